@@ -1,0 +1,267 @@
+//! Component types: what components of a type have and may do.
+
+use super::finding::Origin;
+use super::names::{Ident, TypeName};
+use super::run_state::RunState;
+use super::value::{FitError, Value, ValueType};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A component type. Members are kept in alphabetical order; the runtime may address one by its index in that order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComponentType {
+    /// Its name.
+    pub name: TypeName,
+    /// What it is for, one or more sentences; printed by `davit types`.
+    pub doc: String,
+    /// Ports.
+    pub ports: BTreeMap<Ident, PortType>,
+    /// Properties.
+    pub properties: BTreeMap<Ident, PropertyType>,
+    /// Operations.
+    pub operations: BTreeMap<Ident, OperationType>,
+    /// Types whose components start before those of this type.
+    pub start_after: Vec<TypeName>,
+    /// Types whose components stop after those of this type.
+    pub stop_before: Vec<TypeName>,
+    /// Whether it moves something.
+    pub actuator: bool,
+    /// What of its life cannot be undone.
+    pub irreversible: Irreversible,
+    /// Where it was declared (none for types of a library).
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// Which moves of a component cannot be undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[allow(clippy::struct_excessive_bools)]
+pub struct Irreversible {
+    /// Configuring (as for a device that is calibrated by it).
+    pub configure: bool,
+    /// Stopping.
+    pub stop: bool,
+    /// Destroying.
+    pub destroy: bool,
+}
+
+/// In or out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// Read by the component.
+    In,
+    /// Written by the component.
+    Out,
+}
+
+/// A port of a type. `type: event` makes an event port, `buffered: true` a port that only takes buffered connections.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PortType {
+    /// In or out.
+    pub direction: Direction,
+    /// What travels through it.
+    #[serde(rename = "type")]
+    pub ty: ValueType,
+    /// The unit, if it states one.
+    pub unit: Option<Arc<str>>,
+    /// An in-port that is read as a queue: takes only buffered connections, any number of them.
+    pub buffered: bool,
+    /// What it is.
+    pub doc: String,
+    /// Where it was declared.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+impl PortType {
+    /// Whether it carries event names.
+    pub fn is_event(&self) -> bool {
+        self.ty == ValueType::Event
+    }
+}
+
+/// In which run states a property may be set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Tunable {
+    /// Only while unconfigured.
+    Unconfigured,
+    /// While unconfigured or stopped.
+    Stopped,
+    /// Also while running (and faulted).
+    #[default]
+    Always,
+}
+
+impl Tunable {
+    /// Whether a property may be set in `state`.
+    pub fn allows(self, state: RunState) -> bool {
+        match self {
+            Self::Unconfigured => state == RunState::Unconfigured,
+            Self::Stopped => matches!(state, RunState::Unconfigured | RunState::Stopped),
+            Self::Always => true,
+        }
+    }
+}
+
+/// A property of a type.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PropertyType {
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: ValueType,
+    /// Its value where none is given; a property without one must be given in `create`.
+    pub default: Option<Value>,
+    /// Smallest value allowed, of every number in it.
+    pub min: Option<f64>,
+    /// Largest value allowed, of every number in it.
+    pub max: Option<f64>,
+    /// When it may be set.
+    pub tunable: Tunable,
+    /// The unit, if it states one.
+    pub unit: Option<Arc<str>>,
+    /// What it is.
+    pub doc: String,
+    /// Where it was declared.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// Why a value may not be given to a property.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ValueError {
+    /// Not of the type.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// Outside the limits.
+    #[error("{value} is outside {}", range(*.min, *.max))]
+    Range {
+        /// The number at fault.
+        value: f64,
+        /// The smallest allowed.
+        min: Option<f64>,
+        /// The largest allowed.
+        max: Option<f64>,
+    },
+}
+
+fn range(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} … {max}"),
+        (Some(min), None) => format!("{min} and more"),
+        (None, Some(max)) => format!("{max} and less"),
+        (None, None) => "any number".to_owned(),
+    }
+}
+
+impl PropertyType {
+    /// `value` as a value of this property: of its type, within its limits.
+    ///
+    /// # Errors
+    /// [`ValueError`] naming the number or element at fault.
+    pub fn fit(&self, value: Value) -> Result<Value, ValueError> {
+        let value = value.fit(&self.ty)?;
+        let mut bad = None;
+        if self.min.is_some() || self.max.is_some() {
+            value.for_each_number(&mut |n| {
+                if bad.is_none() && (self.min.is_some_and(|m| n < m) || self.max.is_some_and(|m| n > m)) {
+                    bad = Some(n);
+                }
+            });
+        }
+        match bad {
+            Some(value) => Err(ValueError::Range { value, min: self.min, max: self.max }),
+            None => Ok(value),
+        }
+    }
+}
+
+/// What an operation leaves behind.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Effect {
+    /// Nothing that would have to be undone.
+    None,
+    /// Undone by this operation of the same component, called with the same arguments, or none if it takes none.
+    Undo(Ident),
+    /// Something that nothing undoes.
+    Irreversible,
+}
+
+/// An operation of a type.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OperationType {
+    /// Types of its arguments.
+    pub args: Vec<ValueType>,
+    /// Type of its result, if it has one.
+    pub returns: Option<ValueType>,
+    /// What it leaves behind; without a word, irreversible.
+    pub effect: Effect,
+    /// What it does.
+    pub doc: String,
+    /// Where it was declared.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// The component types a deployment may use, by name.
+#[derive(Debug, Clone, Default)]
+pub struct Catalogue {
+    types: BTreeMap<TypeName, Arc<ComponentType>>,
+}
+
+impl Catalogue {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a type; answers the one it replaced, if the name was taken.
+    pub fn insert(&mut self, ty: impl Into<Arc<ComponentType>>) -> Option<Arc<ComponentType>> {
+        let ty = ty.into();
+        self.types.insert(ty.name, ty)
+    }
+
+    /// The type of that name.
+    pub fn get(&self, name: TypeName) -> Option<&Arc<ComponentType>> {
+        self.types.get(&name)
+    }
+
+    /// All types, by name.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<ComponentType>> {
+        self.types.values()
+    }
+
+    /// Adds all types of `other`.
+    pub fn extend(&mut self, other: &Self) {
+        self.types.extend(other.types.iter().map(|(name, ty)| (*name, ty.clone())));
+    }
+}
+
+impl ComponentType {
+    /// A type without members; the builder methods below add them.
+    ///
+    /// # Panics
+    /// When `name` is no type name: types are written by programmers.
+    pub fn new(name: &str, doc: &str) -> Self {
+        Self {
+            name: TypeName::new(name).expect("a component type's name"),
+            doc: doc.to_owned(),
+            ports: BTreeMap::new(),
+            properties: BTreeMap::new(),
+            operations: BTreeMap::new(),
+            start_after: Vec::new(),
+            stop_before: Vec::new(),
+            actuator: false,
+            irreversible: Irreversible::default(),
+            origin: Origin::NONE,
+        }
+    }
+
+    /// The port of that name.
+    pub fn port(&self, name: Ident) -> Option<&PortType> {
+        self.ports.get(&name)
+    }
+}

@@ -1,0 +1,120 @@
+//! Deployments: everything of one system, as written.
+
+use super::component_type::ComponentType;
+use super::configuration::Configuration;
+use super::finding::Origin;
+use super::names::{ConfigId, EventName, Ident};
+use super::statechart::Statechart;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A deployment file and all it names, lowered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deployment {
+    /// Its name; also the name of its control socket.
+    pub name: Ident,
+    /// The platform it runs on.
+    pub platform: Ident,
+    /// Component libraries it uses.
+    pub libraries: Vec<Ident>,
+    /// Component types declared in the file.
+    pub types: Vec<ComponentType>,
+    /// Activities by name.
+    pub activities: BTreeMap<Ident, Activity>,
+    /// Configurations in written order; IDs are unique.
+    pub configurations: Vec<Configuration>,
+    /// The coordinator.
+    pub coordinator: Statechart,
+    /// Events that leave the deployment.
+    pub emits: Vec<(EventName, Origin)>,
+    /// How it is brought up.
+    pub deploy: BringUp,
+    /// How it is taken down.
+    pub shutdown: TakeDown,
+    /// Bounds the user may set.
+    pub limits: DeploymentLimits,
+    /// How safely the journal is kept.
+    pub durability: Durability,
+    /// Where it was written.
+    pub origin: Origin,
+    /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
+    /// about them.
+    pub key_origins: BTreeMap<String, Origin>,
+}
+
+/// A thread of the embedded runtime that updates components.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Activity {
+    /// Its period; none: event-driven, updated when a sample or an event arrives.
+    pub period: Option<Duration>,
+    /// Its scheduling priority, 0 (none asked for) to 99.
+    pub priority: u8,
+    /// The CPU it is bound to.
+    pub cpu: Option<u32>,
+    /// Where it was written.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// How a deployment comes up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BringUp {
+    /// The event that starts it.
+    pub event: EventName,
+    /// The coordinator's state that means *up*: a name or a path (`operational`, `root.operational`).
+    pub up: String,
+    /// States that mean it failed.
+    pub failed: Vec<String>,
+    /// How long it may take.
+    pub within: Duration,
+}
+
+/// How a deployment goes down.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TakeDown {
+    /// The event that starts it.
+    pub event: EventName,
+    /// The coordinator's state that means *down*.
+    pub down: String,
+    /// How long it may take before it is forced.
+    pub within: Duration,
+}
+
+/// Bounds the user may set; defaults are in [`crate::limits`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeploymentLimits {
+    /// Frames on the stack before the oldest are squashed.
+    pub stack: usize,
+    /// How long one step may take.
+    pub step_timeout: Duration,
+}
+
+impl Default for DeploymentLimits {
+    fn default() -> Self {
+        Self { stack: crate::limits::STACK, step_timeout: crate::limits::STEP_TIMEOUT }
+    }
+}
+
+/// How safely the journal is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Durability {
+    /// Every application is on disk before it begins.
+    #[default]
+    Full,
+    /// Faster; after a crash the last application may be unknown.
+    Relaxed,
+}
+
+impl Deployment {
+    /// The configuration of that name.
+    pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
+        self.configurations.iter().find(|c| c.id == id)
+    }
+
+    /// Where the key of that path was written.
+    pub fn key_origin(&self, path: &str) -> Origin {
+        self.key_origins.get(path).copied().unwrap_or(self.origin)
+    }
+}

@@ -1,0 +1,178 @@
+//! Findings: what is wrong, as data.
+//!
+//! A finding carries a stable [`Code`], the element it is about (an [`Origin`], which the source map turns into a place
+//! in a text, and a path in the model for when there is no text), further labels, and what to do next. Turning findings
+//! into words on a terminal is the business of `diagnostics` alone.
+
+pub use super::codes::Code;
+
+/// Where in the user's text a model element came from: an index into the source map that the loader made.
+///
+/// Origins are no part of the meaning: two elements that differ only in origin are equal.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Origin(pub u32);
+
+impl Origin {
+    /// The origin of what was never written in a file (built from Rust, or made up by a default).
+    pub const NONE: Self = Self(0);
+
+    /// Whether there is a text to point at.
+    pub fn is_some(self) -> bool {
+        self.0 != 0
+    }
+}
+
+impl PartialEq for Origin {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+impl Eq for Origin {}
+impl std::hash::Hash for Origin {
+    fn hash<H: std::hash::Hasher>(&self, _: &mut H) {}
+}
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Good to know.
+    Info,
+    /// Allowed, and likely not what was meant.
+    Warning,
+    /// Refused.
+    Error,
+}
+
+/// A second place that explains the first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    /// The element.
+    pub origin: Origin,
+    /// What it has to do with the finding.
+    pub text: String,
+}
+
+/// One thing that is wrong, or worth saying.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// The stable code.
+    pub code: Code,
+    /// How much it matters.
+    pub severity: Severity,
+    /// One sentence, without a final stop.
+    pub message: String,
+    /// The element at fault.
+    pub origin: Origin,
+    /// What to write at the place itself; empty: nothing.
+    pub label: String,
+    /// The element's path in the model, `configurations.engage.changes[2]`; empty when unknown.
+    pub path: String,
+    /// Other places that explain it.
+    pub labels: Vec<Label>,
+    /// What to do next.
+    pub help: Option<String>,
+}
+
+impl Finding {
+    /// A finding of the given severity at no place yet.
+    pub fn new(severity: Severity, code: Code, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            severity,
+            message: message.into(),
+            origin: Origin::NONE,
+            label: String::new(),
+            path: String::new(),
+            labels: Vec::new(),
+            help: None,
+        }
+    }
+
+    /// An error.
+    pub fn error(code: Code, message: impl Into<String>) -> Self {
+        Self::new(Severity::Error, code, message)
+    }
+
+    /// A warning.
+    pub fn warning(code: Code, message: impl Into<String>) -> Self {
+        Self::new(Severity::Warning, code, message)
+    }
+
+    /// Information.
+    pub fn info(code: Code, message: impl Into<String>) -> Self {
+        Self::new(Severity::Info, code, message)
+    }
+
+    /// The same, at a place.
+    #[must_use]
+    pub fn at(mut self, origin: Origin) -> Self {
+        self.origin = origin;
+        self
+    }
+
+    /// The same, with a text at the place.
+    #[must_use]
+    pub fn labelled(mut self, text: impl Into<String>) -> Self {
+        self.label = text.into();
+        self
+    }
+
+    /// The same, with the element's path in the model.
+    #[must_use]
+    pub fn path(mut self, path: impl Into<String>) -> Self {
+        self.path = path.into();
+        self
+    }
+
+    /// The same, with a second place.
+    #[must_use]
+    pub fn also(mut self, origin: Origin, text: impl Into<String>) -> Self {
+        self.labels.push(Label { origin, text: text.into() });
+        self
+    }
+
+    /// The same, with what to do next.
+    #[must_use]
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        self.help = Some(text.into());
+        self
+    }
+
+    /// Whether it refuses.
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+}
+
+/// A list of findings, in the order they were made.
+pub type Findings = Vec<Finding>;
+
+/// Whether any of `findings` refuses.
+pub fn has_errors(findings: &[Finding]) -> bool {
+    findings.iter().any(Finding::is_error)
+}
+
+/// The known name nearest to `name`, if one is near enough to be what was meant.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase()), candidate))
+        .filter(|(score, candidate)| *score > 0.8 && *candidate != name)
+        .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
+        .map(|(_, candidate)| candidate)
+}
+
+/// The usual help for an unknown name: the nearest known one, else the list of known ones (at most eight of them).
+pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    if let Some(near) = nearest(name, known.iter().copied()) {
+        return format!("did you mean `{near}`?");
+    }
+    if known.is_empty() {
+        return format!("there are no {what} here");
+    }
+    let shown: Vec<String> = known.iter().take(8).map(|k| format!("`{k}`")).collect();
+    let more = if known.len() > 8 { format!(" and {} more", known.len() - 8) } else { String::new() };
+    format!("known {what}: {}{more}", shown.join(", "))
+}

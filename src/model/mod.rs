@@ -1,0 +1,28 @@
+//! What is meant: plain data, no I/O, threads, clock or Lua.
+
+pub mod codes;
+pub mod component_type;
+pub mod configuration;
+pub mod deployment;
+pub mod event;
+pub mod finding;
+pub mod names;
+pub mod run_state;
+pub mod snapshot;
+pub mod statechart;
+pub mod step;
+pub mod value;
+
+pub use component_type::{
+    Catalogue, ComponentType, Direction, Effect, Irreversible, OperationType, PortType, PropertyType, Tunable,
+};
+pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy, StateEntry, Target};
+pub use deployment::{Activity, BringUp, Deployment, DeploymentLimits, Durability, TakeDown};
+pub use event::{Ask, RequestId, Verdict};
+pub use finding::{Code, Finding, Findings, Origin, Severity};
+pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
+pub use run_state::{RunState, Transition};
+pub use snapshot::{ComponentSnapshot, Snapshot};
+pub use statechart::Statechart;
+pub use step::Step;
+pub use value::{Value, ValueType};

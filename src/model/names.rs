@@ -1,0 +1,216 @@
+//! Names, each kind its own type.
+//!
+//! Every name is interned ([`ustr`]): copying, comparing and hashing one costs as much as a pointer, which is what lets a
+//! plan touch thousands of components without an allocation per name. Interned text is never freed; the text a
+//! deployment may bring in is bounded (see [`crate::limits`]), and so is what it can intern.
+//!
+//! Grammar (design §2): a plain name is `[A-Za-z_][A-Za-z0-9_]*`; subsystems are separated by `/`, a member by `.`:
+//! `left/Dynamics.force_gain`.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use ustr::Ustr;
+
+/// Why a text is not a name of the wanted kind.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not a {kind}: {reason}")]
+pub struct NameError {
+    /// The refused text.
+    pub text: String,
+    /// The kind of name that was wanted.
+    pub kind: &'static str,
+    /// What is wrong with it.
+    pub reason: &'static str,
+}
+
+fn is_plain(text: &str) -> bool {
+    let mut bytes = text.bytes();
+    matches!(bytes.next(), Some(b) if b.is_ascii_alphabetic() || b == b'_')
+        && bytes.all(|b| b.is_ascii_alphanumeric() || b == b'_')
+}
+
+const PLAIN: &str = "letters, digits and `_`, not starting with a digit";
+
+macro_rules! name {
+    ($(#[$doc:meta])* $name:ident, $kind:literal, $valid:expr, $reason:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $name(Ustr);
+
+        impl $name {
+            /// The name, or why `text` cannot be one.
+            ///
+            /// # Errors
+            /// [`NameError`] when `text` does not follow the grammar above.
+            pub fn new(text: &str) -> Result<Self, NameError> {
+                let valid: fn(&str) -> bool = $valid;
+                if valid(text) {
+                    Ok(Self(Ustr::from(text)))
+                } else {
+                    Err(NameError { text: text.to_owned(), kind: $kind, reason: $reason })
+                }
+            }
+
+            /// The text of the name.
+            pub fn as_str(&self) -> &'static str {
+                self.0.as_str()
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.as_str())
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.as_str())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = NameError;
+            fn from_str(text: &str) -> Result<Self, NameError> {
+                Self::new(text)
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.as_str())
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let text = String::deserialize(deserializer)?;
+                Self::new(&text).map_err(serde::de::Error::custom)
+            }
+        }
+    };
+}
+
+name!(
+    /// A plain name: of a port, a property, an operation, an activity, a group, a deployment, a record field.
+    Ident, "name", is_plain, PLAIN
+);
+name!(
+    /// A component's name, with the prefix of its subsystem where it has one: `Dynamics`, `left/Dynamics`.
+    ComponentName, "component name", |t| t.split('/').all(is_plain),
+    "plain names (letters, digits, `_`) separated by `/`"
+);
+name!(
+    /// A component type's name: `Gain`, `youbot.Dynamics`.
+    TypeName, "component type name", |t| t.split('.').all(is_plain),
+    "plain names (letters, digits, `_`) separated by `.`"
+);
+name!(
+    /// A configuration's name (its ID), with the prefix of its subsystem where it has one.
+    ConfigId, "configuration name", |t| t.split('/').all(is_plain),
+    "plain names (letters, digits, `_`) separated by `/`"
+);
+name!(
+    /// An event. rFSM models use nearly any text (`e_done@root.a`, `jnt1eff.e_LIM_true`), so only blanks, control
+    /// characters and the empty text are refused: events travel one per word in files of events.
+    EventName, "event name", |t| !t.is_empty() && !t.chars().any(|c| c.is_whitespace() || c.is_control()),
+    "an event is a non-empty text without blanks"
+);
+
+impl ComponentName {
+    /// The subsystem's path before the last `/`, empty at the top.
+    pub fn prefix(&self) -> &'static str {
+        self.as_str().rsplit_once('/').map_or("", |(prefix, _)| prefix)
+    }
+
+    /// `self.member`
+    pub fn member(self, member: Ident) -> MemberRef {
+        MemberRef { component: self, member }
+    }
+}
+
+impl ConfigId {
+    /// The subsystem's path before the last `/`, empty at the top.
+    pub fn prefix(&self) -> &'static str {
+        self.as_str().rsplit_once('/').map_or("", |(prefix, _)| prefix)
+    }
+}
+
+/// `Component.member`: a port, a property or an operation of a component.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MemberRef {
+    /// The component.
+    pub component: ComponentName,
+    /// The port, property or operation.
+    pub member: Ident,
+}
+
+impl MemberRef {
+    /// The reference, or why `text` is not of the form `Component.member`.
+    ///
+    /// # Errors
+    /// [`NameError`] naming the part at fault.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        let Some((component, member)) = text.split_once('.') else {
+            return Err(NameError {
+                text: text.to_owned(),
+                kind: "reference to a member",
+                reason: "it is written `Component.member`",
+            });
+        };
+        Ok(Self { component: ComponentName::new(component)?, member: Ident::new(member)? })
+    }
+}
+
+impl fmt::Display for MemberRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.component, self.member)
+    }
+}
+
+impl fmt::Debug for MemberRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::str::FromStr for MemberRef {
+    type Err = NameError;
+    fn from_str(text: &str) -> Result<Self, NameError> {
+        Self::new(text)
+    }
+}
+
+impl Serialize for MemberRef {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for MemberRef {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Self::new(&text).map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grammar() {
+        assert!(Ident::new("force_gain").is_ok());
+        assert!(Ident::new("9lives").is_err());
+        assert!(Ident::new("").is_err());
+        assert!(ComponentName::new("left/Dynamics").is_ok());
+        assert!(ComponentName::new("left//Dynamics").is_err());
+        assert!(TypeName::new("youbot.Dynamics").is_ok());
+        assert_eq!(MemberRef::new("left/D.k").unwrap().to_string(), "left/D.k");
+        assert!(MemberRef::new("D").is_err());
+        assert!(MemberRef::new("D.k.x").is_err());
+        assert!(EventName::new("e_done@root.a").is_ok());
+        assert!(EventName::new("e b").is_err());
+        assert_eq!(ComponentName::new("left/D").unwrap().prefix(), "left");
+    }
+}

@@ -1,0 +1,144 @@
+//! Platforms: where components live.
+//!
+//! One trait, of blocking calls with deadlines, made from worker threads. Nothing assumes that a call is local, quick or
+//! answered: the same trait must fit components on other hosts and ROS 2 lifecycle nodes.
+
+use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
+use crate::time::Time;
+use std::sync::Arc;
+
+/// How a step ended, as far as the platform knows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It happened. An operation's result, if it has one.
+    Done(Option<Value>),
+    /// It did not happen, and the component is as it was.
+    NotDone(Cause),
+    /// No answer in time, or the connection was lost: it may have happened, may yet happen, or not.
+    Unknown(Cause),
+}
+
+/// Why a step was not done, or is not known to be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Cause {
+    /// The platform's precondition is false (no such component, wrong run state, …).
+    #[error("refused by the platform: {0}")]
+    Refused(String),
+    /// The component's own code answered with an error.
+    #[error("the component failed: {0}")]
+    Failed(String),
+    /// The component's own code panicked; it is faulted.
+    #[error("the component panicked: {0}")]
+    Panicked(String),
+    /// No answer before the deadline.
+    #[error("no answer in time")]
+    Timeout,
+    /// The connection to the component was lost.
+    #[error("the connection was lost: {0}")]
+    Lost(String),
+    /// The component is in quarantine: an earlier call never returned.
+    #[error("in quarantine: an earlier call has not returned")]
+    Quarantined,
+}
+
+/// How a primitive is carried out on this platform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Execution {
+    /// Wait-free and bounded: may run in the configurator's own thread.
+    Immediate,
+    /// May take until its deadline: runs on a worker.
+    Blocking,
+}
+
+/// What a platform reports by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlatformEvent {
+    /// A component raised an event on one of its event ports, or the platform did in its name.
+    Raised {
+        /// The event.
+        event: EventName,
+        /// Who.
+        component: ComponentName,
+        /// When.
+        at: Time,
+    },
+    /// A component became faulted.
+    Faulted {
+        /// Who.
+        component: ComponentName,
+        /// What happened.
+        reason: String,
+        /// When.
+        at: Time,
+    },
+    /// A component whose call had never returned came back and was cleaned up (it is gone, or as before the call).
+    Returned {
+        /// Who.
+        component: ComponentName,
+        /// When.
+        at: Time,
+    },
+}
+
+/// Where platform events go. Called from any thread; must not block.
+pub type EventSink = Arc<dyn Fn(PlatformEvent) + Send + Sync>;
+
+/// Why an observation failed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ObserveError {
+    /// No answer before the deadline.
+    #[error("the platform did not answer in time")]
+    Timeout,
+    /// The connection was lost.
+    #[error("the connection to the platform was lost: {0}")]
+    Lost(String),
+}
+
+/// Where components live.
+pub trait Platform: Send + Sync {
+    /// The component types it can make (libraries' and declared ones).
+    fn catalogue(&self) -> &Catalogue;
+
+    /// Whether a step is immediate or blocking here.
+    fn execution(&self, step: &Step) -> Execution;
+
+    /// Carries out one step. Returns by `deadline` (a little later at most), whatever the component does.
+    /// Checks its own precondition: a step that does not fit what is there is refused and changes nothing.
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome;
+
+    /// The whole system as it is.
+    ///
+    /// # Errors
+    /// When it cannot be read by `deadline`.
+    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError>;
+
+    /// One component as it is; none when there is none. Used to settle an unknown outcome.
+    ///
+    /// # Errors
+    /// When it cannot be read by `deadline`.
+    fn observe_component(
+        &self,
+        component: ComponentName,
+        deadline: Time,
+    ) -> Result<Option<ComponentSnapshot>, ObserveError>;
+
+    /// Resolves a fixed list of steps (no create, destroy) to handles, so that running them again and again costs as
+    /// little as the platform can make it. None: not supported, or some step is blocking.
+    fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
+        let _ = steps;
+        None
+    }
+
+    /// From now on events go to `sink` (one sink; the last one set).
+    fn subscribe(&self, sink: EventSink);
+
+    /// Components whose call never returned.
+    fn quarantined(&self) -> Vec<ComponentName>;
+}
+
+/// A fixed list of immediate steps, resolved.
+pub trait Prepared: Send {
+    /// Carries out step `index` of the list with the value it was prepared with, or with `value` where given (an
+    /// inverse: the value captured). Allocates nothing, takes no lock shared with an activity.
+    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome;
+}
