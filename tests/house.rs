@@ -1,0 +1,320 @@
+//! The rules of the house, read from the sources: which room may use which (`ARCHITECTURE.md`), how long a file may be,
+//! which words may not stand in it, where time may be read, and that every finding code is used and explained.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// A file past this is a sign that a second idea lives in it.
+const LINES: usize = 500;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files_under(dir: &Path, endings: &[&str], found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(dir) else { return };
+    let mut paths: Vec<PathBuf> = entries.map(|e| e.expect("a readable directory").path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() {
+            if path.file_name().is_some_and(|n| n != "target" && n != ".git") {
+                files_under(&path, endings, found);
+            }
+        } else if path.extension().is_some_and(|e| endings.iter().any(|x| e == *x)) {
+            found.push(path);
+        }
+    }
+}
+
+/// Every Rust source under `dir` of the project, with its path relative to the project and its text.
+fn sources(dir: &str) -> Vec<(String, String)> {
+    let mut paths = Vec::new();
+    files_under(&root().join(dir), &["rs"], &mut paths);
+    paths
+        .into_iter()
+        .map(|path| {
+            let text = std::fs::read_to_string(&path).expect("sources are UTF-8");
+            let name = path.strip_prefix(root()).expect("inside the project").to_string_lossy().into_owned();
+            (name, text)
+        })
+        .collect()
+}
+
+/// The import table: room → rooms it may use.
+fn table(text: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let section = text.split("## Import table").nth(1).expect("ARCHITECTURE.md has a section `Import table`");
+    let mut table = BTreeMap::new();
+    let mut above: Vec<String> = Vec::new();
+    for line in section.lines().map(str::trim).skip_while(|l| !l.starts_with('|')).take_while(|l| l.starts_with('|')) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let ([room, uses], true) = (<[&str; 2]>::try_from(cells).expect("two columns"), line.contains('`')) else {
+            continue;
+        };
+        let room = room.trim_matches('`').to_owned();
+        let named: BTreeSet<String> =
+            uses.split('`').skip(1).step_by(2).map(|name| name.trim_end_matches('/').to_owned()).collect();
+        let allowed = if uses.starts_with("all above") {
+            above.iter().filter(|r| !named.contains(*r)).cloned().collect()
+        } else {
+            named
+        };
+        for used in &allowed {
+            assert!(above.contains(used), "ARCHITECTURE.md: `{room}` may use `{used}`, which does not stand above it");
+        }
+        table.insert(room.clone(), allowed);
+        above.push(room);
+    }
+    assert!(table.len() > 10, "the import table of ARCHITECTURE.md was not understood");
+    table
+}
+
+/// The text without comments and with string contents blanked, line by line.
+fn code_lines(text: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut in_raw: Option<String> = None;
+    for line in text.lines() {
+        let mut out = String::new();
+        let mut rest = line;
+        loop {
+            if let Some(end) = &in_raw {
+                let Some(at) = rest.find(end.as_str()) else { break };
+                rest = &rest[at + end.len()..];
+                in_raw = None;
+                continue;
+            }
+            let Some(c) = rest.chars().next() else { break };
+            if rest.starts_with("//") {
+                break;
+            }
+            if let Some(after) = rest.strip_prefix('r') {
+                let hashes = after.chars().take_while(|c| *c == '#').count();
+                let word = out.chars().last().is_some_and(|c| c.is_alphanumeric() || c == '_');
+                if !word && after[hashes..].starts_with('"') {
+                    in_raw = Some(format!("\"{}", "#".repeat(hashes)));
+                    rest = &after[hashes + 1..];
+                    continue;
+                }
+            }
+            if c == '"' {
+                let mut escaped = false;
+                let end = rest[1..].find(|c| {
+                    let ends = c == '"' && !escaped;
+                    escaped = c == '\\' && !escaped;
+                    ends
+                });
+                out.push_str("\"\"");
+                match end {
+                    Some(end) => rest = &rest[end + 2..],
+                    None => {
+                        // A string over several lines: its end is looked for as that of a raw one.
+                        in_raw = Some("\"".to_owned());
+                        rest = "";
+                    }
+                }
+                continue;
+            }
+            if rest.starts_with("'\"'") {
+                out.push_str("' '");
+                rest = &rest[3..];
+                continue;
+            }
+            if rest.starts_with("'\\") {
+                let end = rest[2..].char_indices().skip(1).find(|(_, c)| *c == '\'').map_or(rest.len(), |(i, _)| i + 3);
+                out.push_str("' '");
+                rest = &rest[end.min(rest.len())..];
+                continue;
+            }
+            out.push(c);
+            rest = &rest[c.len_utf8()..];
+        }
+        lines.push(out);
+    }
+    lines
+}
+
+/// The rooms a source names after `prefix` (`crate::` or `davit::`), with the line of each: `crate::a::b` and
+/// `crate::{a::b, c}`.
+fn rooms_named(text: &str, prefix: &str) -> Vec<(usize, String)> {
+    let code = code_lines(text).join("\n");
+    let mut found = Vec::new();
+    let mut from = 0;
+    while let Some(at) = code[from..].find(prefix).map(|i| i + from) {
+        from = at + prefix.len();
+        if code[..at].chars().last().is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '$') {
+            continue;
+        }
+        let line = code[..at].matches('\n').count() + 1;
+        let rest = code[from..].trim_start();
+        if let Some(group) = rest.strip_prefix('{') {
+            let mut depth = 0usize;
+            let mut word = String::new();
+            let mut first = true;
+            for c in group.chars() {
+                match c {
+                    '{' => depth += 1,
+                    '}' if depth == 0 => break,
+                    '}' => depth -= 1,
+                    ',' if depth == 0 => {
+                        found.push((line, std::mem::take(&mut word)));
+                        first = true;
+                        continue;
+                    }
+                    _ => {}
+                }
+                if depth == 0 && first {
+                    if c.is_alphanumeric() || c == '_' {
+                        word.push(c);
+                    } else if !word.is_empty() {
+                        first = false;
+                    }
+                }
+            }
+            found.push((line, word));
+        } else {
+            found.push((line, rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()));
+        }
+    }
+    found.retain(|(_, room)| !room.is_empty());
+    found
+}
+
+fn room_of(file: &str) -> String {
+    let inside = file.strip_prefix("src/").expect("a file under src");
+    inside.split('/').next().expect("a name").trim_end_matches(".rs").to_owned()
+}
+
+#[test]
+fn imports_follow_the_table() {
+    let architecture = std::fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md is there");
+    let table = table(&architecture);
+    let mut wrong = Vec::new();
+    for (file, text) in sources("src") {
+        let room = room_of(&file);
+        if room == "lib" || room == "main" {
+            continue;
+        }
+        let Some(allowed) = table.get(&room) else {
+            wrong.push(format!("{file}: the room `{room}` is not in the import table of ARCHITECTURE.md"));
+            continue;
+        };
+        for (line, used) in rooms_named(&text, "crate::") {
+            if used != room && !allowed.contains(&used) {
+                let why = if table.contains_key(&used) {
+                    format!(
+                        "`{room}` may use only {allowed:?}: imports point downwards, so that every room can be read, \
+                         tested and replaced without the rooms that stand on it"
+                    )
+                } else {
+                    "no room of that name is in the table: name things by the room they live in".to_owned()
+                };
+                wrong.push(format!("{file}:{line}: uses `crate::{used}`; {why}"));
+            }
+        }
+        // `super` must not climb out of the room either.
+        let depth = file.matches('/').count() - usize::from(file.ends_with("/mod.rs"));
+        let climb = "super::".repeat(depth + 1);
+        for (i, line) in code_lines(&text).iter().enumerate() {
+            if line.contains(&climb) {
+                wrong.push(format!("{file}:{}: `{climb}` leaves the room; write `crate::ROOM::…`", i + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "imports that are not in the table of ARCHITECTURE.md:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn files_hold_one_idea() {
+    let long: Vec<String> = sources("src")
+        .into_iter()
+        .chain(sources("tests"))
+        .filter(|(_, text)| text.lines().count() > LINES)
+        // A list of pages is one idea however long it gets.
+        .filter(|(file, _)| file != "src/model/codes.rs")
+        .map(|(file, text)| format!("{file}: {} lines", text.lines().count()))
+        .collect();
+    assert!(long.is_empty(), "files past {LINES} lines; a second idea lives there, split it:\n{}", long.join("\n"));
+}
+
+#[test]
+fn nothing_is_left_undone_and_no_machine_is_named() {
+    // Put together here, so that this file does not contain them.
+    let words =
+        [["to", "do!("], ["unimple", "mented!("], ["db", "g!("], ["/wo", "rk/"], ["/tm", "p/"], ["/ho", "me/"], ["/ro", "ot/"]]
+            .map(|parts| parts.concat());
+    let mut paths = Vec::new();
+    for dir in ["src", "tests", "examples", "benches", "configs", "deployments", "docs", "fuzz"] {
+        files_under(&root().join(dir), &["rs", "lua", "yaml", "yml", "md", "toml", "py", "sh", "json"], &mut paths);
+    }
+    for name in ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "Cargo.toml", "clippy.toml"] {
+        paths.push(root().join(name));
+    }
+    let mut wrong = Vec::new();
+    for path in paths {
+        let Ok(text) = std::fs::read_to_string(&path) else { continue };
+        for (i, line) in text.lines().enumerate() {
+            for word in &words {
+                if line.contains(word.as_str()) {
+                    wrong.push(format!("{}:{}: `{word}`", path.strip_prefix(root()).unwrap().display(), i + 1));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "unfinished code, or paths that exist on one machine only:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn time_is_read_in_one_room() {
+    let mut wrong = Vec::new();
+    for (file, text) in sources("src") {
+        if room_of(&file) == "time" {
+            continue;
+        }
+        for (i, line) in code_lines(&text).iter().enumerate() {
+            for word in ["Instant::now", "SystemTime::now", "thread::sleep", "UNIX_EPOCH.elapsed"] {
+                if line.contains(word) {
+                    wrong.push(format!("{file}:{}: `{word}`", i + 1));
+                }
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "time comes from the clock of `time`, which can be simulated; else a scenario is no ordinary test:\n{}",
+        wrong.join("\n")
+    );
+}
+
+#[test]
+fn every_code_is_used_and_explained() {
+    let text = std::fs::read_to_string(root().join("src/model/codes.rs")).expect("codes.rs is there");
+    let list = text.split("\ncodes! {").nth(1).and_then(|t| t.split("\n}\n").next()).expect("the list of codes");
+    let names: Vec<&str> = list
+        .lines()
+        .filter_map(|line| line.trim().split_once(" = \""))
+        .map(|(name, _)| name)
+        .filter(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'))
+        .collect();
+    assert_eq!(names.len(), davit::model::codes::PAGES.len(), "codes.rs was not understood");
+    let code: String = sources("src")
+        .into_iter()
+        .filter(|(file, _)| file != "src/model/codes.rs")
+        .map(|(_, text)| code_lines(&text).join("\n"))
+        .collect();
+    let words: BTreeSet<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let unused: Vec<&&str> = names.iter().filter(|name| !words.contains(**name)).collect();
+    assert!(unused.is_empty(), "codes that nothing reports; remove them, or report them: {unused:?}");
+    for page in davit::model::codes::PAGES {
+        assert!(page.text.len() > 60, "{} has no real page", page.code);
+        assert!(!page.title.is_empty() && !page.title.ends_with('.'), "{}: the title is one line without a stop", page.code);
+    }
+}
+
+#[test]
+fn the_reader_of_imports_reads() {
+    let text = "use crate::{model::{A, b::C}, system, plan::x};\n// crate::lang\nlet s = \"crate::cli\";\nfn f() { \
+                crate::stack::go() }\nlet q = '\"'; crate::draw::x();\nlet r = r#\"crate::app\"#; crate::time::y();";
+    let rooms: Vec<(usize, String)> = rooms_named(text, "crate::");
+    let names: Vec<&str> = rooms.iter().map(|(_, r)| r.as_str()).collect();
+    assert_eq!(names, ["model", "system", "plan", "stack", "draw", "time"]);
+    assert_eq!(rooms[3].0, 4);
+}
