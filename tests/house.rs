@@ -238,9 +238,16 @@ fn files_hold_one_idea() {
 #[test]
 fn nothing_is_left_undone_and_no_machine_is_named() {
     // Put together here, so that this file does not contain them.
-    let words =
-        [["to", "do!("], ["unimple", "mented!("], ["db", "g!("], ["/wo", "rk/"], ["/tm", "p/"], ["/ho", "me/"], ["/ro", "ot/"]]
-            .map(|parts| parts.concat());
+    let words = [
+        ["to", "do!("],
+        ["unimple", "mented!("],
+        ["db", "g!("],
+        ["/wo", "rk/"],
+        ["/tm", "p/"],
+        ["/ho", "me/"],
+        ["/ro", "ot/"],
+    ]
+    .map(|parts| parts.concat());
     let mut paths = Vec::new();
     for dir in ["src", "tests", "examples", "benches", "configs", "deployments", "docs", "fuzz"] {
         files_under(&root().join(dir), &["rs", "lua", "yaml", "yml", "md", "toml", "py", "sh", "json"], &mut paths);
@@ -292,7 +299,9 @@ fn every_code_is_used_and_explained() {
         .lines()
         .filter_map(|line| line.trim().split_once(" = \""))
         .map(|(name, _)| name)
-        .filter(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'))
+        .filter(|name| {
+            !name.is_empty() && name.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_')
+        })
         .collect();
     assert_eq!(names.len(), davit::model::codes::PAGES.len(), "codes.rs was not understood");
     let code: String = sources("src")
@@ -305,7 +314,11 @@ fn every_code_is_used_and_explained() {
     assert!(unused.is_empty(), "codes that nothing reports; remove them, or report them: {unused:?}");
     for page in davit::model::codes::PAGES {
         assert!(page.text.len() > 60, "{} has no real page", page.code);
-        assert!(!page.title.is_empty() && !page.title.ends_with('.'), "{}: the title is one line without a stop", page.code);
+        assert!(
+            !page.title.is_empty() && !page.title.ends_with('.'),
+            "{}: the title is one line without a stop",
+            page.code
+        );
     }
 }
 
