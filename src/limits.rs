@@ -9,3 +9,15 @@ pub const STACK: usize = 64;
 /// How long one step may take where the deployment does not say: longer than any software-only change, short enough that
 /// an operator does not think the program hangs.
 pub const STEP_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// Connections a control socket serves at once: a coordinator, a few terminals and displays; each costs a thread.
+pub const SOCKET_CONNECTIONS: usize = 32;
+
+/// Bytes of one line on the control socket: far more than any request, little enough to buffer for every connection.
+pub const SOCKET_LINE: usize = 1 << 20;
+
+/// Notifications that may wait for a slow subscriber before it is cut off.
+pub const SOCKET_QUEUE: usize = 1024;
+
+/// How long a client may take to accept what is written to it.
+pub const SOCKET_WRITE: Duration = Duration::from_secs(5);

@@ -1,0 +1,3 @@
+//! A deployment alive: control socket, bring-up, shutdown.
+
+mod socket;
