@@ -1,0 +1,3 @@
+//! The youBot reference application, measured in simulated time.
+
+mod golden;
