@@ -319,7 +319,8 @@ mod tests {
 
     #[test]
     fn triggers_read_what_they_print() {
-        for text in ["e_go", "e_done", "e_done@root.a", "e_after(1)", "e_after(0.50)", "e_at(20)", "e_after(0.5,late)"] {
+        for text in ["e_go", "e_done", "e_done@root.a", "e_after(1)", "e_after(0.50)", "e_at(20)", "e_after(0.5,late)"]
+        {
             let trigger = Trigger::parse(text).unwrap();
             assert_eq!(trigger.to_string(), text);
         }
