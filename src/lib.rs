@@ -2,6 +2,7 @@
 //! again.
 
 pub mod libraries;
+pub mod cli;
 pub mod limits;
 pub mod model;
 pub mod platform;

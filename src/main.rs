@@ -1,1 +1,5 @@
-fn main() {}
+//! The command line with the built-in component libraries.
+
+fn main() -> std::process::ExitCode {
+    davit::cli::main()
+}

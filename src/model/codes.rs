@@ -56,6 +56,9 @@ codes! {
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
     // ---- youbot and standard libraries -----------------------------------------------------------------------------
     // ---- command line ----------------------------------------------------------------------------------------------
+    CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
+        "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
+         `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";
 }
 
 /// The page of `code`, written with or without the leading `davit::`.

@@ -1,0 +1,127 @@
+//! The command line: a thin skin. One file a command, each: load, one call of the library, one view as text or JSON.
+//!
+//! A program with components of its own is three lines: `fn main() -> ExitCode { davit::cli::main(libraries) }`.
+//!
+//! To add a command: a file with an `Args` struct (its doc comment is the help text) that implements [`Run`], and one
+//! line in `commands!` below.
+
+mod completions;
+pub mod exit;
+mod explain;
+pub mod output;
+
+use crate::model::{Code, Finding, Findings};
+use clap::Parser;
+use exit::Exit;
+use output::{Color, Output};
+use std::process::ExitCode;
+
+/// Brings component-based robot systems up, switches them while they run, undoes what it did, and takes them down again.
+///
+/// Exit status: 0 done; 1 the answer is no (findings, failed and rolled back); 2 usage or unreadable input; 3 broken.
+#[derive(Debug, Parser)]
+#[command(name = "davit", version, max_term_width = 100)]
+struct Cli {
+    /// When to use colours.
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
+    color: Color,
+    #[command(subcommand)]
+    command: Command,
+}
+
+macro_rules! commands {
+    ($($variant:ident = $args:path,)*) => {
+        #[derive(Debug, clap::Subcommand)]
+        enum Command {
+            $($variant($args),)*
+        }
+
+        impl Command {
+            fn run(self, context: &Context) -> Answer {
+                match self {
+                    $(Self::$variant(args) => args.run(context),)*
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    Explain = explain::Args,
+    Completions = completions::Args,
+}
+
+/// What every command may use.
+#[derive(Debug)]
+pub struct Context {
+    /// Its streams.
+    pub out: Output,
+}
+
+/// A command.
+pub trait Run {
+    /// Does it, and says how it ended.
+    ///
+    /// # Errors
+    /// [`Failure`] when there are findings instead of an answer.
+    fn run(self, context: &Context) -> Answer;
+}
+
+/// How a command ended, or what kept it from its work.
+pub type Answer = Result<Exit, Failure>;
+
+/// Findings that end a command, and its exit code.
+#[derive(Debug)]
+pub struct Failure {
+    /// How it ended.
+    pub exit: Exit,
+    /// Why.
+    pub findings: Findings,
+}
+
+impl Failure {
+    /// One error; the answer is no.
+    pub fn no(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { exit: Exit::No, findings: vec![Finding::error(code, message).help(help)] }
+    }
+
+    /// One error of usage, or input that cannot be read.
+    pub fn usage(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { exit: Exit::Usage, findings: vec![Finding::error(code, message).help(help)] }
+    }
+}
+
+/// The whole command line: parses the arguments, runs the command, prints what it has to say.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Also help and version, which are no errors. A stream that is gone takes nothing; the code still answers.
+            let _ = error.print();
+            return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
+        }
+    };
+    let context = Context { out: Output::new(cli.color) };
+    match cli.command.run(&context) {
+        Ok(exit) => exit.into(),
+        Err(failure) => {
+            for finding in &failure.findings {
+                context.out.error(format!("error: {} [davit::{}]\n", finding.message, finding.code));
+                if let Some(help) = &finding.help {
+                    context.out.error(format!("  help: {help}\n"));
+                }
+            }
+            failure.exit.into()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        <Cli as clap::CommandFactory>::command().debug_assert();
+    }
+}

@@ -1,0 +1,188 @@
+//! Where a command's words go: text or JSON on stdout, findings on stderr, colours only where a terminal shows them.
+//!
+//! A reader that goes away (`davit plan … | head`) is no error of ours: what is left is thrown away and the command's
+//! answer stands.
+
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::{self, ErrorKind, IsTerminal, Write};
+
+/// When to use colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Color {
+    /// On a terminal, unless NO_COLOR is set.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl Color {
+    fn on(self, terminal: bool) -> bool {
+        match self {
+            Self::Auto => terminal && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
+}
+
+/// The two streams of a command.
+#[derive(Debug, Clone, Copy)]
+pub struct Output {
+    stdout_color: bool,
+    stderr_color: bool,
+}
+
+/// A style of a word. Styles mean the same in every command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Headings.
+    Bold,
+    /// What matters less.
+    Dim,
+    /// Fine, running, exact.
+    Good,
+    /// Look at it: warnings, compensated.
+    Care,
+    /// Wrong, broken, irreversible.
+    Bad,
+    /// Names.
+    Name,
+}
+
+impl Output {
+    /// Streams with colours as asked.
+    pub fn new(color: Color) -> Self {
+        Self { stdout_color: color.on(io::stdout().is_terminal()), stderr_color: color.on(io::stderr().is_terminal()) }
+    }
+
+    /// Whether findings may be coloured.
+    pub fn color_on_stderr(&self) -> bool {
+        self.stderr_color
+    }
+
+    /// `text` in `style`, where stdout shows colours.
+    pub fn paint(&self, style: Style, text: impl Display) -> String {
+        if !self.stdout_color {
+            return text.to_string();
+        }
+        let code = match style {
+            Style::Bold => "1",
+            Style::Dim => "2",
+            Style::Good => "32",
+            Style::Care => "33",
+            Style::Bad => "31",
+            Style::Name => "36",
+        };
+        format!("\x1b[{code}m{text}\x1b[0m")
+    }
+
+    /// Text to stdout as it is.
+    pub fn text(&self, text: impl AsRef<str>) {
+        put(&mut io::stdout().lock(), text.as_ref());
+    }
+
+    /// A line to stdout.
+    pub fn line(&self, line: impl Display) {
+        put(&mut io::stdout().lock(), &format!("{line}\n"));
+    }
+
+    /// A value as JSON on stdout, indented, with a final newline.
+    pub fn json(&self, value: &impl Serialize) {
+        let text = serde_json::to_string_pretty(value).expect("views are plain data");
+        self.line(text);
+    }
+
+    /// A value as JSON on one line of stdout.
+    pub fn json_line(&self, value: &impl Serialize) {
+        let text = serde_json::to_string(value).expect("views are plain data");
+        self.line(text);
+    }
+
+    /// Text to stderr as it is.
+    pub fn error(&self, text: impl AsRef<str>) {
+        put(&mut io::stderr().lock(), text.as_ref());
+    }
+}
+
+fn put(stream: &mut impl Write, text: &str) {
+    match stream.write_all(text.as_bytes()).and_then(|()| stream.flush()) {
+        Ok(()) => {}
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => {}
+        // Nothing can be said on a stream that takes nothing; the exit code still answers.
+        Err(_) => {}
+    }
+}
+
+/// Rows in columns as wide as their widest cell. Cells may carry colours, which take no width.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    rows: Vec<Vec<String>>,
+    indent: usize,
+}
+
+impl Table {
+    /// An empty table, its rows indented by so many blanks.
+    pub fn new(indent: usize) -> Self {
+        Self { rows: Vec::new(), indent }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+}
+
+impl Display for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns)
+            .map(|i| self.rows.iter().filter_map(|r| r.get(i)).map(|c| width(c)).max().unwrap_or(0))
+            .collect();
+        for row in &self.rows {
+            let mut line = " ".repeat(self.indent);
+            for (cell, wide) in row.iter().zip(&widths) {
+                line.push_str(cell);
+                line.push_str(&" ".repeat(wide - width(cell) + 2));
+            }
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+/// Characters of `text` that a terminal shows.
+pub fn width(text: &str) -> usize {
+    let mut count = 0;
+    let mut escape = false;
+    for c in text.chars() {
+        match c {
+            '\x1b' => escape = true,
+            'm' if escape => escape = false,
+            _ if escape => {}
+            _ => count += 1,
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_align_whatever_their_colour() {
+        let mut table = Table::new(2);
+        table.row(["a".into(), "\x1b[1mlong\x1b[0m".into(), "x".into()]);
+        table.row(["bcd".into(), "s".into(), "y".into()]);
+        assert_eq!(table.to_string(), "  a    \x1b[1mlong\x1b[0m  x\n  bcd  s     y\n");
+    }
+}
