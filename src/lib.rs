@@ -1,8 +1,8 @@
 //! Davit brings component-based robot systems up, switches them while they run, undoes what it did, and takes them down
 //! again.
 
-pub mod libraries;
 pub mod cli;
+pub mod libraries;
 pub mod limits;
 pub mod model;
 pub mod platform;
