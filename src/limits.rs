@@ -21,3 +21,6 @@ pub const SOCKET_QUEUE: usize = 1024;
 
 /// How long a client may take to accept what is written to it.
 pub const SOCKET_WRITE: Duration = Duration::from_secs(5);
+
+/// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
+pub const LOG_ENTRIES: usize = 4096;

@@ -1,0 +1,86 @@
+//! What the commands that talk to a running deployment share: finding it, asking it, telling why not.
+
+use super::Failure;
+use super::exit::Exit;
+use crate::model::codes::{CLI_NOT_RUNNING, CLI_NO_ANSWER, CLI_REFUSED, CLI_SEVERAL_RUNNING};
+use crate::session::client::{Client, ClientError};
+use serde_json::Value as Json;
+use std::time::Duration;
+
+/// How long a running deployment may take to answer what needs no waiting. Its socket threads do nothing else.
+pub const ASK: Duration = Duration::from_secs(10);
+
+/// Which running deployment.
+#[derive(Debug, clap::Args)]
+pub struct Which {
+    /// The running deployment's name; not needed while only one runs.
+    #[arg(long = "on", value_name = "NAME")]
+    pub name: Option<String>,
+}
+
+/// How long to wait for an answer.
+#[derive(Debug, clap::Args)]
+pub struct Wait {
+    /// Wait for the answer, and exit with 1 or 3 if it is not a good one.
+    #[arg(long)]
+    pub wait: bool,
+    /// How long to wait at most, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    pub within: f64,
+}
+
+/// A number of seconds: finite, not negative.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    if value.is_finite() && (0.0..=1e6).contains(&value) {
+        Ok(value)
+    } else {
+        Err("give a number of seconds from 0 to 1000000".to_owned())
+    }
+}
+
+/// Connects.
+pub fn connect(name: Option<&str>) -> Result<Client, Failure> {
+    Client::connect(name).map_err(failure)
+}
+
+/// Connects, asks once, and gives the answer.
+pub fn ask(name: Option<&str>, method: &str, params: &Json, limit: Duration) -> Result<Json, Failure> {
+    connect(name)?.call(method, params, limit).map_err(failure)
+}
+
+/// Why there is no answer, as a finding.
+pub fn failure(error: ClientError) -> Failure {
+    match error {
+        ClientError::None => Failure::no(
+            CLI_NOT_RUNNING,
+            "no deployment is running",
+            "start one with `davit deploy FILE`, or look whether XDG_RUNTIME_DIR is the same here and there",
+        ),
+        ClientError::Several(names) => Failure {
+            exit: Exit::Usage,
+            ..Failure::usage(
+                CLI_SEVERAL_RUNNING,
+                format!("{} deployments are running", names.len()),
+                format!("say which: {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+            )
+        },
+        ClientError::Unknown { name, help } => {
+            Failure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
+        }
+        ClientError::Io { name, source } => Failure {
+            exit: Exit::No,
+            ..Failure::no(
+                CLI_NO_ANSWER,
+                format!("the deployment `{name}` does not answer: {source}"),
+                "look at its terminal; `davit status` tries again, `davit shutdown --force` takes it down without its \
+                 coordinator",
+            )
+        },
+        ClientError::Refused(error) => Failure::no(
+            CLI_REFUSED,
+            error.message.clone(),
+            error.data.get("help").and_then(Json::as_str).unwrap_or("`davit log` shows what happened").to_owned(),
+        ),
+    }
+}

@@ -1,0 +1,129 @@
+//! `davit event`, `davit apply`, `davit undo`: what is asked of a running deployment.
+
+use super::exit::Exit;
+use super::log::{count, duration};
+use super::output::Style;
+use super::remote::{ASK, Wait, Which, ask};
+use super::status::text;
+use super::{Answer, Context, Failure, Run};
+use serde_json::{Value as Json, json};
+use std::time::Duration;
+
+/// Raise an event for the coordinator of a running deployment.
+#[derive(Debug, clap::Args)]
+pub struct EventArgs {
+    /// The event.
+    event: String,
+    #[command(flatten)]
+    which: Which,
+    /// Wait until this event or answer is heard; exit with 1 if it is not.
+    #[arg(long = "wait", value_name = "EVENT")]
+    wait_for: Option<String>,
+    /// How long to wait at most, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::remote::seconds)]
+    within: f64,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for EventArgs {
+    fn run(self, context: &Context) -> Answer {
+        let params = json!({ "event": self.event, "wait_for": self.wait_for, "within_s": self.within });
+        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))?;
+        if self.json {
+            context.out.json(&answer);
+        } else if let Some(heard) = answer["heard"].as_str() {
+            context.out.line(format!("{} after {}", context.out.paint(Style::Good, heard), self.event));
+        } else {
+            context.out.line(format!("{} raised", self.event));
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// Apply a configuration on a running deployment.
+#[derive(Debug, clap::Args)]
+pub struct ApplyArgs {
+    /// The configuration.
+    configuration: String,
+    #[command(flatten)]
+    which: Which,
+    #[command(flatten)]
+    wait: Wait,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for ApplyArgs {
+    fn run(self, context: &Context) -> Answer {
+        let params = json!({ "configuration": self.configuration });
+        request(context, "apply", params, &self.which, &self.wait, self.json)
+    }
+}
+
+/// Undo the newest configuration of a running deployment, or a named one, or down to N frames.
+#[derive(Debug, clap::Args)]
+pub struct UndoArgs {
+    /// The configuration whose newest frame is undone; without one, the top of the stack.
+    configuration: Option<String>,
+    /// Undo until so many frames are left.
+    #[arg(long, value_name = "N", conflicts_with = "configuration")]
+    to: Option<usize>,
+    #[command(flatten)]
+    which: Which,
+    #[command(flatten)]
+    wait: Wait,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for UndoArgs {
+    fn run(self, context: &Context) -> Answer {
+        let params = json!({ "configuration": self.configuration, "to": self.to });
+        request(context, "undo", params, &self.which, &self.wait, self.json)
+    }
+}
+
+/// Real time for what the deployment was given, and a little for the way.
+fn limit(within: f64) -> Duration {
+    Duration::from_secs_f64(within) + ASK
+}
+
+fn request(
+    context: &Context,
+    method: &str,
+    mut params: Json,
+    which: &Which,
+    wait: &Wait,
+    json: bool,
+) -> Result<Exit, Failure> {
+    params["wait"] = json!(wait.wait);
+    params["within_s"] = json!(wait.within);
+    let out = &context.out;
+    let answer = ask(which.name.as_deref(), method, &params, limit(wait.within))?;
+    let verdict = text(&answer["answer"]);
+    if json {
+        out.json(&answer);
+    } else if wait.wait {
+        let ok = answer["ok"] == true;
+        out.line(format!(
+            "{} ({}, {})",
+            out.paint(if ok { Style::Good } else { Style::Bad }, verdict),
+            count(answer["steps"].as_array().map_or(0, Vec::len), "step"),
+            duration(answer["took_us"].as_f64().unwrap_or_default()),
+        ));
+        for reason in answer["reasons"].as_array().into_iter().flatten() {
+            out.line(format!("  {}", text(reason)));
+        }
+    } else {
+        out.line(format!("request {} accepted; `davit log` shows its answer", answer["request"]));
+    }
+    Ok(match (wait.wait, answer["ok"] == true, verdict.ends_with(".broken")) {
+        (false, ..) | (_, true, _) => Exit::Done,
+        (_, _, true) => Exit::Broken,
+        _ => Exit::No,
+    })
+}

@@ -1,0 +1,48 @@
+//! `davit shutdown`
+
+use super::exit::Exit;
+use super::output::Style;
+use super::remote::{ASK, connect, failure};
+use super::status::text;
+use super::{Answer, Context, Run};
+use serde_json::{Value as Json, json};
+use std::time::Duration;
+
+/// Drive a running deployment to its *down* state; nothing is left.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The running deployment's name; not needed while only one runs.
+    name: Option<String>,
+    /// Without its coordinator: the safe configurations, then everything is taken down.
+    #[arg(long)]
+    force: bool,
+    /// How long to wait at most, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0, value_parser = super::remote::seconds)]
+    within: f64,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let out = &context.out;
+        let mut client = connect(self.name.as_deref())?;
+        let name = client.name().to_owned();
+        let limit = Duration::from_secs_f64(self.within) + ASK;
+        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure)?;
+        if self.json {
+            out.json(&answer);
+        } else {
+            for note in answer["forced"].as_array().into_iter().flatten() {
+                out.line(format!("{}  {}", out.paint(Style::Care, "forced"), text(note)));
+            }
+            for note in answer["left"].as_array().into_iter().flatten() {
+                out.line(format!("{}    {}", out.paint(Style::Bad, "left"), text(note)));
+            }
+            let phase = text(&answer["phase"]);
+            out.line(format!("{name}: {}", out.paint(super::status::state_style(phase), phase)));
+        }
+        Ok(if answer["left"].as_array().is_some_and(|l: &Vec<Json>| !l.is_empty()) { Exit::Broken } else { Exit::Done })
+    }
+}

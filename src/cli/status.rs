@@ -1,0 +1,85 @@
+//! `davit status`
+
+use super::exit::Exit;
+use super::output::{Output, Style, Table};
+use super::remote::{ASK, ask};
+use super::{Answer, Context, Run};
+use serde_json::{Value as Json, json};
+
+/// Show a running deployment: its phase, the coordinator's states, components, faults.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The running deployment's name; not needed while only one runs.
+    name: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let status = ask(self.name.as_deref(), "status", &json!({}), ASK)?;
+        if self.json {
+            context.out.json(&status);
+        } else {
+            print(&context.out, &status);
+        }
+        Ok(if status["phase"] == "broken" { Exit::Broken } else { Exit::Done })
+    }
+}
+
+/// The style of a phase or a run state.
+pub fn state_style(state: &str) -> Style {
+    match state {
+        "running" | "up" => Style::Good,
+        "broken" | "faulted" => Style::Bad,
+        "stopped" | "deploying" | "shutting_down" => Style::Care,
+        _ => Style::Dim,
+    }
+}
+
+/// A text in a JSON view, empty where there is none.
+pub fn text(json: &Json) -> &str {
+    json.as_str().unwrap_or_default()
+}
+
+fn print(out: &Output, status: &Json) {
+    let phase = text(&status["phase"]);
+    out.line(format!(
+        "{}  {}  {:.3} s",
+        out.paint(Style::Bold, text(&status["name"])),
+        out.paint(state_style(phase), phase),
+        status["at"].as_f64().unwrap_or_default()
+    ));
+    let active = status["coordinator"].as_array().and_then(|a| a.last()).map_or("(inactive)", |s| text(s));
+    out.line(format!("coordinator  {}", out.paint(Style::Name, active)));
+    if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
+        let names: Vec<&str> = outstanding.iter().map(text).collect();
+        out.line(format!("waiting for  {}", names.join(", ")));
+    }
+    let empty = Vec::new();
+    let stack = status["stack"].as_array().unwrap_or(&empty);
+    out.line(format!("stack        {} frames{}", stack.len(), match stack.last() {
+        Some(top) => format!(", newest {}", text(&top["configuration"])),
+        None => String::new(),
+    }));
+    let mut table = Table::new(2);
+    if let Some(components) = status["system"]["components"].as_object() {
+        for (name, component) in components {
+            let state = text(&component["state"]);
+            table.row([
+                out.paint(state_style(state), state),
+                name.clone(),
+                out.paint(Style::Dim, text(&component["type"])),
+                out.paint(Style::Dim, text(&component["activity"])),
+            ]);
+        }
+    }
+    if !table.is_empty() {
+        out.line(out.paint(Style::Bold, "components"));
+        out.text(table.to_string());
+    }
+    for fault in status["faults"].as_array().unwrap_or(&empty) {
+        out.line(format!("{} {}: {}", out.paint(Style::Bad, "fault"), text(&fault["component"]), text(&fault["reason"])));
+    }
+}

@@ -1,0 +1,219 @@
+//! What happened, in memory: a bounded ring of entries, oldest dropped first.
+
+use crate::limits;
+use crate::model::Snapshot;
+use crate::time::Time;
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// One thing that happened.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Entry {
+    /// When, in seconds of the deployment's clock since its start.
+    pub at: f64,
+    /// What.
+    #[serde(flatten)]
+    pub what: Happening,
+}
+
+/// What may happen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "what", rename_all = "snake_case")]
+pub enum Happening {
+    /// The deployment's phase changed.
+    Phase {
+        /// The new phase.
+        phase: Phase,
+    },
+    /// An event was given to the coordinator.
+    Event {
+        /// The event.
+        event: String,
+        /// Who raised it: `operator`, a component, `configurator`.
+        from: String,
+    },
+    /// The coordinator raised an event that leaves the deployment.
+    Emitted {
+        /// The event.
+        event: String,
+    },
+    /// The coordinator's active states changed.
+    State {
+        /// From root to leaf.
+        active: Vec<String>,
+    },
+    /// A request was made.
+    Requested {
+        /// Its number.
+        request: u64,
+        /// What is asked.
+        ask: String,
+        /// Who asks.
+        by: String,
+    },
+    /// A request was answered.
+    Answered(Answered),
+    /// An answer came after the state that asked had been left; the coordinator did not hear it.
+    Stale {
+        /// The answer.
+        event: String,
+    },
+    /// A component failed.
+    Fault {
+        /// Which.
+        component: String,
+        /// How.
+        reason: String,
+    },
+    /// A component whose call had not returned came back and was cleaned up.
+    Returned {
+        /// Which.
+        component: String,
+    },
+    /// Something had to be forced, or was left over.
+    Forced {
+        /// What.
+        note: String,
+    },
+}
+
+/// An answer with what led to it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Answered {
+    /// The request's number.
+    pub request: u64,
+    /// What was asked.
+    pub ask: String,
+    /// The status event.
+    pub answer: String,
+    /// Whether the request got what it asked for.
+    pub ok: bool,
+    /// Who asked.
+    pub by: String,
+    /// From the beginning of its execution to the answer, in microseconds.
+    pub took_us: f64,
+    /// Why not, one line each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<String>,
+    /// The steps that were carried out.
+    pub steps: Vec<StepTime>,
+}
+
+/// How long a step took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StepTime {
+    /// The step, in words.
+    pub step: String,
+    /// How it ended: `done`, or why not.
+    pub outcome: String,
+    /// In microseconds.
+    pub took_us: f64,
+}
+
+/// Where a deployment is in its life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Being brought up.
+    Deploying,
+    /// Up.
+    Up,
+    /// Being taken down.
+    ShuttingDown,
+    /// Down: nothing is left.
+    Down,
+    /// Neither: something could not be undone.
+    Broken,
+}
+
+impl Phase {
+    /// Its name in views.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Deploying => "deploying",
+            Self::Up => "up",
+            Self::ShuttingDown => "shutting_down",
+            Self::Down => "down",
+            Self::Broken => "broken",
+        }
+    }
+}
+
+/// The ring.
+#[derive(Debug, Default)]
+pub struct Log {
+    entries: VecDeque<Entry>,
+    dropped: u64,
+}
+
+impl Log {
+    /// Adds an entry, dropping the oldest past the bound.
+    pub fn push(&mut self, at: Time, what: Happening) {
+        if self.entries.len() == limits::LOG_ENTRIES {
+            self.entries.pop_front();
+            self.dropped += 1;
+        }
+        self.entries.push_back(Entry { at: at.as_secs_f64(), what });
+    }
+
+    /// The newest `last` entries, oldest first.
+    pub fn last(&self, last: usize) -> Vec<Entry> {
+        self.entries.iter().skip(self.entries.len().saturating_sub(last)).cloned().collect()
+    }
+
+    /// How many entries were dropped.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// A component that failed, or whose call has not returned.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fault {
+    /// The component.
+    pub component: String,
+    /// What is wrong with it.
+    pub reason: String,
+    /// When it was noticed, in seconds.
+    pub at: f64,
+}
+
+/// A frame of the stack.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrameView {
+    /// The configuration it was made by.
+    pub configuration: String,
+    /// Who asked.
+    pub by: String,
+    /// When it was applied, in seconds.
+    pub at: f64,
+    /// Its group, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+    /// Whether undo stops here, and why.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<String>,
+    /// Its steps, in words.
+    pub steps: Vec<String>,
+}
+
+/// A deployment at one moment: what `status --json` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StatusView {
+    /// Its name.
+    pub name: String,
+    /// Where it is in its life.
+    pub phase: Phase,
+    /// Active states of the coordinator, root to leaf.
+    pub coordinator: Vec<String>,
+    /// The system as the configurator knows it.
+    pub system: Snapshot,
+    /// Frames in force, newest last.
+    pub stack: Vec<FrameView>,
+    /// What is wrong.
+    pub faults: Vec<Fault>,
+    /// Requests that are not answered yet.
+    pub outstanding: Vec<String>,
+    /// Seconds of its clock since its start.
+    pub at: f64,
+}
