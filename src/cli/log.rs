@@ -72,12 +72,9 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             line
         }
         "stale" => format!("stale      {}", text(&entry["event"])),
-        "fault" => format!(
-            "{}      {}: {}",
-            out.paint(Style::Bad, "fault"),
-            text(&entry["component"]),
-            text(&entry["reason"])
-        ),
+        "fault" => {
+            format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))
+        }
         "returned" => format!("returned   {}", text(&entry["component"])),
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),

@@ -8,7 +8,13 @@
 mod completions;
 pub mod exit;
 mod explain;
+mod log;
 pub mod output;
+mod remote;
+mod request;
+mod shutdown;
+mod stack;
+mod status;
 
 use crate::model::{Code, Finding, Findings};
 use clap::Parser;
@@ -47,6 +53,13 @@ macro_rules! commands {
 }
 
 commands! {
+    Shutdown = shutdown::Args,
+    Status = status::Args,
+    Stack = stack::Args,
+    Log = log::Args,
+    Event = request::EventArgs,
+    Apply = request::ApplyArgs,
+    Undo = request::UndoArgs,
     Explain = explain::Args,
     Completions = completions::Args,
 }

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::exit::Exit;
-use crate::model::codes::{CLI_NOT_RUNNING, CLI_NO_ANSWER, CLI_REFUSED, CLI_SEVERAL_RUNNING};
+use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING};
 use crate::session::client::{Client, ClientError};
 use serde_json::Value as Json;
 use std::time::Duration;

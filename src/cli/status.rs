@@ -59,10 +59,14 @@ fn print(out: &Output, status: &Json) {
     }
     let empty = Vec::new();
     let stack = status["stack"].as_array().unwrap_or(&empty);
-    out.line(format!("stack        {} frames{}", stack.len(), match stack.last() {
-        Some(top) => format!(", newest {}", text(&top["configuration"])),
-        None => String::new(),
-    }));
+    out.line(format!(
+        "stack        {} frames{}",
+        stack.len(),
+        match stack.last() {
+            Some(top) => format!(", newest {}", text(&top["configuration"])),
+            None => String::new(),
+        }
+    ));
     let mut table = Table::new(2);
     if let Some(components) = status["system"]["components"].as_object() {
         for (name, component) in components {
@@ -80,6 +84,11 @@ fn print(out: &Output, status: &Json) {
         out.text(table.to_string());
     }
     for fault in status["faults"].as_array().unwrap_or(&empty) {
-        out.line(format!("{} {}: {}", out.paint(Style::Bad, "fault"), text(&fault["component"]), text(&fault["reason"])));
+        out.line(format!(
+            "{} {}: {}",
+            out.paint(Style::Bad, "fault"),
+            text(&fault["component"]),
+            text(&fault["reason"])
+        ));
     }
 }

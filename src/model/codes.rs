@@ -59,6 +59,21 @@ codes! {
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";
+    CLI_NOT_RUNNING = "cli::not_running", "there is no such running deployment",
+        "The command talks to a running deployment through its control socket, and none of that name (or none at all) \
+         answers. Start one with `davit deploy FILE`. Sockets are looked for in $XDG_RUNTIME_DIR/davit: a deployment \
+         started by another user, or with another value of that variable, is not seen.";
+    CLI_SEVERAL_RUNNING = "cli::several_running", "several deployments are running",
+        "The command was given no name and more than one deployment is running, so it is not known which is meant. \
+         Give the name: `davit status NAME`, `davit event E --on NAME`.";
+    CLI_NO_ANSWER = "cli::no_answer", "the running deployment does not answer",
+        "The control socket is there and something listens on it, but no answer came in time, or the connection was \
+         closed. The deployment may just have ended: `davit status` tells. If it is stuck, `davit shutdown --force` \
+         takes it down without its coordinator.";
+    CLI_REFUSED = "cli::refused", "the running deployment refused",
+        "The running deployment understood the request and said no; the message is its own. An unknown event or \
+         configuration is refused at once; a wait that ran out is told as such, and the request itself may still be \
+         answered: `davit log` shows it.";
 }
 
 /// The page of `code`, written with or without the leading `davit::`.
