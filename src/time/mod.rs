@@ -1,6 +1,31 @@
 //! Time: one clock, real or simulated, for everything (design §11).
+//!
+//! What runs on a [`Clock`] never reads another one: no `Instant::now`, no `thread::sleep`, no other channel, anywhere
+//! else in the project. In return the same code runs in real time and, on [`Clock::simulated`], as fast as the machine and
+//! the same way every time, threads included.
+//!
+//! * [`clock`]: the handle.
+//! * [`channel`]: bounded queues between participants. [`signal`]: one thread waits, anybody notifies.
+//! * [`simulated`]: the scheduler that hands one token round.
 
+pub mod channel;
+pub mod clock;
+pub mod signal;
+pub mod simulated;
+#[cfg(test)]
+mod tests;
+
+pub use channel::{Receiver, RecvError, SendError, Sender, TryRecvError, TrySendError};
+pub use clock::{Clock, Guard, Join, JoinError, Released};
+pub use signal::Signal;
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+/// Locks, also after a panic elsewhere: what our locks guard is consistent between any two statements that may panic.
+pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A moment, in nanoseconds since the clock's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize)]
@@ -31,5 +56,18 @@ impl std::ops::Add<Duration> for Time {
     type Output = Self;
     fn add(self, d: Duration) -> Self {
         Self(self.0.saturating_add(u64::try_from(d.as_nanos()).unwrap_or(u64::MAX)))
+    }
+}
+
+impl std::ops::AddAssign<Duration> for Time {
+    fn add_assign(&mut self, d: Duration) {
+        *self = *self + d;
+    }
+}
+
+/// Seconds with as many digits as there are: `1.5 s`.
+impl std::fmt::Display for Time {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if *self == Self::NEVER { f.write_str("never") } else { write!(f, "{} s", self.as_secs_f64()) }
     }
 }
