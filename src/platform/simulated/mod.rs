@@ -1,0 +1,460 @@
+//! A platform that runs any declared component type, without the components: it keeps the run states, values and
+//! connections a real platform would, refuses what a real platform would, and does wrong what it is told to.
+//!
+//! *Nothing is injected unless asked*: without [`Faults`] and [`Delays`] every step that may happen happens at once.
+//! It shares no code with `system` or `plan` (see [`world`]), so that it can judge them.
+
+mod faults;
+mod world;
+
+pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, StepPattern, When};
+
+use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
+use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Ident, RunState, Snapshot, Step, Value};
+use crate::time::{Clock, Join, RecvError, Sender, Time, TrySendError};
+use faults::Chance;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use world::World;
+
+/// How a simulated platform is made.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// What goes wrong.
+    pub faults: Faults,
+    /// How long steps take.
+    pub delays: Delays,
+    /// What components raise by themselves.
+    pub reactions: Vec<Reaction>,
+    /// Activities that exist; none: a component may name any.
+    pub activities: Option<BTreeSet<Ident>>,
+    /// Every step is called blocking, also where it takes no time.
+    pub blocking: bool,
+}
+
+/// The simulated platform. A cheap handle: clones are the same platform.
+#[derive(Clone)]
+pub struct Simulated {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    clock: Clock,
+    catalogue: Catalogue,
+    state: Mutex<State>,
+}
+
+struct State {
+    world: World,
+    faults: Faults,
+    fired: Vec<u32>,
+    asked: u64,
+    chance: Chance,
+    delays: Delays,
+    blocking: bool,
+    reactions: Vec<Reaction>,
+    /// Components whose call has not returned, with the step that hangs.
+    quarantine: BTreeMap<ComponentName, Step>,
+    sink: Option<EventSink>,
+    executed: Option<Vec<Step>>,
+    timers: Option<(Sender<(Time, Due)>, Join)>,
+}
+
+/// What happens by itself later.
+enum Due {
+    Returned(ComponentName),
+    Raised { event: EventName, component: ComponentName },
+}
+
+/// How many late happenings may be on their way to the timer thread at once: it takes them up at once, so this bounds a
+/// burst, and what does not fit happens immediately instead of being lost.
+const DUE_QUEUE: usize = 4096;
+
+impl Shared {
+    // A panic while the lock is held is a defect of this file; the data are plain, so others may go on.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn emit(&self, event: PlatformEvent) {
+        let sink = self.lock().sink.clone();
+        if let Some(sink) = sink {
+            sink(event);
+        }
+    }
+
+    fn happen(&self, due: Due) {
+        let at = self.clock.now();
+        match due {
+            Due::Raised { event, component } => self.emit(PlatformEvent::Raised { event, component, at }),
+            Due::Returned(component) => {
+                // The effect of a hung step never reached the world: what the late call did is taken back by that.
+                if self.lock().quarantine.remove(&component).is_some() {
+                    self.emit(PlatformEvent::Returned { component, at });
+                }
+            }
+        }
+    }
+
+    /// Lets `due` happen at `at`, on a thread of its own that is there from the first such wish on.
+    fn later(self: &Arc<Self>, at: Time, due: Due) {
+        let mut state = self.lock();
+        let (sender, _) = state.timers.get_or_insert_with(|| {
+            let (sender, receiver) = self.clock.channel::<(Time, Due)>(DUE_QUEUE);
+            let (weak, clock) = (Arc::downgrade(self), self.clock.clone());
+            let thread = self.clock.spawn("simulated: timers", move || {
+                let mut queue: BTreeMap<(Time, u64), Due> = BTreeMap::new();
+                let mut count = 0;
+                loop {
+                    let next = queue.keys().next().map_or(Time::NEVER, |(at, _)| *at);
+                    match receiver.recv_deadline(next) {
+                        Ok((at, due)) => {
+                            count += 1;
+                            queue.insert((at, count), due);
+                        }
+                        Err(RecvError::Timeout) => {}
+                        Err(RecvError::Closed) => return,
+                    }
+                    while let Some(entry) = queue.first_entry().filter(|entry| entry.key().0 <= clock.now()) {
+                        let due = entry.remove();
+                        let Some(shared) = weak.upgrade() else { return };
+                        shared.happen(due);
+                    }
+                }
+            });
+            (sender, thread)
+        });
+        let refused = sender.try_send((at, due)).err();
+        drop(state);
+        if let Some(TrySendError::Full((_, due)) | TrySendError::Closed((_, due))) = refused {
+            self.happen(due);
+        }
+    }
+}
+
+impl State {
+    /// The fault that hits the step asked for now, if one does.
+    fn fault(&mut self, step: &Step) -> Option<Fault> {
+        self.asked += 1;
+        let (asked, chance) = (self.asked, &mut self.chance);
+        for (rule, fired) in self.faults.rules.iter().zip(&mut self.fired) {
+            let hit = *fired < rule.times
+                && rule.when.nth.is_none_or(|nth| nth == asked)
+                && rule.when.pattern.as_ref().is_none_or(|pattern| pattern.matches(step))
+                && rule.when.chance.is_none_or(|p| chance.unit() < p);
+            if hit {
+                *fired += 1;
+                return Some(rule.fault.clone());
+            }
+        }
+        None
+    }
+
+    fn delay(&mut self, step: &Step) -> Duration {
+        if self.delays.is_none() {
+            return Duration::ZERO;
+        }
+        if let Some((_, delay)) = self.delays.of.iter().find(|(pattern, _)| pattern.matches(step)) {
+            return *delay;
+        }
+        self.delays.base + self.delays.jitter.mul_f64(self.chance.unit())
+    }
+
+    /// The component in quarantine that `step` needs, if there is one. Taking a connection away needs nothing of the
+    /// component at its end.
+    fn quarantined(&self, step: &Step) -> bool {
+        if self.quarantine.is_empty() {
+            return false;
+        }
+        match step {
+            Step::Disconnect { .. } => false,
+            Step::Connect { from, to, .. } => {
+                self.quarantine.contains_key(&from.component) || self.quarantine.contains_key(&to.component)
+            }
+            other => self.quarantine.contains_key(&other.component()),
+        }
+    }
+}
+
+impl Simulated {
+    /// A platform with nothing on it.
+    pub fn new(catalogue: Catalogue, clock: Clock, options: Options) -> Self {
+        let chance = Chance(options.faults.seed);
+        let state = State {
+            world: World::new(catalogue.clone(), options.activities),
+            fired: vec![0; options.faults.rules.len()],
+            faults: options.faults,
+            asked: 0,
+            chance,
+            delays: options.delays,
+            blocking: options.blocking,
+            reactions: options.reactions,
+            quarantine: BTreeMap::new(),
+            sink: None,
+            executed: None,
+            timers: None,
+        };
+        Self { shared: Arc::new(Shared { clock, catalogue, state: Mutex::new(state) }) }
+    }
+
+    /// From now on these faults, and no others; steps are counted from 1 again.
+    pub fn set_faults(&self, faults: Faults) {
+        let mut state = self.shared.lock();
+        state.fired = vec![0; faults.rules.len()];
+        state.asked = 0;
+        state.chance = Chance(faults.seed);
+        state.faults = faults;
+    }
+
+    /// From now on steps take so long.
+    pub fn set_delays(&self, delays: Delays) {
+        self.shared.lock().delays = delays;
+    }
+
+    /// How many steps were asked for since the faults were set.
+    pub fn asked(&self) -> u64 {
+        self.shared.lock().asked
+    }
+
+    /// From now on the steps that happened are kept; answers those kept so far.
+    pub fn record(&self) -> Vec<Step> {
+        self.shared.lock().executed.replace(Vec::new()).unwrap_or_default()
+    }
+
+    /// Raises `event` in the name of `component`.
+    pub fn raise(&self, component: ComponentName, event: EventName) {
+        self.shared.happen(Due::Raised { event, component });
+    }
+
+    /// `component` fails by itself: it is faulted. Answers whether there is such a component.
+    pub fn fault(&self, component: ComponentName, reason: &str) -> bool {
+        let found = match self.shared.lock().world.components.get_mut(&component) {
+            Some(it) => {
+                it.state = RunState::Faulted;
+                true
+            }
+            None => false,
+        };
+        if found {
+            let at = self.shared.clock.now();
+            self.shared.emit(PlatformEvent::Faulted { component, reason: reason.to_owned(), at });
+        }
+        found
+    }
+
+    /// Something changes behind everybody's back: `step` happens if it may, without faults, delays or reactions.
+    /// Answers whether it happened.
+    pub fn tamper(&self, step: &Step) -> bool {
+        let mut state = self.shared.lock();
+        let may = state.world.check(step).is_ok();
+        if may {
+            state.world.apply(step);
+        }
+        may
+    }
+
+    fn execute(&self, step: &Step, value: Option<&Value>, deadline: Time) -> Outcome {
+        let with_value;
+        let step = match value {
+            None => step,
+            Some(value) => {
+                with_value = with(step, value);
+                &with_value
+            }
+        };
+        let now = self.shared.clock.now();
+        let (fault, delay) = {
+            let mut state = self.shared.lock();
+            if state.faults.rules.is_empty() && state.delays.is_none() && state.reactions.is_empty() {
+                state.asked += 1;
+                if state.quarantined(step) {
+                    return Outcome::NotDone(Cause::Quarantined);
+                }
+                return Self::now(&mut state, step);
+            }
+            let fault = state.fault(step);
+            if state.quarantined(step) {
+                return Outcome::NotDone(Cause::Quarantined);
+            }
+            (fault, state.delay(step))
+        };
+        let slow = (now + delay > deadline).then(|| Fault::Hang { returns: Some((now + delay).since(deadline)) });
+        match fault.or(slow) {
+            None => {
+                self.shared.clock.sleep_until(now + delay);
+                let outcome = Self::now(&mut self.shared.lock(), step);
+                if matches!(outcome, Outcome::Done(_)) {
+                    self.react(step);
+                }
+                outcome
+            }
+            Some(Fault::Fail) => {
+                self.shared.clock.sleep_until(now + delay);
+                Outcome::NotDone(Cause::Failed("a failure was injected".to_owned()))
+            }
+            Some(Fault::Panic) => {
+                self.shared.clock.sleep_until(now + delay);
+                self.panic(step)
+            }
+            Some(Fault::FalseDone) => {
+                self.shared.clock.sleep_until(now + delay);
+                Outcome::Done(None)
+            }
+            Some(Fault::FalseNotDone) => {
+                self.shared.clock.sleep_until(now + delay);
+                match Self::now(&mut self.shared.lock(), step) {
+                    Outcome::Done(_) => Outcome::NotDone(Cause::Failed("a false answer was injected".to_owned())),
+                    other => other,
+                }
+            }
+            Some(fault @ (Fault::LostAnswer | Fault::LostRequest)) => {
+                self.shared.clock.sleep_until(now + delay);
+                if fault == Fault::LostAnswer
+                    && let Outcome::Done(_) = Self::now(&mut self.shared.lock(), step)
+                {
+                    self.react(step);
+                }
+                self.shared.clock.sleep_until(deadline);
+                Outcome::Unknown(Cause::Timeout)
+            }
+            Some(Fault::Hang { returns }) => self.hang(step, returns, deadline),
+        }
+    }
+
+    fn now(state: &mut State, step: &Step) -> Outcome {
+        match state.world.check(step) {
+            Err(why) => Outcome::NotDone(Cause::Refused(why)),
+            Ok(()) => {
+                let result = state.world.apply(step);
+                if let Some(executed) = &mut state.executed {
+                    executed.push(step.clone());
+                }
+                Outcome::Done(result)
+            }
+        }
+    }
+
+    fn panic(&self, step: &Step) -> Outcome {
+        let component = step.component();
+        let reason = "a panic was injected";
+        if let Err(why) = self.shared.lock().world.check(step) {
+            return Outcome::NotDone(Cause::Refused(why));
+        }
+        self.fault(component, reason);
+        Outcome::NotDone(Cause::Panicked(reason.to_owned()))
+    }
+
+    fn hang(&self, step: &Step, returns: Option<Duration>, deadline: Time) -> Outcome {
+        {
+            let mut state = self.shared.lock();
+            if let Err(why) = state.world.check(step) {
+                return Outcome::NotDone(Cause::Refused(why));
+            }
+            state.quarantine.insert(step.component(), step.clone());
+        }
+        if let Some(after) = returns {
+            self.shared.later(deadline + after, Due::Returned(step.component()));
+        }
+        self.shared.clock.sleep_until(deadline);
+        Outcome::Unknown(Cause::Timeout)
+    }
+
+    fn react(&self, step: &Step) {
+        let due: Vec<(Duration, EventName, ComponentName)> = {
+            let state = self.shared.lock();
+            let fitting = state.reactions.iter().filter(|reaction| reaction.on.matches(step));
+            fitting.map(|reaction| (reaction.after, reaction.raise, reaction.component)).collect()
+        };
+        for (after, event, component) in due {
+            let due = Due::Raised { event, component };
+            if after.is_zero() {
+                self.shared.happen(due);
+            } else {
+                self.shared.later(self.shared.clock.now() + after, due);
+            }
+        }
+    }
+}
+
+/// `step` with another value (property and port writes; others stay as they are).
+fn with(step: &Step, value: &Value) -> Step {
+    match step {
+        Step::PropertySet { property, .. } => Step::PropertySet { property: *property, value: value.clone() },
+        Step::PortWrite { port, .. } => Step::PortWrite { port: *port, value: Some(value.clone()) },
+        other => other.clone(),
+    }
+}
+
+impl Platform for Simulated {
+    fn catalogue(&self) -> &Catalogue {
+        &self.shared.catalogue
+    }
+
+    fn execution(&self, _step: &Step) -> Execution {
+        let state = self.shared.lock();
+        if state.blocking || !state.faults.rules.is_empty() || !state.delays.is_none() {
+            Execution::Blocking
+        } else {
+            Execution::Immediate
+        }
+    }
+
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        self.execute(step, None, deadline)
+    }
+
+    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
+        self.see(deadline).map(|state| state.world.snapshot())
+    }
+
+    fn observe_component(
+        &self,
+        component: ComponentName,
+        deadline: Time,
+    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
+        self.see(deadline).map(|state| state.world.observe(component))
+    }
+
+    fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
+        let fixed = |step: &Step| {
+            !matches!(step, Step::Create { .. } | Step::Destroy { .. }) && self.execution(step) == Execution::Immediate
+        };
+        steps.iter().all(fixed).then(|| Box::new(Resolved { platform: self.clone(), steps: steps.to_vec() }) as _)
+    }
+
+    fn subscribe(&self, sink: EventSink) {
+        self.shared.lock().sink = Some(sink);
+    }
+
+    fn quarantined(&self) -> Vec<ComponentName> {
+        self.shared.lock().quarantine.keys().copied().collect()
+    }
+}
+
+impl Simulated {
+    fn see(&self, deadline: Time) -> Result<MutexGuard<'_, State>, ObserveError> {
+        let state = self.shared.lock();
+        if state.faults.blind {
+            drop(state);
+            self.shared.clock.sleep_until(deadline);
+            return Err(ObserveError::Timeout);
+        }
+        Ok(state)
+    }
+}
+
+/// A prepared list: here, simply the list.
+struct Resolved {
+    platform: Simulated,
+    steps: Vec<Step>,
+}
+
+impl Prepared for Resolved {
+    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome {
+        match self.steps.get(index) {
+            Some(step) => self.platform.execute(step, value, deadline),
+            None => Outcome::NotDone(Cause::Refused(format!("there is no step {index}"))),
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! One contract for every platform (design §11): each test is a rule of the `Platform` trait, run on every platform.
+//!
+//! A platform joins by a [`bed::Bed`]: how to make one with the test types of [`bed::types`], how to make a component of it
+//! fail, panic or hang in a hook, and how to make one raise an event.
+
+mod bed;
+mod rules;
+mod simulated;
+
+/// Every rule as a test of its own, for the platform that `$bed` makes.
+macro_rules! conforms {
+    ($platform:ident, $bed:expr; $($rule:ident),* $(,)?) => {
+        mod $platform {
+            $(
+                #[test]
+                fn $rule() {
+                    crate::rules::$rule(&$bed);
+                }
+            )*
+        }
+    };
+}
+
+macro_rules! every_rule {
+    ($platform:ident, $bed:expr) => {
+        conforms!($platform, $bed;
+            create_needs_a_known_type_and_a_free_name,
+            create_needs_every_value_of_its_type_and_within_its_limits,
+            run_states_move_along_the_legal_path_only,
+            destroy_needs_unconfigured_and_no_connections,
+            a_property_takes_its_type_within_its_limits,
+            a_property_is_set_only_where_it_is_tunable,
+            a_data_connection_is_the_only_one_of_its_port,
+            types_units_and_directions_of_connected_ports_agree,
+            event_ports_take_many_connections,
+            port_write_needs_a_port_that_nothing_drives,
+            a_written_value_survives_a_connection_and_never_written_comes_back,
+            a_component_may_be_connected_to_itself,
+            operations_need_their_arguments_and_answer_their_type,
+            a_failed_step_leaves_the_component_as_it_was,
+            a_panic_faults_the_component_and_nothing_else,
+            faulted_components_can_be_cleaned_up_and_destroyed,
+            a_hung_call_is_unknown_at_its_deadline_and_quarantined,
+            a_quarantined_component_can_be_disconnected,
+            a_call_that_returns_late_is_cleaned_up,
+            unknown_is_settled_by_reading_back,
+            events_of_components_reach_the_sink,
+            prepared_steps_do_what_executed_ones_do,
+            one_component_observed_is_the_one_of_the_whole,
+        );
+    };
+}
+
+every_rule!(on_simulated, crate::simulated::SimulatedBed);
