@@ -281,9 +281,9 @@ mod tests {
         let at = model.posture(&radians(WORKING_POSE_DEG));
         assert!((at.tool - Vector3::new(0.259, 0.0, 0.167)).norm() < 1e-3, "{}", at.tool);
         let candle = model.posture(&J5::zeros());
-        assert!(manipulability(&candle.jacobian()) < 1e-12);
+        assert!(manipulability(&candle.jacobian()) < 1e-9);
         // Horizontal: joint 2 needs more than the 9.5 N m of the URDF.
         let flat = model.gravity(&model.posture(&radians([0.0, 90.0, 0.0, 0.0, 0.0])));
-        assert!((flat[1].abs() - 9.82).abs() < 0.02, "{flat}");
+        assert!((flat[1].abs() - 10.04).abs() < 0.01, "{flat}");
     }
 }

@@ -1,0 +1,225 @@
+-- Bring-up, operation and teardown of one robot of the youBot coupling.
+--
+-- The order between configurations is the coordinator's; inside a configuration there is none.
+-- The four configurations of the coupling's switch are in coupling.lua.
+
+ConfiguratorConf {
+
+  -- Bring-up ---------------------------------------------------------------------------------------------------------
+
+  create_core = Configuration { description = "the control loop",
+    create("youbot",         "youbot.Driver",         { activity = "control" }),
+    create("Arm_Kinematics", "youbot.Arm_Kinematics", { activity = "control" }),
+    create("Cart_Impedance", "youbot.Cart_Impedance", { activity = "control" }),
+    create("Dynamics",       "youbot.Dynamics",       { activity = "control" }),
+    create("Base_Ctrl",      "youbot.Base_Ctrl",      { activity = "base" }),
+  },
+
+  create_link = Configuration { description = "the link to the other robot, and a stand-in for that robot",
+    create("Link_Tx", "youbot.Link_Tx", { activity = "link" }),
+    create("Link_Rx", "youbot.Link_Rx", { activity = "link" }),
+    create("Peer",    "youbot.Peer",    { activity = "link" }),
+  },
+
+  create_monitors = Configuration { description = "what watches, and the hand of the operator",
+    create("Link_Monitor",   "youbot.Link_Monitor",   { activity = "watch" }),
+    create("Force_Monitor",  "youbot.Force_Monitor",  { activity = "watch" }),
+    create("Safety_Monitor", "youbot.Safety_Monitor", { activity = "safety" }),
+    create("Operator",       "youbot.Operator",       { activity = "link" }),
+    create("Mode_Switch",    "youbot.Mode_Switch",    { activity = "watch" }),
+    create("Reporter",       "youbot.Reporter",       { activity = "watch" }),
+  },
+
+  connect_all = Configuration {
+    -- control loop
+    connect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
+    connect("youbot.odometry",               "Arm_Kinematics.odometry"),
+    connect("Arm_Kinematics.tool_pose",      "Cart_Impedance.tool_pose"),
+    connect("Arm_Kinematics.tool_twist",     "Cart_Impedance.tool_twist"),
+    connect("Link_Rx.ext_ref",               "Cart_Impedance.ext_ref"),
+    connect("Cart_Impedance.f_des",          "Dynamics.f_des"),
+    connect("youbot.jointstate",             "Dynamics.jointstate"),
+    connect("youbot.odometry",               "Dynamics.odometry"),
+    connect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
+    connect("Dynamics.joint_effort_command", "youbot.joint_effort_command"),
+    connect("Dynamics.base_twist",           "Base_Ctrl.base_twist"),
+    connect("youbot.odometry",               "Base_Ctrl.odometry"),
+    connect("Base_Ctrl.cmd_twist",           "youbot.cmd_twist"),
+    -- link
+    connect("Arm_Kinematics.tool_pose",      "Link_Tx.tool_pose"),
+    connect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
+    connect("Cart_Impedance.active",         "Link_Tx.copying"),
+    connect("Force_Monitor.aligned",         "Link_Tx.aligned"),
+    connect("Link_Tx.tx",                    "Peer.rx",    { buffer = 64 }),
+    connect("Peer.tx",                       "Link_Rx.rx", { buffer = 64 }),
+    -- the operator's hand
+    connect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
+    connect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
+    connect("Link_Rx.ext_ref",               "Operator.ext_ref"),
+    connect("Operator.ext_force",            "youbot.ext_force"),
+    -- monitors
+    connect("Link_Rx.link_stats",            "Link_Monitor.link_stats"),
+    connect("Link_Rx.peer_state",            "Link_Monitor.peer_state"),
+    connect("Cart_Impedance.active",         "Link_Monitor.copying"),
+    connect("Cart_Impedance.f_raw_norm",     "Force_Monitor.f_raw_norm"),
+    connect("Link_Rx.peer_state",            "Force_Monitor.peer_state"),
+    connect("youbot.jointstate",             "Safety_Monitor.jointstate"),
+    connect("youbot.odometry",               "Safety_Monitor.odometry"),
+    connect("youbot.motor_states",           "Safety_Monitor.motor_states"),
+    connect("youbot.driver_state",           "Safety_Monitor.driver_state"),
+    connect("Dynamics.tau_sat",              "Safety_Monitor.tau_sat"),
+    connect("Cart_Impedance.f_raw_norm",     "Safety_Monitor.controller"),
+    -- record
+    connect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
+    connect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
+    connect("youbot.jointstate",             "Reporter.jointstate"),
+    connect("youbot.odometry",               "Reporter.odometry"),
+    connect("Cart_Impedance.f_des",          "Reporter.f_des"),
+    connect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
+    connect("Cart_Impedance.active",         "Reporter.active"),
+  },
+
+  load_properties = Configuration { description = "this robot's own numbers, then everything configured",
+    property_set("youbot.q_start",               { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
+    property_set("Cart_Impedance.stiffness",     150.0),
+    property_set("Cart_Impedance.damping_abs",   5.0),
+    property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
+    property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0.15"),
+    property_set("Peer.delay",                   0.005),
+    post_conf_state = { "_default:configured" },
+  },
+
+  start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
+    post_conf_state = { "youbot:running" },
+  },
+
+  calibrate = Configuration { timeout = 10.0,
+    operation_call("youbot.start_calibration"),
+  },
+
+  unfold = Configuration { timeout = 10.0, description = "from the stops to the working pose; the drives hold it there",
+    operation_call("youbot.unfold"):undo("youbot.fold"),
+  },
+
+  start_control = Configuration { description = "everything runs; the drives do not listen to the control loop yet",
+    post_conf_state = { "Arm_Kinematics:running", "Cart_Impedance:running", "Dynamics:running", "Base_Ctrl:running",
+                        "_default:running" },
+  },
+
+  take_over = Configuration { description = "the drives take torques (mode 6); taking it back, they hold (mode 1)",
+    operation_call("youbot.setControlMode", 6):undo("youbot.setControlMode", 1),
+  },
+
+  -- Operation --------------------------------------------------------------------------------------------------------
+
+  base_stop = Configuration {
+    operation_call("Base_Ctrl.stop"),
+  },
+
+  profile_soft   = Configuration { group = "profile",
+    property_set("Cart_Impedance.stiffness", 70.0),  property_set("Cart_Impedance.damping_abs", 5.0) },
+  profile_normal = Configuration { group = "profile",
+    property_set("Cart_Impedance.stiffness", 150.0), property_set("Cart_Impedance.damping_abs", 5.0) },
+  profile_stiff  = Configuration { group = "profile",
+    property_set("Cart_Impedance.stiffness", 300.0), property_set("Cart_Impedance.damping_abs", 7.0) },
+  -- For a link of up to 100 ms: damping of 1.2 times stiffness times delay keeps the coupling stable.
+  profile_slow_link = Configuration { group = "profile",
+    property_set("Cart_Impedance.stiffness", 150.0), property_set("Cart_Impedance.damping_abs", 18.0) },
+
+  relink = Configuration { description = "the link from the beginning, as a new epoch",
+    pre_conf_state  = { "Link_Tx:stopped", "Link_Rx:stopped" },
+    operation_call("Link_Rx.reset_stats"),
+    post_conf_state = { "Link_Rx:running", "Link_Tx:running" },
+  },
+
+  -- Faults -----------------------------------------------------------------------------------------------------------
+
+  safe_hold = Configuration { safe = true, description = "no coupling, no base; the arm stays up, compensating gravity",
+    port_write("Cart_Impedance.ext_ref_mode", false),
+    property_set("Dynamics.force_gain", { 0, 0, 0 }),
+    property_set("Base_Ctrl.enabled", false),
+  },
+
+  clear_faults = Configuration {
+    operation_call("youbot.clear_faults"),
+  },
+
+  restart_controller = Configuration { description = "the impedance controller from the beginning",
+    pre_conf_state  = { "Cart_Impedance:unconfigured" },
+    post_conf_state = { "Cart_Impedance:running" },
+  },
+
+  -- Teardown ---------------------------------------------------------------------------------------------------------
+
+  hold = Configuration { description = "the drives hold the arm by themselves",
+    operation_call("youbot.setControlMode", 1):undo("youbot.setControlMode", 6),
+  },
+
+  park = Configuration { timeout = 10.0, description = "onto the stops, where nothing has to hold the arm",
+    operation_call("youbot.fold"):undo("youbot.unfold"),
+  },
+
+  stop_control = Configuration { description = "everything but the driver",
+    pre_conf_state = { "youbot:running", "_default:stopped" },
+  },
+
+  stop_all = Configuration {
+    operation_call("youbot.setControlMode", 0):undo("youbot.setControlMode", 1),
+    post_conf_state = { "youbot:stopped" },
+  },
+
+  cleanup_all = Configuration {
+    post_conf_state = { "youbot:unconfigured", "_default:unconfigured" },
+  },
+
+  disconnect_all = Configuration {
+    disconnect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
+    disconnect("youbot.odometry",               "Arm_Kinematics.odometry"),
+    disconnect("Arm_Kinematics.tool_pose",      "Cart_Impedance.tool_pose"),
+    disconnect("Arm_Kinematics.tool_twist",     "Cart_Impedance.tool_twist"),
+    disconnect("Link_Rx.ext_ref",               "Cart_Impedance.ext_ref"),
+    disconnect("Cart_Impedance.f_des",          "Dynamics.f_des"),
+    disconnect("youbot.jointstate",             "Dynamics.jointstate"),
+    disconnect("youbot.odometry",               "Dynamics.odometry"),
+    disconnect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
+    disconnect("Dynamics.joint_effort_command", "youbot.joint_effort_command"),
+    disconnect("Dynamics.base_twist",           "Base_Ctrl.base_twist"),
+    disconnect("youbot.odometry",               "Base_Ctrl.odometry"),
+    disconnect("Base_Ctrl.cmd_twist",           "youbot.cmd_twist"),
+    disconnect("Arm_Kinematics.tool_pose",      "Link_Tx.tool_pose"),
+    disconnect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
+    disconnect("Cart_Impedance.active",         "Link_Tx.copying"),
+    disconnect("Force_Monitor.aligned",         "Link_Tx.aligned"),
+    disconnect("Link_Tx.tx",                    "Peer.rx"),
+    disconnect("Peer.tx",                       "Link_Rx.rx"),
+    disconnect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
+    disconnect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
+    disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
+    disconnect("Operator.ext_force",            "youbot.ext_force"),
+    disconnect("Link_Rx.link_stats",            "Link_Monitor.link_stats"),
+    disconnect("Link_Rx.peer_state",            "Link_Monitor.peer_state"),
+    disconnect("Cart_Impedance.active",         "Link_Monitor.copying"),
+    disconnect("Cart_Impedance.f_raw_norm",     "Force_Monitor.f_raw_norm"),
+    disconnect("Link_Rx.peer_state",            "Force_Monitor.peer_state"),
+    disconnect("youbot.jointstate",             "Safety_Monitor.jointstate"),
+    disconnect("youbot.odometry",               "Safety_Monitor.odometry"),
+    disconnect("youbot.motor_states",           "Safety_Monitor.motor_states"),
+    disconnect("youbot.driver_state",           "Safety_Monitor.driver_state"),
+    disconnect("Dynamics.tau_sat",              "Safety_Monitor.tau_sat"),
+    disconnect("Cart_Impedance.f_raw_norm",     "Safety_Monitor.controller"),
+    disconnect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
+    disconnect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
+    disconnect("youbot.jointstate",             "Reporter.jointstate"),
+    disconnect("youbot.odometry",               "Reporter.odometry"),
+    disconnect("Cart_Impedance.f_des",          "Reporter.f_des"),
+    disconnect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
+    disconnect("Cart_Impedance.active",         "Reporter.active"),
+  },
+
+  destroy_all = Configuration {
+    destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
+    destroy("Link_Tx"), destroy("Link_Rx"), destroy("Peer"),
+    destroy("Link_Monitor"), destroy("Force_Monitor"), destroy("Safety_Monitor"),
+    destroy("Operator"), destroy("Mode_Switch"), destroy("Reporter"),
+  },
+}

@@ -1,0 +1,223 @@
+-- Coordinator of one robot of the youBot coupling, with state-scoped configurations: being in `copying` means that
+-- enable_copying is in force, and leaving it undoes it. No inverse is written.
+--
+-- It is pure: states, and names of events to raise. It names no component, no port, no platform: what the names mean
+-- here is said by the deployment's configurations, and the same file coordinates another platform over other ones
+-- (deployments/generic_arm.yaml). In an rFSM statechart the outer state's transition wins over the inner one's.
+
+return state {
+
+  idle = state {},
+
+  -- Bring-up: each step asks for one configuration and goes on when it is applied. Nothing here undoes anything: undoing
+  -- is what `cancelling` does, from wherever the bring-up has come to.
+  deploying = state {
+    creating_core     = state { entry = "create_core" },
+    creating_link     = state { entry = "create_link" },
+    creating_monitors = state { entry = "create_monitors" },
+    wiring            = state { entry = "connect_all" },
+    configuring       = state { entry = "load_properties" },
+    powering          = state { entry = "start_driver" },
+    calibrating       = state { entry = "calibrate" },
+    unfolding         = state { entry = "unfold" },
+    starting          = state { entry = "start_control" },
+    taking_over       = state { entry = "take_over" },
+
+    trans { src = "initial",           tgt = "creating_core" },
+    trans { src = "creating_core",     tgt = "creating_link",     events = { "create_core.ok" } },
+    trans { src = "creating_link",     tgt = "creating_monitors", events = { "create_link.ok" } },
+    trans { src = "creating_monitors", tgt = "wiring",            events = { "create_monitors.ok" } },
+    trans { src = "wiring",            tgt = "configuring",       events = { "connect_all.ok" } },
+    trans { src = "configuring",       tgt = "powering",          events = { "load_properties.ok" } },
+    trans { src = "powering",          tgt = "calibrating",       events = { "start_driver.ok" } },
+    trans { src = "calibrating",       tgt = "unfolding",         events = { "calibrate.ok" } },
+    trans { src = "unfolding",         tgt = "starting",          events = { "unfold.ok" } },
+    trans { src = "starting",          tgt = "taking_over",       events = { "start_control.ok" } },
+  },
+
+  -- A bring-up that failed waits here: every applied step is still in force, and is undone by `cancelling`.
+  deploy_failed = state {},
+
+  -- The bring-up backwards. An undo is answered `undone` also when there was nothing to undo, so this serves from
+  -- everywhere; it contains the folding of the arm, as the inverse of unfolding it.
+  cancelling = state {
+    handing_back   = state { entry = "take_over.undo" },
+    stopping       = state { entry = "start_control.undo" },
+    folding        = state { entry = "unfold.undo" },
+    uncalibrating  = state { entry = "calibrate.undo" },
+    powering_down  = state { entry = "start_driver.undo" },
+    unconfiguring  = state { entry = "load_properties.undo" },
+    unwiring       = state { entry = "connect_all.undo" },
+    removing_monitors = state { entry = "create_monitors.undo" },
+    removing_link     = state { entry = "create_link.undo" },
+    removing_core     = state { entry = "create_core.undo" },
+
+    trans { src = "initial",           tgt = "handing_back" },
+    trans { src = "handing_back",      tgt = "stopping",          events = { "take_over.undone" } },
+    trans { src = "stopping",          tgt = "folding",           events = { "start_control.undone" } },
+    trans { src = "folding",           tgt = "uncalibrating",     events = { "unfold.undone" } },
+    trans { src = "uncalibrating",     tgt = "powering_down",     events = { "calibrate.undone" } },
+    trans { src = "powering_down",     tgt = "unconfiguring",     events = { "start_driver.undone" } },
+    trans { src = "unconfiguring",     tgt = "unwiring",          events = { "load_properties.undone" } },
+    trans { src = "unwiring",          tgt = "removing_monitors", events = { "connect_all.undone" } },
+    trans { src = "removing_monitors", tgt = "removing_link",     events = { "create_monitors.undone" } },
+    trans { src = "removing_link",     tgt = "removing_core",     events = { "create_link.undone" } },
+  },
+
+  -- The undoing itself failed: somebody has to look. `e_shutdown` tries again.
+  cancel_failed = state {},
+
+  operational = state {
+
+    -- The other robot is not heard.
+    unsync = state {},
+
+    sync = state {
+
+      -- Both robots are heard; the hands bring the arms together. The desired force is computed, not put out.
+      harmonizing = state { config = "five_DOF",
+        good     = state {},
+        degraded = state {},
+        trans { src = "initial",  tgt = "good" },
+        trans { src = "good",     tgt = "degraded", events = { "e_qos_degraded" } },
+        trans { src = "degraded", tgt = "good",     events = { "e_qos_restored" } },
+      },
+
+      copying = state { config = "enable_copying",
+        eight_DOF_mode = state { config = "eight_DOF" },
+        five_DOF_mode  = state { config = "five_DOF",
+          free     = state {},
+          degraded = state {},      -- eight degrees of freedom need a quick link: e_8dof is not heard here
+          trans { src = "initial",  tgt = "free" },
+          trans { src = "free",     tgt = "degraded", events = { "e_qos_degraded" } },
+          trans { src = "degraded", tgt = "free",     events = { "e_qos_restored" } },
+        },
+        trans { src = "initial",            tgt = "eight_DOF_mode" },
+        trans { src = "eight_DOF_mode",     tgt = "five_DOF_mode",  events = { "e_5dof", "eight_DOF.failed" } },
+        trans { src = "eight_DOF_mode",     tgt = ".five_DOF_mode.degraded", events = { "e_qos_degraded" } },
+        trans { src = ".five_DOF_mode.free", tgt = "eight_DOF_mode", events = { "e_8dof" } },
+      },
+
+      trans { src = "initial",              tgt = "harmonizing" },
+      trans { src = ".harmonizing.good",     tgt = "copying", events = { "e_aligned" } },
+      trans { src = ".harmonizing.degraded", tgt = ".copying.five_DOF_mode.degraded", events = { "e_aligned" } },
+      trans { src = "copying",              tgt = "harmonizing",
+              events = { "e_misaligned", "e_peer_left", "e_torque_sat", "e_JNT_SOFT_LIMIT_EXEEDED",
+                         "enable_copying.failed" } },
+    },
+
+    -- Somebody pushed hard. Nothing couples and the base stands until the operator says so.
+    soft_stop = state { entry = "base_stop" },
+
+    trans { src = "initial",   tgt = "unsync" },
+    trans { src = "unsync",    tgt = "sync",      events = { "e_qos_ok" } },
+    trans { src = "sync",      tgt = "unsync",    events = { "e_link_lost" } },
+    trans { src = "sync",      tgt = "soft_stop", events = { "e_force_spike" } },
+    trans { src = "soft_stop", tgt = "unsync",    events = { "e_reset" } },
+  },
+
+  fault = state {
+    holding   = state { entry = "safe_hold" },
+    waiting   = state {},
+    clearing  = state { entry = "clear_faults" },
+    releasing = state { entry = "safe_hold.undo" },
+
+    -- The controller itself stopped: the same, then it is started again without asking anybody.
+    holding_controller = state { entry = "safe_hold" },
+    repairing          = state { entry = "restart_controller" },
+
+    trans { src = "initial",            tgt = "holding" },
+    trans { src = "holding",            tgt = "waiting",   events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
+    trans { src = "waiting",            tgt = "clearing",  events = { "e_reset" } },
+    trans { src = "clearing",           tgt = "releasing", events = { "clear_faults.ok" } },
+    trans { src = "clearing",           tgt = "waiting",   events = { "clear_faults.failed", "clear_faults.broken" } },
+    trans { src = "holding_controller", tgt = "repairing", events = { "safe_hold.ok" } },
+    trans { src = "holding_controller", tgt = "waiting",   events = { "safe_hold.failed", "safe_hold.broken" } },
+    trans { src = "repairing",          tgt = "releasing", events = { "restart_controller.ok" } },
+    trans { src = "repairing",          tgt = "waiting",   events = { "restart_controller.failed", "restart_controller.broken" } },
+    trans { src = "releasing",          tgt = "waiting",   events = { "safe_hold.undo.failed", "safe_hold.undo.broken" } },
+  },
+
+  -- The arm goes down before anything that holds it is stopped.
+  shutting_down = state {
+    quieting     = state { entry = "base_stop" },
+    holding      = state { entry = "hold" },
+    parking      = state { entry = "park" },
+    stopping     = state { entry = "stop_control" },
+    powering_off = state { entry = "stop_all" },
+    cleaning     = state { entry = "cleanup_all" },
+    unwiring     = state { entry = "disconnect_all" },
+    destroying   = state { entry = "destroy_all" },
+
+    trans { src = "initial",      tgt = "quieting" },
+    trans { src = "quieting",     tgt = "holding",      events = { "base_stop.ok" } },
+    trans { src = "holding",      tgt = "parking",      events = { "hold.ok" } },
+    trans { src = "parking",      tgt = "stopping",     events = { "park.ok" } },
+    trans { src = "stopping",     tgt = "powering_off", events = { "stop_control.ok" } },
+    trans { src = "powering_off", tgt = "cleaning",     events = { "stop_all.ok" } },
+    trans { src = "cleaning",     tgt = "unwiring",     events = { "cleanup_all.ok" } },
+    trans { src = "unwiring",     tgt = "destroying",   events = { "disconnect_all.ok" } },
+  },
+
+  -- A step of the teardown failed: everything stays as it is, the arm where it is. `e_shutdown` goes on from there.
+  stranded = state {
+    before_parking = state {},
+    parked         = state {},
+    stopped        = state {},
+    trans { src = "initial", tgt = "before_parking" },
+  },
+
+  trans { src = "initial",   tgt = "idle" },
+  trans { src = "idle",      tgt = "deploying", events = { "e_start" } },
+
+  trans { src = "deploying", tgt = "deploy_failed",
+          events = { "create_core.failed", "create_link.failed", "create_monitors.failed", "connect_all.failed",
+                     "load_properties.failed", "start_driver.failed", "calibrate.failed", "unfold.failed",
+                     "start_control.failed", "take_over.failed",
+                     "create_core.broken", "create_link.broken", "create_monitors.broken", "connect_all.broken",
+                     "load_properties.broken", "start_driver.broken", "calibrate.broken", "unfold.broken",
+                     "start_control.broken", "take_over.broken" } },
+  trans { src = "deploying",     tgt = "cancelling", events = { "e_shutdown" } },
+  trans { src = "deploy_failed", tgt = "cancelling", events = { "e_shutdown" } },
+  trans { src = "cancel_failed", tgt = "cancelling", events = { "e_shutdown" } },
+  trans { src = "cancelling", tgt = "cancel_failed",
+          events = { "take_over.undo.failed", "start_control.undo.failed", "unfold.undo.failed",
+                     "calibrate.undo.failed", "start_driver.undo.failed", "load_properties.undo.failed",
+                     "connect_all.undo.failed", "create_monitors.undo.failed", "create_link.undo.failed",
+                     "create_core.undo.failed",
+                     "take_over.undo.broken", "start_control.undo.broken", "unfold.undo.broken",
+                     "calibrate.undo.broken", "start_driver.undo.broken", "load_properties.undo.broken",
+                     "connect_all.undo.broken", "create_monitors.undo.broken", "create_link.undo.broken",
+                     "create_core.undo.broken" } },
+  trans { src = "cancelling.removing_core", tgt = "idle",        events = { "create_core.undone" } },
+  trans { src = "deploying.taking_over",    tgt = "operational", events = { "take_over.ok" } },
+
+  trans { src = "operational", tgt = "shutting_down", events = { "e_shutdown" } },
+  trans { src = "operational", tgt = "fault",
+          events = { "e_overspeed", "e_base_overspeed", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP",
+                     "e_EC_TIMEOUT", "e_ENCODER_ERR", "e_cmd_watchdog", "e_estop",
+                     "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
+                     "enable_copying.broken", "enable_copying.undo.failed", "enable_copying.undo.broken",
+                     "eight_DOF.undo.failed", "eight_DOF.undo.broken", "five_DOF.undo.failed", "five_DOF.undo.broken" } },
+  trans { src = "operational", tgt = "fault.holding_controller", events = { "e_controller_lost" } },
+  -- What was asked for in leaving `operational` is answered here.
+  trans { src = "fault", tgt = "fault.holding",
+          events = { "enable_copying.undo.failed", "enable_copying.undo.broken", "eight_DOF.undo.failed", "eight_DOF.undo.broken",
+                     "five_DOF.undo.failed", "five_DOF.undo.broken" } },
+  trans { src = "fault", tgt = "shutting_down", events = { "e_shutdown" } },
+  trans { src = "fault.releasing", tgt = "operational", events = { "safe_hold.undone" } },
+
+  trans { src = "shutting_down", tgt = "stranded.before_parking",
+          events = { "base_stop.failed", "hold.failed", "park.failed", "base_stop.broken", "hold.broken", "park.broken",
+                     "enable_copying.undo.failed", "enable_copying.undo.broken", "eight_DOF.undo.failed", "eight_DOF.undo.broken",
+                     "five_DOF.undo.failed", "five_DOF.undo.broken" } },
+  trans { src = "shutting_down", tgt = "stranded.parked",
+          events = { "stop_control.failed", "stop_all.failed", "stop_control.broken", "stop_all.broken" } },
+  trans { src = "shutting_down", tgt = "stranded.stopped",
+          events = { "cleanup_all.failed", "cleanup_all.broken", "disconnect_all.failed", "disconnect_all.broken",
+                     "destroy_all.failed", "destroy_all.broken" } },
+  trans { src = "stranded.before_parking", tgt = "shutting_down",              events = { "e_shutdown" } },
+  trans { src = "stranded.parked",         tgt = "shutting_down.stopping",     events = { "e_shutdown" } },
+  trans { src = "stranded.stopped",        tgt = "shutting_down.cleaning",     events = { "e_shutdown" } },
+  trans { src = "shutting_down.destroying", tgt = "idle", events = { "destroy_all.ok" } },
+}

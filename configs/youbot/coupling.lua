@@ -1,0 +1,18 @@
+-- The youBot coupling's switch: the paper's four configurations, as they stand in its second listing.
+ConfiguratorConf {
+   disable_copying = Configuration{
+       port_write("Cart_Impedance.ext_ref_mode", false)
+   },
+   
+   enable_copying = Configuration {
+       port_write("Cart_Impedance.ext_ref_mode", true)
+   },
+
+   eight_DOF = Configuration {
+      property_set("Dynamics.force_gain", {0.1, 0.1, 0.1})
+   },
+
+   five_DOF = Configuration {
+      property_set("Dynamics.force_gain", {0, 0, 0})
+   },
+}
