@@ -1,0 +1,149 @@
+//! A picture in Mermaid's language: statecharts as `stateDiagram-v2`, everything else as a flowchart.
+
+use super::picture::{Direction, Picture, Shape, Subject, Tone};
+use std::fmt::Write as _;
+
+pub(super) fn write(picture: &Picture) -> String {
+    if picture.subject == Subject::Statechart { statechart(picture) } else { flowchart(picture) }
+}
+
+fn flowchart(picture: &Picture) -> String {
+    let mut out = format!("---\ntitle: \"{}\"\n---\n", plain(&picture.title));
+    out.push_str(match picture.direction {
+        Direction::Right => "flowchart LR\n",
+        Direction::Down => "flowchart TB\n",
+    });
+    flow_level(&mut out, picture, None, 1);
+    for edge in &picture.edges {
+        let mut label = edge.label.clone();
+        let from_port = edge.from_port.and_then(|p| picture.nodes[edge.from].outs.get(p));
+        let to_port = edge.to_port.and_then(|p| picture.nodes[edge.to].ins.get(p));
+        if let (Some(from), Some(to)) = (from_port, to_port) {
+            label.insert(0, if from == to { from.clone() } else { format!("{from} → {to}") });
+        }
+        let arrow = if edge.dashed { "-.->" } else { "-->" };
+        if label.is_empty() {
+            let _ = writeln!(out, "  n{} {arrow} n{}", edge.from, edge.to);
+        } else {
+            let _ = writeln!(out, "  n{} {arrow}|\"{}\"| n{}", edge.from, plain(&label.join("\n")), edge.to);
+        }
+    }
+    for (i, node) in picture.nodes.iter().enumerate() {
+        if let Some(style) = style(node.tone) {
+            let _ = writeln!(out, "  style n{i} {style}");
+        }
+    }
+    out
+}
+
+fn flow_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
+    let indent = "  ".repeat(depth);
+    for index in picture.children(group) {
+        let node = &picture.nodes[index];
+        let text = std::iter::once(&node.title).chain(&node.lines).map(|l| plain(l)).collect::<Vec<_>>().join("<br/>");
+        if node.shape == Shape::Group && picture.children(Some(index)).next().is_some() {
+            let _ = writeln!(out, "{indent}subgraph n{index} [\"{text}\"]");
+            flow_level(out, picture, Some(index), depth + 1);
+            let _ = writeln!(out, "{indent}end");
+        } else {
+            let _ = writeln!(out, "{indent}n{index}[\"{text}\"]");
+        }
+    }
+}
+
+fn statechart(picture: &Picture) -> String {
+    let mut out = format!("---\ntitle: \"{}\"\n---\nstateDiagram-v2\n", plain(&picture.title));
+    state_level(&mut out, picture, None, 1);
+    let mut active = Vec::new();
+    for (i, node) in picture.nodes.iter().enumerate() {
+        if node.tone == Tone::Active {
+            active.push(format!("n{i}"));
+        }
+    }
+    if !active.is_empty() {
+        let _ = writeln!(out, "  classDef active fill:#ffe9b8,stroke:#d97706,stroke-width:2px");
+        let _ = writeln!(out, "  class {} active", active.join(","));
+    }
+    out
+}
+
+fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
+    let indent = "  ".repeat(depth);
+    for index in picture.children(group) {
+        let node = &picture.nodes[index];
+        match node.shape {
+            Shape::Dot => continue,
+            Shape::Connector => {
+                let _ = writeln!(out, "{indent}state n{index} <<choice>>");
+            }
+            Shape::Box | Shape::Group => {
+                let _ = writeln!(out, "{indent}state \"{}\" as n{index}", plain(&node.title));
+                if picture.children(Some(index)).next().is_some() {
+                    let _ = writeln!(out, "{indent}state n{index} {{");
+                    state_level(out, picture, Some(index), depth + 1);
+                    let _ = writeln!(out, "{indent}}}");
+                }
+                for line in &node.lines {
+                    let _ = writeln!(out, "{indent}n{index} : {}", plain(line));
+                }
+            }
+        }
+    }
+    // A transition stands in the innermost state around both its ends, where Mermaid wants `[*]` to be.
+    for edge in picture.edges.iter().filter(|e| scope(picture, e.from, e.to) == group) {
+        let name = |node: usize| match picture.nodes[node].shape {
+            Shape::Dot => "[*]".to_owned(),
+            _ => format!("n{node}"),
+        };
+        let _ = write!(out, "{indent}{} --> {}", name(edge.from), name(edge.to));
+        if edge.label.is_empty() {
+            out.push('\n');
+        } else {
+            let _ = writeln!(out, " : {}", plain(&edge.label.join(" / ")));
+        }
+    }
+}
+
+/// The innermost group around two nodes (not one of them).
+fn scope(picture: &Picture, a: usize, b: usize) -> Option<usize> {
+    let chain = |node: usize| {
+        let mut chain = Vec::new();
+        let mut at = picture.nodes[node].parent;
+        while let Some(group) = at {
+            chain.push(group);
+            at = picture.nodes[group].parent;
+        }
+        chain
+    };
+    let around = chain(b);
+    chain(a).into_iter().find(|group| around.contains(group))
+}
+
+fn style(tone: Tone) -> Option<&'static str> {
+    Some(match tone {
+        Tone::Plain => return None,
+        Tone::Good => "fill:#e9f6ec,stroke:#3a8f55",
+        Tone::Care => "fill:#fdf4dc,stroke:#b98212",
+        Tone::Bad => "fill:#fdeaea,stroke:#c0403c",
+        Tone::Quiet => "fill:#f3f4f6,stroke:#9aa5b1",
+        Tone::Active => "fill:#ffe9b8,stroke:#d97706,stroke-width:2px",
+    })
+}
+
+/// Text in which Mermaid sees nothing of its own.
+fn plain(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("#quot;"),
+            '#' => out.push_str("#35;"),
+            '<' => out.push_str("#lt;"),
+            '>' => out.push_str("#gt;"),
+            ';' => out.push_str("#59;"),
+            ':' => out.push_str("#58;"),
+            '\n' => out.push_str("<br/>"),
+            c => out.push(c),
+        }
+    }
+    out
+}

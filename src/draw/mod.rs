@@ -1,0 +1,29 @@
+//! Pictures: components, coordinators and plans as SVG, DOT and Mermaid text.
+//!
+//! Each subject becomes one [`Picture`]; each format writes any picture. Knows no file and no terminal.
+
+mod dot;
+pub mod layout;
+mod mermaid;
+pub mod picture;
+mod svg;
+mod text;
+
+pub use picture::Picture;
+
+impl Picture {
+    /// The picture as SVG.
+    pub fn svg(&self) -> String {
+        svg::write(self)
+    }
+
+    /// The picture in Graphviz' language.
+    pub fn dot(&self) -> String {
+        dot::write(self)
+    }
+
+    /// The picture in Mermaid's language.
+    pub fn mermaid(&self) -> String {
+        mermaid::write(self)
+    }
+}
