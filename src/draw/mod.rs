@@ -2,6 +2,7 @@
 //!
 //! Each subject becomes one [`Picture`]; each format writes any picture. Knows no file and no terminal.
 
+mod components;
 mod dot;
 pub mod layout;
 mod mermaid;
@@ -9,6 +10,7 @@ pub mod picture;
 mod svg;
 mod text;
 
+pub use components::components;
 pub use picture::Picture;
 
 impl Picture {

@@ -1,0 +1,184 @@
+//! The components of a system, their ports and connections.
+
+use super::picture::{Direction, Edge, Node, Picture, Subject, Tone};
+use super::text::short;
+use crate::model::{Catalogue, ComponentName, Direction as PortDirection, MemberRef, Policy, RunState, Snapshot};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a system looks like: a box for each component with its type, its run state and those of its ports that are
+/// connected or written; an edge for each connection, labelled with its policy where that is not `data`.
+pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue) -> Picture {
+    let mut picture = Picture::new(Subject::Components, Direction::Right, title);
+    let mut used: BTreeSet<MemberRef> = BTreeSet::new();
+    for (from, to) in system.connections.keys() {
+        used.insert(*from);
+        used.insert(*to);
+    }
+    used.extend(system.ports.keys());
+    let mut boxes: BTreeMap<ComponentName, usize> = BTreeMap::new();
+    let mut rows: BTreeMap<MemberRef, usize> = BTreeMap::new();
+    let mut groups: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut tones: BTreeSet<RunState> = BTreeSet::new();
+    for (name, component) in &system.components {
+        let parent = subsystem(&mut picture, &mut groups, name.prefix());
+        let own = name.as_str().rsplit('/').next().unwrap_or(name.as_str());
+        let mut node = Node::new(name.as_str(), own);
+        node.parent = parent;
+        node.lines.push(component.ty.to_string());
+        node.lines.push(match component.activity {
+            Some(activity) => format!("{} · {activity}", component.state),
+            None => component.state.to_string(),
+        });
+        node.tone = tone(component.state);
+        tones.insert(component.state);
+        if let Some(ty) = catalogue.get(component.ty) {
+            for (port, description) in &ty.ports {
+                let member = name.member(*port);
+                if !used.contains(&member) {
+                    continue;
+                }
+                let list = match description.direction {
+                    PortDirection::In => &mut node.ins,
+                    PortDirection::Out => &mut node.outs,
+                };
+                rows.insert(member, list.len());
+                list.push(match system.ports.get(&member) {
+                    Some(value) => format!("{port} = {}", short(&value.to_string(), 18)),
+                    None => port.to_string(),
+                });
+            }
+        }
+        boxes.insert(*name, picture.add(node));
+    }
+    for ((from, to), policy) in &system.connections {
+        let (Some(a), Some(b)) = (boxes.get(&from.component), boxes.get(&to.component)) else { continue };
+        let mut edge = Edge::new(*a, *b);
+        edge.from_port = rows.get(from).copied();
+        edge.to_port = rows.get(to).copied();
+        if let Policy::Buffer(_) = policy {
+            edge.label.push(policy.to_string());
+            edge.dashed = true;
+        }
+        picture.edges.push(edge);
+    }
+    picture.legend = tones.into_iter().map(|state| (tone(state), state.to_string())).collect();
+    picture
+}
+
+/// The group of a subsystem's path, made where it is not there yet.
+fn subsystem<'a>(picture: &mut Picture, groups: &mut BTreeMap<&'a str, usize>, path: &'a str) -> Option<usize> {
+    if path.is_empty() {
+        return None;
+    }
+    if let Some(group) = groups.get(path) {
+        return Some(*group);
+    }
+    let (outer, own) = path.rsplit_once('/').unwrap_or(("", path));
+    let parent = subsystem(picture, groups, outer);
+    let mut node = Node::new(path, own);
+    node.shape = super::picture::Shape::Group;
+    node.parent = parent;
+    let group = picture.add(node);
+    groups.insert(path, group);
+    Some(group)
+}
+
+fn tone(state: RunState) -> Tone {
+    match state {
+        RunState::Unconfigured => Tone::Quiet,
+        RunState::Stopped => Tone::Care,
+        RunState::Running => Tone::Good,
+        RunState::Faulted => Tone::Bad,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{ComponentSnapshot, ComponentType, Ident, PortType, TypeName, Value, ValueType};
+
+    /// A picture of the youBot's control loop, with everything a drawing can have.
+    pub(crate) fn youbot() -> (Snapshot, Catalogue) {
+        let ident = |t: &str| Ident::new(t).unwrap();
+        let mut catalogue = Catalogue::new();
+        let mut system = Snapshot::default();
+        for (name, ins, outs, state) in [
+            ("youbot", "joint_effort_command cmd_twist ext_force", "jointstate odometry events", RunState::Running),
+            ("Arm_Kinematics", "jointstate odometry", "tool_pose tool_twist jacobian", RunState::Running),
+            ("Cart_Impedance", "tool_pose tool_twist ext_ref ext_ref_mode", "f_des f_raw_norm", RunState::Running),
+            ("Dynamics", "f_des jointstate jacobian odometry", "joint_effort_command base_twist", RunState::Stopped),
+            ("Base_Ctrl", "base_twist odometry", "cmd_twist", RunState::Unconfigured),
+            ("Link_Tx", "tool_pose tool_twist", "tx", RunState::Running),
+            ("Link_Rx", "rx", "ext_ref link_stats", RunState::Running),
+            ("Link_Monitor", "link_stats", "events", RunState::Running),
+            ("Force_Monitor", "f_raw_norm", "events", RunState::Faulted),
+            ("Operator", "tool_pose", "ext_force", RunState::Running),
+            ("left/Relay", "u", "y", RunState::Running),
+        ] {
+            let ty = name.rsplit('/').next().unwrap();
+            let mut description = ComponentType::new(ty, "");
+            for (ports, direction) in [(ins, PortDirection::In), (outs, PortDirection::Out)] {
+                for port in ports.split_whitespace() {
+                    description.ports.insert(
+                        ident(port),
+                        PortType {
+                            direction,
+                            ty: ValueType::Float,
+                            unit: None,
+                            buffered: false,
+                            doc: String::new(),
+                            origin: crate::model::Origin::NONE,
+                        },
+                    );
+                }
+            }
+            catalogue.insert(description);
+            system.components.insert(
+                ComponentName::new(name).unwrap(),
+                ComponentSnapshot {
+                    ty: TypeName::new(ty).unwrap(),
+                    state,
+                    properties: BTreeMap::new(),
+                    activity: Some(ident("control")),
+                },
+            );
+        }
+        for pair in "youbot.jointstate Arm_Kinematics.jointstate youbot.jointstate Dynamics.jointstate youbot.odometry \
+                     Arm_Kinematics.odometry youbot.odometry Dynamics.odometry youbot.odometry Base_Ctrl.odometry \
+                     Arm_Kinematics.tool_pose Cart_Impedance.tool_pose Arm_Kinematics.tool_twist \
+                     Cart_Impedance.tool_twist Arm_Kinematics.tool_pose Link_Tx.tool_pose Arm_Kinematics.tool_twist \
+                     Link_Tx.tool_twist Arm_Kinematics.tool_pose Operator.tool_pose Arm_Kinematics.jacobian \
+                     Dynamics.jacobian Link_Rx.ext_ref Cart_Impedance.ext_ref Link_Rx.link_stats \
+                     Link_Monitor.link_stats Cart_Impedance.f_des Dynamics.f_des Cart_Impedance.f_raw_norm \
+                     Force_Monitor.f_raw_norm Dynamics.joint_effort_command youbot.joint_effort_command \
+                     Dynamics.base_twist Base_Ctrl.base_twist Base_Ctrl.cmd_twist youbot.cmd_twist Operator.ext_force \
+                     youbot.ext_force Link_Tx.tx Link_Rx.rx left/Relay.y left/Relay.u"
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .chunks(2)
+        {
+            let policy = if pair[0].ends_with("tx") { Policy::Buffer(64) } else { Policy::Data };
+            system.connections.insert((MemberRef::new(pair[0]).unwrap(), MemberRef::new(pair[1]).unwrap()), policy);
+        }
+        system.ports.insert(MemberRef::new("Cart_Impedance.ext_ref_mode").unwrap(), Value::Bool(true));
+        (system, catalogue)
+    }
+
+    #[test]
+    fn every_component_port_and_connection_is_drawn() {
+        let (system, catalogue) = youbot();
+        let picture = components("youbot", &system, &catalogue);
+        assert_eq!(picture.edges.len(), system.connections.len());
+        assert!(picture.edges.iter().all(|e| e.from_port.is_some() && e.to_port.is_some()));
+        let svg = picture.svg();
+        if let Ok(path) = std::env::var("DRAW_COMPONENTS") {
+            std::fs::write(path, &svg).unwrap();
+        }
+        for name in system.components.keys() {
+            assert!(svg.contains(name.as_str().rsplit('/').next().unwrap()));
+        }
+        assert!(svg.contains("ext_ref_mode = true"));
+        assert!(picture.mermaid().contains("buffer(64)"));
+        assert!(picture.dot().contains("subgraph"));
+    }
+}
