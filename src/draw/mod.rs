@@ -3,6 +3,7 @@
 //! Each subject becomes one [`Picture`]; each format writes any picture. Knows no file and no terminal.
 
 mod components;
+mod coordinator;
 mod dot;
 pub mod layout;
 mod mermaid;
@@ -11,6 +12,7 @@ mod svg;
 mod text;
 
 pub use components::components;
+pub use coordinator::coordinator;
 pub use picture::Picture;
 
 impl Picture {

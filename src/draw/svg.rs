@@ -69,8 +69,13 @@ pub(super) fn write(picture: &Picture) -> String {
         );
     }
     for (i, node) in picture.nodes.iter().enumerate() {
-        if node.shape != Shape::Group {
+        if node.shape == Shape::Group {
+            draw_heading(&mut out, node, nodes[i], Some(group_colour(node, depth[i])));
+        } else {
             draw_node(&mut out, picture, i, nodes[i], depth[i]);
+            if node.shape != Shape::Dot {
+                draw_heading(&mut out, node, nodes[i], None);
+            }
         }
     }
     for (edge, route) in picture.edges.iter().zip(&routes) {
@@ -120,7 +125,7 @@ fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: 
         }
         Shape::Box | Shape::Group => {
             let group = node.shape == Shape::Group;
-            let fill = if group && node.tone == Tone::Plain { group_fill(depth) } else { fill };
+            let fill = if group { group_colour(node, depth) } else { fill };
             let wide = if node.tone == Tone::Active { 2.4 } else { 1.2 };
             let _ = writeln!(
                 out,
@@ -129,22 +134,6 @@ fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: 
                 r.x, r.y, r.w, r.h
             );
         }
-    }
-    let _ = writeln!(
-        out,
-        "<text x=\"{cx:.1}\" y=\"{:.1}\" font-size=\"{TITLE}\" font-weight=\"bold\" text-anchor=\"middle\" \
-         fill=\"{ink}\">{}</text>",
-        r.y + 19.0,
-        xml(&node.title)
-    );
-    let mut y = r.y + 19.0;
-    for line in &node.lines {
-        y += LINE - 2.0;
-        let _ = writeln!(
-            out,
-            "<text x=\"{cx:.1}\" y=\"{y:.1}\" text-anchor=\"middle\" fill=\"{ink}\" opacity=\"0.85\">{}</text>",
-            xml(line)
-        );
     }
     if node.ins.is_empty() && node.outs.is_empty() {
         return;
@@ -172,6 +161,34 @@ fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: 
             );
         }
     }
+}
+
+/// The text at the top of a node. A group's is drawn over the edges that pass there, with a rim in the group's colour.
+fn draw_heading(out: &mut String, node: &Node, r: Rect, rim: Option<&str>) {
+    let ink = colours(node.tone).2;
+    let cx = r.x + r.w / 2.0;
+    let rim = rim.map_or_else(String::new, |c| format!(" stroke=\"{c}\" stroke-width=\"5\" paint-order=\"stroke\""));
+    let _ = writeln!(
+        out,
+        "<text x=\"{cx:.1}\" y=\"{:.1}\" font-size=\"{TITLE}\" font-weight=\"bold\" text-anchor=\"middle\" \
+         fill=\"{ink}\"{rim}>{}</text>",
+        r.y + 19.0,
+        xml(&node.title)
+    );
+    let mut y = r.y + 19.0;
+    for line in &node.lines {
+        y += LINE - 2.0;
+        let _ = writeln!(
+            out,
+            "<text x=\"{cx:.1}\" y=\"{y:.1}\" text-anchor=\"middle\" fill=\"{ink}\"{rim}>{}</text>",
+            xml(line)
+        );
+    }
+}
+
+/// The fill of a group: its tone's, or that of its depth.
+fn group_colour(node: &Node, depth: usize) -> &'static str {
+    if node.tone == Tone::Plain { group_fill(depth) } else { colours(node.tone).0 }
 }
 
 fn draw_label(out: &mut String, lines: &[String], r: Rect, beside: bool) {
@@ -226,7 +243,7 @@ fn path(route: &Route, direction: Direction) -> String {
                     (b - a).abs() * 0.5
                 } else {
                     // Turning round: far enough out to be seen.
-                    (distance * 0.4).clamp(10.0, 26.0)
+                    (distance * 0.4).clamp(10.0, 22.0)
                 };
                 if distance < 0.05 && last.heading == run.heading {
                     let _ = write!(out, " L{}", point(b, run.across));

@@ -427,12 +427,12 @@ impl<'a> Levels<'a> {
                 let a_at = if k == 0 { first_at[c] } else { 0.0 };
                 let b_at = if k + 2 == n { last_at[c] } else { 0.0 };
                 let passes = usize::from(pair[0] >= items.len()) + usize::from(pair[1] >= items.len());
-                let weight = [1.0, 2.0, 8.0][passes];
+                let weight = [1.0, 2.0, 24.0][passes];
                 ties.push(Tie { a: pair[0], a_at, b: pair[1], b_at, weight });
             }
         }
         for (a, b) in &near {
-            ties.push(Tie { a: *a, a_at: 0.0, b: *b, b_at: 0.0, weight: 0.2 });
+            ties.push(Tie { a: *a, a_at: 0.0, b: *b, b_at: 0.0, weight: 0.05 });
         }
         let wides: Vec<f64> = vertices.iter().map(|v| v.wide).collect();
         let count = items.len();

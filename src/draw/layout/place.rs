@@ -15,8 +15,76 @@ pub struct Tie {
     pub weight: f64,
 }
 
-/// Middles of all vertices. `layers` in order, `sizes` across, `gap` between two neighbours of a layer.
+/// Middles of all vertices. `layers` in order, `sizes` across, `gap` between two neighbours of a layer. Parts that no tie
+/// joins stand one after the other, the largest first.
 pub fn place(layers: &[Vec<usize>], sizes: &[f64], gap: impl Fn(usize, usize) -> f64, ties: &[Tie]) -> Vec<f64> {
+    let parts = parts(sizes.len(), ties);
+    let count = parts.iter().max().map_or(0, |p| p + 1);
+    if count <= 1 {
+        return place_part(layers, sizes, &gap, ties);
+    }
+    let mut members = vec![0usize; count];
+    parts.iter().for_each(|p| members[*p] += 1);
+    // Single vertices share one part: a grid of boxes without edges.
+    let group_of = |v: usize| if members[parts[v]] == 1 { count } else { parts[v] };
+    let mut order: Vec<usize> = (0..count).filter(|p| members[*p] > 1).collect();
+    order.sort_by_key(|p| std::cmp::Reverse(members[*p]));
+    order.push(count);
+    let mut layers_of: Vec<Vec<Vec<usize>>> = vec![vec![Vec::new(); layers.len()]; count + 1];
+    for (i, layer) in layers.iter().enumerate() {
+        for v in layer {
+            layers_of[group_of(*v)][i].push(*v);
+        }
+    }
+    let mut ties_of: Vec<Vec<Tie>> = vec![Vec::new(); count + 1];
+    ties.iter().for_each(|t| ties_of[group_of(t.a)].push(*t));
+    let mut at = vec![0.0; sizes.len()];
+    let mut next = 0.0;
+    for group in order {
+        let layers = &layers_of[group];
+        let mut own: Vec<usize> = layers.iter().flatten().copied().collect();
+        if own.is_empty() {
+            continue;
+        }
+        own.sort_unstable();
+        let placed = place_part(layers, sizes, &gap, &ties_of[group]);
+        let low = own.iter().map(|v| placed[*v] - sizes[*v] / 2.0).fold(f64::INFINITY, f64::min);
+        let high = own.iter().map(|v| placed[*v] + sizes[*v] / 2.0).fold(f64::NEG_INFINITY, f64::max);
+        own.iter().for_each(|v| at[*v] = placed[*v] - low + next);
+        next += high - low + 26.0;
+    }
+    at
+}
+
+/// The part each vertex belongs to: vertices joined by ties are in one, numbered without gaps.
+fn parts(count: usize, ties: &[Tie]) -> Vec<usize> {
+    let mut lead: Vec<usize> = (0..count).collect();
+    fn find(lead: &mut [usize], mut v: usize) -> usize {
+        while lead[v] != v {
+            lead[v] = lead[lead[v]];
+            v = lead[v];
+        }
+        v
+    }
+    for t in ties {
+        let (a, b) = (find(&mut lead, t.a), find(&mut lead, t.b));
+        lead[a.max(b)] = a.min(b);
+    }
+    let mut number = vec![usize::MAX; count];
+    let mut next = 0;
+    (0..count)
+        .map(|v| {
+            let root = find(&mut lead, v);
+            if number[root] == usize::MAX {
+                number[root] = next;
+                next += 1;
+            }
+            number[root]
+        })
+        .collect()
+}
+
+fn place_part(layers: &[Vec<usize>], sizes: &[f64], gap: &impl Fn(usize, usize) -> f64, ties: &[Tie]) -> Vec<f64> {
     let mut at = vec![0.0; sizes.len()];
     let mut layer_of = vec![0usize; sizes.len()];
     let mut rests: Vec<Vec<f64>> = Vec::with_capacity(layers.len());

@@ -1,0 +1,272 @@
+//! A coordinator: states inside states, with what they ask for; transitions with what triggers them.
+
+use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
+use super::text::short;
+use crate::model::Statechart;
+use crate::model::statechart::{Action, INITIAL, Node as Child, ROOT, State, Transition};
+use std::collections::BTreeMap;
+
+/// Lines of a transition's label before the rest is only counted.
+const LABEL_LINES: usize = 5;
+/// Characters of a line of a label.
+const LABEL_COLUMNS: usize = 34;
+
+/// What a coordinator looks like. `active` are the active states (`root.sync.copying`), which are marked.
+///
+/// References are followed as far as they lead to something; a transition that leads nowhere is not drawn (`check` says
+/// so). Transitions with the same ends are one edge with the events of all.
+pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Picture {
+    let mut picture = Picture::new(Subject::Statechart, Direction::Down, title);
+    let mut drawing = Drawing { picture: &mut picture, index: BTreeMap::new(), active };
+    drawing.state_content(&chart.root, ROOT, None);
+    drawing.transitions(&chart.root, ROOT);
+    picture
+}
+
+struct Drawing<'a> {
+    picture: &'a mut Picture,
+    /// Nodes by their full name; the root has none.
+    index: BTreeMap<String, usize>,
+    active: &'a [String],
+}
+
+impl Drawing<'_> {
+    fn state_content(&mut self, state: &State, fqn: &str, parent: Option<usize>) {
+        let implied = state.transitions.iter().any(|t| t.src.as_ref().is_some_and(|(s, _)| s == INITIAL));
+        let written = state.children.iter().any(|c| c.name().as_str() == INITIAL);
+        if implied && !written {
+            self.dot(&format!("{fqn}.{INITIAL}"), parent);
+        }
+        for child in &state.children {
+            let name = format!("{fqn}.{}", child.name());
+            match child {
+                Child::Connector(c) if c.name.as_str() == INITIAL => self.dot(&name, parent),
+                Child::Connector(c) => {
+                    let mut node = Node::new(&name, c.name.as_str());
+                    node.shape = Shape::Connector;
+                    node.parent = parent;
+                    let at = self.picture.add(node);
+                    self.index.insert(name, at);
+                }
+                Child::State(inner) => {
+                    let mut node = Node::new(&name, inner.name.as_str());
+                    node.parent = parent;
+                    node.shape = if inner.children.is_empty() && inner.transitions.is_empty() {
+                        Shape::Box
+                    } else {
+                        Shape::Group
+                    };
+                    node.lines = state_lines(inner);
+                    if self.active.contains(&name) {
+                        node.tone = Tone::Active;
+                    }
+                    let at = self.picture.add(node);
+                    self.index.insert(name.clone(), at);
+                    self.state_content(inner, &name, Some(at));
+                }
+            }
+        }
+    }
+
+    fn dot(&mut self, name: &str, parent: Option<usize>) {
+        let mut node = Node::new(name, INITIAL);
+        node.shape = Shape::Dot;
+        node.parent = parent;
+        let at = self.picture.add(node);
+        self.index.insert(name.to_owned(), at);
+    }
+
+    fn transitions(&mut self, state: &State, fqn: &str) {
+        for transition in &state.transitions {
+            let ends = (transition.src.as_ref(), transition.tgt.as_ref());
+            let (Some((src, _)), Some((tgt, _))) = ends else { continue };
+            let (Some(from), Some(to)) = (self.find(fqn, src), self.find(fqn, tgt)) else { continue };
+            let label = transition_lines(transition);
+            if let Some(edge) = self.picture.edges.iter_mut().find(|e| e.from == from && e.to == to) {
+                edge.label.extend(label);
+            } else {
+                let mut edge = Edge::new(from, to);
+                edge.label = label;
+                self.picture.edges.push(edge);
+            }
+        }
+        for child in &state.children {
+            if let Child::State(inner) = child {
+                self.transitions(inner, &format!("{fqn}.{}", inner.name));
+            }
+        }
+        if fqn == ROOT {
+            for edge in &mut self.picture.edges {
+                edge.label = fold(&edge.label);
+            }
+        }
+    }
+
+    /// The node that `text` names in the scope `fqn`: a name of the scope, a path from it (with a leading dot), or a
+    /// path from the root.
+    fn find(&self, fqn: &str, text: &str) -> Option<usize> {
+        if let Some(rest) = text.strip_prefix('.') {
+            return self.index.get(&format!("{fqn}.{rest}")).copied();
+        }
+        if !text.contains('.') {
+            return self.index.get(&format!("{fqn}.{text}")).copied();
+        }
+        let mut path = text;
+        while let Some(rest) = path.strip_prefix("root.") {
+            path = rest;
+        }
+        self.index.get(&format!("{ROOT}.{path}")).copied()
+    }
+}
+
+fn actions(what: &str, actions: &[(Action, crate::model::Origin)]) -> Option<String> {
+    if actions.is_empty() {
+        return None;
+    }
+    let names: Vec<String> = actions
+        .iter()
+        .map(|(action, _)| match action {
+            Action::Raise(event) => event.to_string(),
+            Action::Function(_) => "function".to_owned(),
+        })
+        .collect();
+    Some(format!("{what} / {}", names.join(", ")))
+}
+
+fn state_lines(state: &State) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    lines.extend(actions("entry", &state.entry));
+    if !state.config.is_empty() {
+        let names: Vec<&str> = state.config.iter().map(|(id, _)| id.as_str()).collect();
+        lines.push(format!("config {}", names.join(", ")));
+    }
+    if state.doo.is_some() {
+        lines.push("doo / function".to_owned());
+    }
+    lines.extend(actions("exit", &state.exit));
+    lines.iter().map(|l| short(l, 48)).collect()
+}
+
+/// Each event of a transition, the last with what the transition raises.
+fn transition_lines(transition: &Transition) -> Vec<String> {
+    let mut lines: Vec<String> = transition.events.iter().map(|(trigger, _)| trigger.to_string()).collect();
+    let mut tail = String::new();
+    if transition.guard.is_some() {
+        tail.push_str(" [guard]");
+    }
+    if let Some(effect) = actions("", &transition.effect) {
+        tail.push_str(&effect);
+    }
+    if !tail.is_empty() {
+        match lines.last_mut() {
+            Some(last) => last.push_str(&tail),
+            None => lines.push(tail.trim().to_owned()),
+        }
+    }
+    lines
+}
+
+/// Events as few lines, and how many more there are.
+fn fold(events: &[String]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for (i, event) in events.iter().enumerate() {
+        let last = i + 1 == events.len();
+        let text = format!("{}{}", short(event, LABEL_COLUMNS), if last { "" } else { "," });
+        let full = lines.len() == LABEL_LINES;
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + text.chars().count() <= LABEL_COLUMNS => {
+                line.push(' ');
+                line.push_str(&text);
+            }
+            _ if full => {
+                lines.push(format!("… {} more", events.len() - i));
+                break;
+            }
+            _ => lines.push(text),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::statechart::Trigger;
+    use crate::model::{EventName, Ident};
+
+    fn state(name: &str, children: Vec<State>, transitions: &[(&str, &str, &[&str])]) -> State {
+        let mut state = State::new(Ident::new(name).unwrap());
+        state.children = children.into_iter().map(Child::State).collect();
+        state.transitions = transitions
+            .iter()
+            .map(|(src, tgt, events)| {
+                Transition::new(src, tgt, events.iter().map(|e| Trigger::Event(EventName::new(e).unwrap())))
+            })
+            .collect();
+        state
+    }
+
+    fn leaf(name: &str) -> State {
+        state(name, vec![], &[])
+    }
+
+    #[test]
+    fn nested_states_transitions_and_what_is_active() {
+        let five = state(
+            "five_DOF_mode",
+            vec![leaf("free"), leaf("degraded")],
+            &[
+                ("initial", "free", &[]),
+                ("free", "degraded", &["e_qos_degraded"]),
+                ("degraded", "free", &["e_qos_restored"]),
+            ],
+        );
+        let mut copying = state(
+            "copying",
+            vec![leaf("eight_DOF_mode"), five],
+            &[
+                ("initial", "eight_DOF_mode", &[]),
+                ("eight_DOF_mode", "five_DOF_mode", &["e_5dof", "eight_DOF.failed"]),
+                ("eight_DOF_mode", ".five_DOF_mode.degraded", &["e_qos_degraded"]),
+                (".five_DOF_mode.free", "eight_DOF_mode", &["e_8dof"]),
+                ("eight_DOF_mode", "eight_DOF_mode", &["e_again"]),
+            ],
+        );
+        copying.entry.push((Action::Raise(EventName::new("enable_copying").unwrap()), Default::default()));
+        let sync = state(
+            "sync",
+            vec![leaf("harmonizing"), copying],
+            &[
+                ("initial", "harmonizing", &[]),
+                ("harmonizing", "copying", &["e_aligned"]),
+                (
+                    "copying",
+                    "harmonizing",
+                    &["enable_copying.failed", "e_misaligned", "e_peer_left", "e_torque_sat", "e_x"],
+                ),
+            ],
+        );
+        let root = state(
+            "root",
+            vec![leaf("unsync"), sync, leaf("fault")],
+            &[
+                ("initial", "unsync", &[]),
+                ("unsync", "sync", &["e_qos_ok"]),
+                ("sync", "unsync", &["e_link_lost"]),
+                ("sync.copying.five_DOF_mode", "unsync", &["e_out"]),
+                ("nowhere", "unsync", &["e"]),
+            ],
+        );
+        let chart = Statechart::new(root);
+        let picture = coordinator("demo", &chart, &["root.sync".to_owned(), "root.sync.copying".to_owned()]);
+        assert_eq!(picture.edges.len(), 15);
+        let svg = picture.svg();
+        if let Ok(path) = std::env::var("DRAW_COORDINATOR") {
+            std::fs::write(path, &svg).unwrap();
+        }
+        assert!(svg.contains("entry / enable_copying"));
+        assert_eq!(picture.nodes.iter().filter(|n| n.tone == Tone::Active).count(), 2);
+        assert!(picture.mermaid().contains("[*] -->"));
+        assert!(picture.dot().contains("cluster_"));
+    }
+}
