@@ -24,3 +24,16 @@ pub const SOCKET_WRITE: Duration = Duration::from_secs(5);
 
 /// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
 pub const LOG_ENTRIES: usize = 4096;
+/// Events that may wait inside a statechart for its next step. A pure chart never has more than one completion and one
+/// time event per active state; the rest is for functions that send events, and for sets given to `davit sim`.
+pub const CHART_QUEUE: usize = 1024;
+
+/// Turns a statechart may take to come to rest. More than any chart needs that comes to rest at all; rFSM would never
+/// return from one that does not.
+pub const CHART_RUN: u64 = 10_000;
+
+/// Levels of states in a statechart. People write five; the walk through a chart is recursive.
+pub const CHART_DEPTH: usize = 100;
+
+/// Connectors one after the other on a path. People write three; the search is recursive.
+pub const CONNECTOR_CHAIN: usize = 200;

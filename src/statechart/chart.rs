@@ -1,0 +1,408 @@
+//! The compiled chart: flat tables, indexed by small numbers.
+
+use crate::model::finding::Origin;
+use crate::model::names::{EventName, Ident};
+use crate::model::statechart::FunctionId;
+use rustc_hash::FxHashMap;
+use std::fmt;
+
+/// A state or connector of a chart. Ids are in the order of a walk through the chart as written; the root is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub(super) u32);
+
+impl NodeId {
+    /// The outermost state.
+    pub const ROOT: Self = Self(0);
+
+    /// Its number, from 0 to `Chart::len() - 1`.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A transition of a chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EdgeId(pub(super) u32);
+
+impl EdgeId {
+    /// Its number.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// An event as a chart knows it: dense for those that some transition lists, one common id for all others from outside,
+/// and one for each completion that no transition lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EventId(pub(super) u32);
+
+impl EventId {
+    /// Any event from outside that no transition lists. It still triggers transitions that take any event.
+    pub const OTHER: Self = Self(u32::MAX);
+    /// The event of the first entry, when no transition lists it.
+    pub(super) const INIT: Self = Self(u32::MAX - 1);
+    const DONE: u32 = 1 << 31;
+
+    /// The completion of `leaf`, when no transition lists it.
+    pub(super) fn done(leaf: u32) -> Self {
+        Self(Self::DONE | leaf)
+    }
+}
+
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A state without child nodes.
+    Leaf,
+    /// A state with child nodes.
+    Composite,
+    /// A connector.
+    Connector,
+}
+
+/// A piece `start..start + len` of another table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Span {
+    pub start: u32,
+    pub len: u32,
+}
+
+impl Span {
+    pub fn of<T>(self, table: &[T]) -> &[T] {
+        &table[self.start as usize..(self.start + self.len) as usize]
+    }
+
+    pub fn ids(self) -> std::ops::Range<u32> {
+        self.start..self.start + self.len
+    }
+}
+
+pub(super) const NONE: u32 = u32::MAX;
+
+/// What one step needs to know of a node.
+#[derive(Debug, Clone)]
+pub(super) struct NodeRow {
+    pub parent: u32,
+    pub depth: u32,
+    pub kind: Kind,
+    /// Its outgoing transitions in the order in which they are tried.
+    pub out: Span,
+    pub entry: Span,
+    pub exit: Span,
+    /// What its completion is called (leaves).
+    pub done: EventId,
+    /// Its time event, or [`NONE`].
+    pub timer: u32,
+    pub doo: Option<FunctionId>,
+}
+
+/// What one step needs to know of a transition.
+#[derive(Debug, Clone)]
+pub(super) struct EdgeRow {
+    pub src: u32,
+    pub tgt: u32,
+    /// The least common ancestor: it is neither left nor entered.
+    pub lca: u32,
+    /// Triggered by any event.
+    pub null: bool,
+    /// Events that trigger it, sorted by id.
+    pub events: Span,
+    pub predicates: Span,
+    pub guard: Option<FunctionId>,
+    pub effect: Span,
+}
+
+/// One thing done by an entry, exit or effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Op {
+    Raise(EventName),
+    Call(FunctionId),
+}
+
+/// A time event of a state.
+#[derive(Debug, Clone)]
+pub(super) struct Timer {
+    /// From the entry of the state, not from the clock's start.
+    pub relative: bool,
+    /// Fires when more nanoseconds than this have passed.
+    pub nanos: i64,
+    pub event: EventId,
+}
+
+/// When a name is raised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum When {
+    /// On entry of the state: by `entry`, or to push a state-scoped configuration.
+    Entry(NodeId),
+    /// On exit of the state: by `exit`, or to undo a state-scoped configuration.
+    Exit(NodeId),
+    /// By the transition's effect.
+    Effect(EdgeId),
+}
+
+/// A place in the chart that raises a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RaiseSite {
+    /// The name.
+    pub name: EventName,
+    /// When it is raised.
+    pub when: When,
+    /// It comes from a state-scoped configuration.
+    pub scoped: bool,
+    /// Where it was written.
+    pub origin: Origin,
+}
+
+/// A compiled statechart.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    pub(super) nodes: Vec<NodeRow>,
+    pub(super) edges: Vec<EdgeRow>,
+    pub(super) ops: Vec<Op>,
+    /// Event lists of all transitions, one after the other.
+    pub(super) triggers: Vec<EventId>,
+    pub(super) predicates: Vec<FunctionId>,
+    pub(super) timers: Vec<Timer>,
+    pub(super) events: Vec<EventName>,
+    pub(super) event_ids: FxHashMap<EventName, EventId>,
+    pub(super) names: Vec<Ident>,
+    pub(super) node_origins: Vec<Origin>,
+    pub(super) edge_origins: Vec<Origin>,
+    /// Priority numbers of all transitions: already in the order of the outgoing lists, kept for findings.
+    pub(super) priorities: Vec<f64>,
+    pub(super) raises: Vec<RaiseSite>,
+    pub(super) children: FxHashMap<(u32, Ident), u32>,
+    /// The connector at which the chart is entered.
+    pub(super) initial: u32,
+    /// Depth of the deepest node.
+    pub(super) depth: u32,
+    /// Transitions that leave connectors: bounds the tree of paths that one search can find.
+    pub(super) connector_edges: u32,
+    /// Neither guards nor predicates: whether a path exists then depends on the events alone.
+    pub(super) unguarded: bool,
+    /// No functions at all.
+    pub(super) pure: bool,
+    /// The event of the first entry.
+    pub(super) init: EventId,
+}
+
+/// Why a text names no state.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FindError {
+    /// No state's path ends so.
+    #[error("the coordinator has no state `{name}`{}", near.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The state that may have been meant.
+        near: Option<String>,
+    },
+    /// More than one state's path ends so.
+    #[error("`{name}` is the name of {} states: {}", candidates.len(), candidates.join(", "))]
+    Ambiguous {
+        /// What was asked for.
+        name: String,
+        /// The full names of all that fit.
+        candidates: Vec<String>,
+    },
+}
+
+impl Chart {
+    /// How many states and connectors it has.
+    #[allow(clippy::len_without_is_empty)] // a chart has at least a root and its initial connector
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether it has no functions.
+    pub fn is_pure(&self) -> bool {
+        self.pure
+    }
+
+    /// All states and connectors, in order.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = NodeId> + use<> {
+        (0..u32::try_from(self.nodes.len()).unwrap_or(NONE)).map(NodeId)
+    }
+
+    /// What a node is.
+    pub fn kind(&self, node: NodeId) -> Kind {
+        self.nodes[node.index()].kind
+    }
+
+    /// Whether a node is a state (else it is a connector).
+    pub fn is_state(&self, node: NodeId) -> bool {
+        self.kind(node) != Kind::Connector
+    }
+
+    /// The state around a node; none for the root.
+    pub fn parent(&self, node: NodeId) -> Option<NodeId> {
+        (node != NodeId::ROOT).then(|| NodeId(self.nodes[node.index()].parent))
+    }
+
+    /// How many states are around a node.
+    pub fn depth(&self, node: NodeId) -> usize {
+        self.nodes[node.index()].depth as usize
+    }
+
+    /// Whether `node` is `of`, or inside it.
+    pub fn is_inside(&self, node: NodeId, of: NodeId) -> bool {
+        let mut node = node.0;
+        while self.nodes[node as usize].depth > self.nodes[of.index()].depth {
+            node = self.nodes[node as usize].parent;
+        }
+        node == of.0
+    }
+
+    /// A node's own name.
+    pub fn name(&self, node: NodeId) -> Ident {
+        self.names[node.index()]
+    }
+
+    /// A node's full name: `root.sync.copying`.
+    pub fn fqn(&self, node: NodeId) -> Fqn<'_> {
+        Fqn { chart: self, node }
+    }
+
+    /// Where a node was written.
+    pub fn origin(&self, node: NodeId) -> Origin {
+        self.node_origins[node.index()]
+    }
+
+    /// The connector at which the chart is entered.
+    pub fn initial(&self) -> NodeId {
+        NodeId(self.initial)
+    }
+
+    /// A node's outgoing transitions, in the order in which they are tried.
+    pub fn outgoing(&self, node: NodeId) -> impl ExactSizeIterator<Item = EdgeId> + use<> {
+        self.nodes[node.index()].out.ids().map(EdgeId)
+    }
+
+    /// The number of transitions.
+    pub fn edge_count(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Where a transition starts and where it ends. The target of one that names a composite state is that state's
+    /// initial connector.
+    pub fn ends(&self, edge: EdgeId) -> (NodeId, NodeId) {
+        let row = &self.edges[edge.index()];
+        (NodeId(row.src), NodeId(row.tgt))
+    }
+
+    /// The state that a transition neither leaves nor enters.
+    pub fn least_common_ancestor(&self, edge: EdgeId) -> NodeId {
+        NodeId(self.edges[edge.index()].lca)
+    }
+
+    /// The events a transition lists; none: any event triggers it.
+    pub fn triggers(&self, edge: EdgeId) -> Option<&[EventId]> {
+        let row = &self.edges[edge.index()];
+        (!row.null).then(|| row.events.of(&self.triggers))
+    }
+
+    /// Whether a function of the model decides over a transition (a guard or a predicate).
+    pub fn is_guarded(&self, edge: EdgeId) -> bool {
+        let row = &self.edges[edge.index()];
+        row.guard.is_some() || row.predicates.len > 0
+    }
+
+    /// Where a transition was written.
+    pub fn edge_origin(&self, edge: EdgeId) -> Origin {
+        self.edge_origins[edge.index()]
+    }
+
+    /// The id of an event from outside.
+    pub fn event(&self, name: EventName) -> EventId {
+        self.event_ids.get(&name).copied().unwrap_or(EventId::OTHER)
+    }
+
+    /// All events that some transition lists, completions and time events among them (`e_done@root.a`).
+    pub fn events(&self) -> &[EventName] {
+        &self.events
+    }
+
+    /// The completion event of a leaf.
+    pub fn completion(&self, leaf: NodeId) -> EventId {
+        self.nodes[leaf.index()].done
+    }
+
+    /// The time event of a state, where it has one.
+    pub fn time_event(&self, state: NodeId) -> Option<EventId> {
+        self.timers.get(self.nodes[state.index()].timer as usize).map(|timer| timer.event)
+    }
+
+    /// The text of an event (`other` for those that the chart does not know).
+    pub fn event_text(&self, event: EventId) -> String {
+        match event {
+            EventId::OTHER => "other".to_owned(),
+            EventId::INIT => "e_init_fsm".to_owned(),
+            EventId(id) if id & EventId::DONE != 0 => format!("e_done@{}", self.fqn(NodeId(id & !EventId::DONE))),
+            EventId(id) => self.events[id as usize].to_string(),
+        }
+    }
+
+    /// Every place that raises a name.
+    pub fn raises(&self) -> &[RaiseSite] {
+        &self.raises
+    }
+
+    /// The state that `text` names: by its own name (`operational`), its full name (`root.operational`), or any end of it
+    /// (`sync.copying`).
+    ///
+    /// # Errors
+    /// [`FindError`] when no state or more than one is named so. A full name is never ambiguous.
+    pub fn find(&self, text: &str) -> Result<NodeId, FindError> {
+        let parts: Vec<&str> = text.split('.').collect();
+        let mut found = Vec::new();
+        for node in self.nodes().filter(|node| self.is_state(*node)) {
+            if self.ends_with(node, &parts) {
+                if self.depth(node) + 1 == parts.len() {
+                    return Ok(node);
+                }
+                found.push(node);
+            }
+        }
+        match found[..] {
+            [node] => Ok(node),
+            [] => {
+                let last = parts.last().copied().unwrap_or_default();
+                let names: Vec<String> =
+                    self.nodes().filter(|n| self.is_state(*n)).map(|n| self.name(n).to_string()).collect();
+                let near = crate::model::finding::nearest(last, names.iter().map(String::as_str)).map(str::to_owned);
+                Err(FindError::Unknown { name: text.to_owned(), near })
+            }
+            _ => Err(FindError::Ambiguous {
+                name: text.to_owned(),
+                candidates: found.iter().map(|n| self.fqn(*n).to_string()).collect(),
+            }),
+        }
+    }
+
+    fn ends_with(&self, node: NodeId, parts: &[&str]) -> bool {
+        let mut at = Some(node);
+        for part in parts.iter().rev() {
+            match at {
+                Some(n) if self.name(n).as_str() == *part => at = self.parent(n),
+                _ => return false,
+            }
+        }
+        true
+    }
+}
+
+/// Writes a node's full name.
+#[derive(Clone, Copy)]
+pub struct Fqn<'a> {
+    chart: &'a Chart,
+    node: NodeId,
+}
+
+impl fmt::Display for Fqn<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(parent) = self.chart.parent(self.node) {
+            write!(f, "{}.", self.chart.fqn(parent))?;
+        }
+        f.write_str(self.chart.name(self.node).as_str())
+    }
+}

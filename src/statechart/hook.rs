@@ -1,0 +1,152 @@
+//! What a machine calls: functions of a model that has some, and whoever wants to see what happens.
+
+use super::chart::{Chart, NodeId};
+use super::machine::Queue;
+use super::{EdgeId, EventId};
+use crate::model::names::EventName;
+use crate::model::statechart::FunctionId;
+
+/// A name raised by an entry, an exit or an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Raised {
+    /// The name.
+    pub name: EventName,
+    /// Who is to hear the answer: the state, if raised on its entry; the least common ancestor of the transition (the
+    /// outermost one of a compound transition) if raised on an exit or by an effect.
+    pub owner: NodeId,
+    /// The owner's how-manieth visit this is, from 1. Once the owner has been left, the visit is over for good.
+    pub visit: u32,
+}
+
+/// Where a function of a model is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// On the entry of a state.
+    Entry(NodeId),
+    /// On the exit of a state, which is already inactive then.
+    Exit(NodeId),
+    /// Between the exits and the entries of a transition.
+    Effect(EdgeId),
+}
+
+/// What a function may see and do.
+pub struct View<'a> {
+    /// The chart.
+    pub chart: &'a Chart,
+    /// The active states, from the root inwards.
+    pub active: &'a [NodeId],
+    /// The active leaf; while a transition is under way as rFSM tells it: on exit still the old one, on entry none.
+    pub leaf: Option<NodeId>,
+    /// The events of this step.
+    pub events: &'a [EventId],
+    /// Takes events that the function sends to the chart itself; they are seen in the next step.
+    pub queue: &'a mut Queue,
+}
+
+/// How one resumption of a leaf's activity ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Doo {
+    /// It yielded, and is content to wait (`idle`) or wants to be called again at once.
+    Yielded {
+        /// Nothing to do for now.
+        idle: bool,
+    },
+    /// It is through: the leaf completes.
+    Finished,
+    /// It raised an error (reported by the hook): no completion event.
+    Failed,
+}
+
+/// What a machine calls. Every method has a default that does nothing: a pure chart needs none.
+///
+/// Functions report their own errors; an error never aborts a transition.
+pub trait Hook {
+    /// A state is active now; its entry actions follow.
+    fn entered(&mut self, chart: &Chart, state: NodeId) {
+        let _ = (chart, state);
+    }
+
+    /// A state is not active any more; its exit actions follow.
+    fn exited(&mut self, chart: &Chart, state: NodeId) {
+        let _ = (chart, state);
+    }
+
+    /// A transition was chosen; its exits, effect and entries follow. A compound transition says so for each segment.
+    fn taking(&mut self, chart: &Chart, edge: EdgeId) {
+        let _ = (chart, edge);
+    }
+
+    /// A name was raised.
+    fn raised(&mut self, chart: &Chart, raised: Raised) {
+        let _ = (chart, raised);
+    }
+
+    /// At `connector` more than one way led on; `ways` lists their first segments, and the first of them is taken.
+    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
+        let _ = (chart, connector, ways);
+    }
+
+    /// The chart could not be entered: no path from its initial connector.
+    fn not_entered(&mut self, chart: &Chart) {
+        let _ = chart;
+    }
+
+    /// Adds the events that wait outside (rFSM's `getevents`).
+    fn poll(&mut self, queue: &mut Queue) {
+        let _ = queue;
+    }
+
+    /// Before a step, with its events; more may be added.
+    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
+        let _ = (view, added);
+    }
+
+    /// After a step.
+    fn after_step(&mut self, view: &mut View<'_>) {
+        let _ = view;
+    }
+
+    /// Whether a guard lets the transition pass. What a script answers with nothing at all counts as yes.
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+        let _ = (function, edge, view);
+        false
+    }
+
+    /// Whether a predicate accepts an event.
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+        let _ = (function, event, view);
+        false
+    }
+
+    /// Runs an entry, exit or effect function.
+    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+        let _ = (function, place, view);
+    }
+
+    /// The activity of `state` starts from its beginning when next resumed.
+    fn doo_reset(&mut self, state: NodeId) {
+        let _ = state;
+    }
+
+    /// Resumes the activity of `state`.
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+        let _ = (function, state, view);
+        Doo::Failed
+    }
+
+    /// Called when a run is idle; yes: go on stepping (rFSM's `idle_hook`).
+    fn go_on(&mut self) -> bool {
+        false
+    }
+
+    /// A chain of connectors went round in a circle, held by no guard; no path was found there.
+    fn runaway(&mut self, chart: &Chart, connector: NodeId) {
+        let _ = (chart, connector);
+    }
+}
+
+/// The hook of a pure chart that nobody watches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Nobody;
+
+impl Hook for Nobody {}

@@ -1,0 +1,485 @@
+//! One run of a chart: rFSM's `step` and `run` (`rfsm.md` §5, §6, §7, §9).
+
+use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
+use super::hook::{Doo, Hook, Place, Raised, View};
+use super::search::{Around, Search};
+use super::EdgeId;
+use crate::limits;
+use crate::time::Time;
+
+/// Events on their way to the next step, bounded.
+#[derive(Debug, Clone)]
+pub struct Queue {
+    events: Vec<EventId>,
+    dropped: u64,
+}
+
+impl Queue {
+    fn new() -> Self {
+        Self { events: Vec::with_capacity(limits::CHART_QUEUE), dropped: 0 }
+    }
+
+    /// Appends an event; `false`: the queue is full, and the event is dropped and counted.
+    pub fn push(&mut self, event: EventId) -> bool {
+        let room = self.events.len() < limits::CHART_QUEUE;
+        if room {
+            self.events.push(event);
+        } else {
+            self.dropped += 1;
+        }
+        room
+    }
+
+    /// The events, oldest first.
+    pub fn events(&self) -> &[EventId] {
+        &self.events
+    }
+
+    /// How many events found no room so far.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// The mode of the active leaf.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Its activity goes on.
+    Active,
+    /// It has none, or it is through.
+    Done,
+}
+
+/// What one turn of the step loop did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Step {
+    /// The chart was entered.
+    Entered,
+    /// The chart could not be entered; the events are lost.
+    NotEntered,
+    /// A transition was taken.
+    Taken,
+    /// There were events, and no transition for them.
+    Unmatched,
+    /// There were no events; the leaf's activity was resumed, if it has one.
+    Quiet {
+        /// Nothing left to do.
+        idle: bool,
+    },
+}
+
+/// What [`Machine::step`] and [`Machine::run`] did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Stepped {
+    /// What rFSM's `step` returns: nothing is left to do. `false`: the number of steps was used up, or entering failed.
+    pub idle: bool,
+    /// At least one transition was taken, the first entry counted.
+    pub transition: bool,
+    /// Why it ended.
+    pub ended: Ended,
+}
+
+/// Why stepping ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Ended {
+    /// Nothing left to do.
+    Idle,
+    /// As many steps as asked for.
+    Steps,
+    /// The chart could not be entered.
+    NotEntered,
+    /// It did not come to rest within [`limits::CHART_RUN`] turns (rFSM would never return).
+    Endless,
+}
+
+/// The state of one run of a chart. All of its methods must be given the chart it was made for.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// Active states from the root inwards; also while a transition is under way.
+    path: Vec<NodeId>,
+    /// rFSM's active leaf: on exit still the old one, on entry none.
+    leaf: Option<NodeId>,
+    mode: Mode,
+    queue: Queue,
+    events: Vec<EventId>,
+    added: Vec<EventId>,
+    /// By node: how often it was entered.
+    visits: Vec<u32>,
+    /// By time event: when its state was entered, and whether it was raised since.
+    timers: Vec<(Time, bool)>,
+    search: Search,
+    chain: Vec<NodeId>,
+}
+
+impl Machine {
+    /// A run that has not begun: the first step enters the chart.
+    pub fn new(chart: &Chart) -> Self {
+        let depth = chart.depth as usize + 1;
+        let mut machine = Self {
+            path: Vec::with_capacity(depth),
+            leaf: None,
+            mode: Mode::Done,
+            queue: Queue::new(),
+            events: Vec::with_capacity(limits::CHART_QUEUE),
+            added: Vec::new(),
+            visits: vec![0; chart.nodes.len()],
+            timers: vec![(Time::default(), false); chart.timers.len()],
+            search: Search::new(chart),
+            chain: Vec::with_capacity(depth),
+        };
+        machine.queue.push(chart.init);
+        machine
+    }
+
+    /// Begins anew: no exit action runs, and the next step enters the chart.
+    pub fn reset(&mut self, chart: &Chart) {
+        self.path.clear();
+        self.leaf = None;
+        self.queue.events.clear();
+        self.queue.push(chart.init);
+    }
+
+    /// Queues an event; `false`: the queue is full, and the event is dropped and counted.
+    pub fn send(&mut self, event: EventId) -> bool {
+        self.queue.push(event)
+    }
+
+    /// The events left for the next step.
+    pub fn queue(&self) -> &Queue {
+        &self.queue
+    }
+
+    /// The active states, from the root to the leaf; empty before the chart was entered.
+    pub fn active(&self) -> &[NodeId] {
+        &self.path
+    }
+
+    /// The active leaf; none before the chart was entered.
+    pub fn leaf(&self) -> Option<NodeId> {
+        self.leaf
+    }
+
+    /// The mode of the active leaf; none before the chart was entered.
+    pub fn mode(&self) -> Option<Mode> {
+        self.leaf.map(|_| self.mode)
+    }
+
+    /// Whether a state is active.
+    pub fn is_active(&self, chart: &Chart, state: NodeId) -> bool {
+        self.path.get(chart.depth(state)) == Some(&state)
+    }
+
+    /// How often a state was entered. While the state is active, this is the number of the present visit.
+    pub fn visit(&self, state: NodeId) -> u32 {
+        self.visits[state.index()]
+    }
+
+    /// Whether the visit of `owner` in which a name was raised is still going on.
+    pub fn is_present(&self, chart: &Chart, owner: NodeId, visit: u32) -> bool {
+        self.is_active(chart, owner) && self.visit(owner) == visit
+    }
+
+    /// How many transitions all searches have looked at so far: what stepping costs, counted.
+    pub fn work(&self) -> u64 {
+        self.search.work()
+    }
+
+    /// Puts the machine into `leaf` as if it had been entered at `now` and had completed: nothing is raised, nothing is
+    /// left in the queue. For walking through a chart's reactions without running it.
+    ///
+    /// # Panics
+    /// If `leaf` is no leaf.
+    pub fn place(&mut self, chart: &Chart, leaf: NodeId, now: Time) {
+        assert_eq!(chart.kind(leaf), Kind::Leaf, "only a leaf can be the innermost active state");
+        self.path.clear();
+        self.queue.events.clear();
+        let mut at = Some(leaf);
+        while let Some(node) = at {
+            self.path.push(node);
+            self.visits[node.index()] += 1;
+            self.restart_timer(chart, node, now);
+            at = chart.parent(node);
+        }
+        self.path.reverse();
+        self.leaf = Some(leaf);
+        self.mode = if chart.nodes[leaf.index()].doo.is_some() { Mode::Active } else { Mode::Done };
+    }
+
+    /// The first moment at which a time event of an active state is due; none if no time event is to come.
+    pub fn next_deadline(&self, chart: &Chart) -> Option<Time> {
+        if chart.timers.is_empty() {
+            return None;
+        }
+        let due = |node: &NodeId| {
+            let index = chart.nodes[node.index()].timer;
+            let timer = chart.timers.get(index as usize)?;
+            let (entered, raised) = self.timers[index as usize];
+            (!raised).then(|| first_after(if timer.relative { entered } else { Time::default() }, timer.nanos))
+        };
+        self.path.iter().filter_map(due).min()
+    }
+
+    /// What rFSM's `step(fsm, steps)` does: turns until `steps` of them counted, or nothing is left to do. A turn whose
+    /// events match no transition does not count.
+    pub fn step(&mut self, chart: &Chart, now: Time, steps: u64, hook: &mut impl Hook) -> Stepped {
+        let mut left = steps;
+        let mut transition = false;
+        for _ in 0..limits::CHART_RUN.saturating_add(steps) {
+            let turn = self.turn(chart, now, hook);
+            let mut idle = false;
+            match turn {
+                Step::NotEntered => return Stepped { idle: false, transition, ended: Ended::NotEntered },
+                Step::Entered | Step::Taken => {
+                    transition = true;
+                    left = left.saturating_sub(1);
+                }
+                Step::Unmatched => (),
+                Step::Quiet { idle: quiet } => {
+                    idle = quiet;
+                    left = left.saturating_sub(1);
+                }
+            }
+            if left < 1 {
+                return Stepped { idle, transition, ended: if idle { Ended::Idle } else { Ended::Steps } };
+            }
+            if idle && !hook.go_on() {
+                return Stepped { idle, transition, ended: Ended::Idle };
+            }
+        }
+        Stepped { idle: false, transition, ended: Ended::Endless }
+    }
+
+    /// What rFSM's `run(fsm)` does: turns until nothing is left to do, but no more than [`limits::CHART_RUN`].
+    pub fn run(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Stepped {
+        let mut transition = false;
+        for _ in 0..limits::CHART_RUN {
+            match self.turn(chart, now, hook) {
+                Step::NotEntered => return Stepped { idle: false, transition, ended: Ended::NotEntered },
+                Step::Entered | Step::Taken => transition = true,
+                Step::Quiet { idle: true } if !hook.go_on() => {
+                    return Stepped { idle: true, transition, ended: Ended::Idle };
+                }
+                Step::Unmatched | Step::Quiet { .. } => (),
+            }
+        }
+        Stepped { idle: false, transition, ended: Ended::Endless }
+    }
+
+    /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
+    pub fn turn(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+        hook.poll(&mut self.queue);
+        self.events.clear();
+        std::mem::swap(&mut self.queue.events, &mut self.events);
+        let mut added = std::mem::take(&mut self.added);
+        hook.before_step(&mut self.view(chart), &mut added);
+        self.events.append(&mut added);
+        self.added = added;
+
+        let step = if self.path.is_empty() {
+            self.enter_chart(chart, now, hook)
+        } else if self.events.is_empty() {
+            self.quiet(chart, hook)
+        } else {
+            self.transit(chart, now, hook)
+        };
+        if step != Step::NotEntered {
+            self.check_timers(chart, now);
+            hook.after_step(&mut self.view(chart));
+        }
+        step
+    }
+
+    fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
+        View { chart, active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
+    }
+
+    fn find(&mut self, chart: &Chart, node: u32, hook: &mut impl Hook) -> u32 {
+        let mut around =
+            Around { active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue };
+        self.search.from(chart, node, &mut around, hook)
+    }
+
+    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+        self.search.begin();
+        let way = self.find(chart, chart.initial, hook);
+        if way == NONE {
+            hook.not_entered(chart);
+            return Step::NotEntered;
+        }
+        self.enter(chart, NodeId::ROOT, now, hook);
+        self.execute(chart, way, now, hook);
+        Step::Entered
+    }
+
+    /// The outermost active state with a complete path wins, whatever the priorities further in.
+    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+        self.search.begin();
+        for i in 0..self.path.len() {
+            let node = self.path[i];
+            if chart.nodes[node.index()].out.len == 0 {
+                continue;
+            }
+            let way = self.find(chart, node.0, hook);
+            if way != NONE {
+                self.execute(chart, way, now, hook);
+                return Step::Taken;
+            }
+        }
+        Step::Unmatched
+    }
+
+    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> Step {
+        let mut idle = true;
+        if let Some(leaf) = self.leaf
+            && self.mode == Mode::Active
+            && let Some(function) = chart.nodes[leaf.index()].doo
+        {
+            match hook.doo(function, leaf, &mut self.view(chart)) {
+                Doo::Yielded { idle: content } => idle = content,
+                Doo::Finished => {
+                    self.mode = Mode::Done;
+                    self.queue.push(chart.nodes[leaf.index()].done);
+                }
+                Doo::Failed => self.mode = Mode::Done,
+            }
+        }
+        if idle {
+            hook.poll(&mut self.queue);
+            idle = self.queue.events.is_empty();
+        }
+        Step::Quiet { idle }
+    }
+
+    /// Takes the path that begins with `way`, segment by segment, to a leaf.
+    fn execute(&mut self, chart: &Chart, mut way: u32, now: Time, hook: &mut impl Hook) {
+        let owner = self.owner_of(chart, way);
+        loop {
+            let taken = self.search.ways[way as usize];
+            let edge = &chart.edges[taken.edge as usize];
+            hook.taking(chart, EdgeId(taken.edge));
+            let keep = chart.nodes[edge.lca as usize].depth as usize + 1;
+            while self.path.len() > keep {
+                self.exit(chart, owner, hook);
+            }
+            self.act(chart, edge.effect, Place::Effect(EdgeId(taken.edge)), owner, hook);
+            let target = &chart.nodes[edge.tgt as usize];
+            let ends_at_connector = target.kind == Kind::Connector;
+            self.enter_down_to(chart, if ends_at_connector { target.parent } else { edge.tgt }, now, hook);
+            if !ends_at_connector {
+                return;
+            }
+            way = taken.then;
+            if self.search.ways[way as usize].other != NONE {
+                let ways = &self.search.ways;
+                let mut at = way;
+                let mut all = std::iter::from_fn(|| {
+                    let way = ways.get(at as usize)?;
+                    at = way.other;
+                    Some(EdgeId(way.edge))
+                });
+                hook.conflict(chart, NodeId(edge.tgt), &mut all);
+            }
+        }
+    }
+
+    /// Who owns what the exits and effects of the path raise: the outermost of its least common ancestors, which stays
+    /// active throughout.
+    fn owner_of(&self, chart: &Chart, mut way: u32) -> NodeId {
+        let mut owner = NONE;
+        while way != NONE {
+            let taken = self.search.ways[way as usize];
+            let lca = chart.edges[taken.edge as usize].lca;
+            if owner == NONE || chart.nodes[lca as usize].depth < chart.nodes[owner as usize].depth {
+                owner = lca;
+            }
+            way = taken.then;
+        }
+        NodeId(owner)
+    }
+
+    /// Leaves the innermost active state. When its exit actions run it is inactive already.
+    fn exit(&mut self, chart: &Chart, owner: NodeId, hook: &mut impl Hook) {
+        let Some(state) = self.path.pop() else { return };
+        hook.exited(chart, state);
+        let row = &chart.nodes[state.index()];
+        self.act(chart, row.exit, Place::Exit(state), owner, hook);
+        if row.kind == Kind::Leaf {
+            self.leaf = None;
+        }
+    }
+
+    /// Enters all states from below the innermost active one down to `state`.
+    fn enter_down_to(&mut self, chart: &Chart, state: u32, now: Time, hook: &mut impl Hook) {
+        let mut chain = std::mem::take(&mut self.chain);
+        let mut at = state;
+        while chart.nodes[at as usize].depth as usize >= self.path.len() {
+            chain.push(NodeId(at));
+            at = chart.nodes[at as usize].parent;
+        }
+        while let Some(next) = chain.pop() {
+            self.enter(chart, next, now, hook);
+        }
+        self.chain = chain;
+    }
+
+    fn enter(&mut self, chart: &Chart, state: NodeId, now: Time, hook: &mut impl Hook) {
+        self.path.push(state);
+        self.visits[state.index()] = self.visits[state.index()].wrapping_add(1);
+        self.restart_timer(chart, state, now);
+        hook.entered(chart, state);
+        let row = &chart.nodes[state.index()];
+        self.act(chart, row.entry, Place::Entry(state), state, hook);
+        if row.kind == Kind::Leaf {
+            self.leaf = Some(state);
+            if row.doo.is_some() {
+                self.mode = Mode::Active;
+                hook.doo_reset(state);
+            } else {
+                self.mode = Mode::Done;
+                self.queue.push(row.done);
+            }
+        }
+    }
+
+    fn act(&mut self, chart: &Chart, ops: Span, place: Place, owner: NodeId, hook: &mut impl Hook) {
+        for op in ops.of(&chart.ops) {
+            match *op {
+                Op::Raise(name) => {
+                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()] });
+                }
+                Op::Call(function) => hook.action(function, place, &mut self.view(chart)),
+            }
+        }
+    }
+
+    fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time) {
+        if let Some(timer) = self.timers.get_mut(chart.nodes[state.index()].timer as usize) {
+            *timer = (now, false);
+        }
+    }
+
+    /// After a turn: time events of the active states that are due, from the leaf outwards, each once a visit. What is
+    /// raised here is seen in the next turn, even if this one was idle.
+    fn check_timers(&mut self, chart: &Chart, now: Time) {
+        if chart.timers.is_empty() {
+            return;
+        }
+        for node in self.path.iter().rev() {
+            let index = chart.nodes[node.index()].timer;
+            let Some(timer) = chart.timers.get(index as usize) else { continue };
+            let (entered, raised) = &mut self.timers[index as usize];
+            let since = if timer.relative { *entered } else { Time::default() };
+            if !*raised && now >= first_after(since, timer.nanos) {
+                *raised = true;
+                self.queue.push(timer.event);
+            }
+        }
+    }
+}
+
+/// The first moment that is *more* than so many nanoseconds after `since`.
+fn first_after(since: Time, nanos: i64) -> Time {
+    let first = i128::from(since.as_nanos()) + i128::from(nanos) + 1;
+    Time(u64::try_from(first.max(0)).unwrap_or(u64::MAX))
+}

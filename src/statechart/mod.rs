@@ -1,0 +1,25 @@
+//! Statecharts, compiled: flat tables and a step function with the semantics of rFSM (design §7).
+//!
+//! [`compile`] turns a chart as written into a [`Chart`] (every reference resolved, every outgoing list in its final
+//! order) and says all that is wrong with it. A [`Machine`] is one run of a chart: [`Machine::step`] is what rFSM's
+//! `step` does. Functions of a model, and whoever wants to see what happens, are reached through a [`Hook`].
+//!
+//! What is absent: threads, a clock (the time is an argument), configurations (a state-scoped configuration is here only
+//! two names, raised on entry and on exit), and Lua. A step of a pure chart allocates nothing, and what it costs grows
+//! with the depth and the outgoing transitions of the active states, not with the size of the chart.
+
+mod chart;
+mod checks;
+mod compile;
+mod hook;
+mod machine;
+mod order;
+mod resolve;
+mod search;
+mod sim;
+
+pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
+pub use compile::compile;
+pub use hook::{Doo, Hook, Nobody, Place, Raised, View};
+pub use machine::{Ended, Machine, Mode, Queue, Step, Stepped};
+pub use sim::{Observation, Sim, SimError};

@@ -1,0 +1,150 @@
+//! The search for a path: from a node along enabled transitions, through connectors, to a leaf.
+//!
+//! Nothing is executed during the search; all segments of a path see the same events (connectors are junctions). A
+//! connector without an enabled way on is a dead end, and the search goes back to the next transition of the source.
+//! The result is the tree of all complete paths, kept in an arena: the first one is taken, the others matter where a
+//! connector has more than one (a conflict).
+//!
+//! Without guards, whether a connector leads on depends on the events alone; so each connector is searched once a step,
+//! and a net of connectors costs its number of transitions, not its number of paths. With guards every visit counts,
+//! because guards may do things.
+
+use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
+use super::hook::{Hook, View};
+use super::machine::Queue;
+use super::EdgeId;
+use crate::limits;
+
+/// One way on from a node: a transition and, if it ends at a connector, the ways on from there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    pub edge: u32,
+    /// First way on from the connector it ends at; [`NONE`] at a leaf.
+    pub then: u32,
+    /// The next way of the same node.
+    pub other: u32,
+}
+
+/// What a search works with, kept from step to step so that none allocates.
+#[derive(Debug, Clone)]
+pub(super) struct Search {
+    pub ways: Vec<Way>,
+    /// By node: the step in which it was last searched, and what was found.
+    memo: Vec<(u32, u32)>,
+    step: u32,
+    work: u64,
+}
+
+/// What the functions called by a search may see.
+pub(super) struct Around<'a> {
+    pub active: &'a [NodeId],
+    pub leaf: Option<NodeId>,
+    pub events: &'a [EventId],
+    pub queue: &'a mut Queue,
+}
+
+impl Around<'_> {
+    fn view<'v>(&'v mut self, chart: &'v Chart) -> View<'v> {
+        View { chart, active: self.active, leaf: self.leaf, events: self.events, queue: self.queue }
+    }
+}
+
+impl Search {
+    pub fn new(chart: &Chart) -> Self {
+        let memo = if chart.unguarded { vec![(0, NONE); chart.nodes.len()] } else { Vec::new() };
+        // One more for the segment that leaves a state: without guards its search stops at the first way.
+        Self { ways: Vec::with_capacity(chart.connector_edges as usize + 1), memo, step: 0, work: 0 }
+    }
+
+    /// Transitions looked at so far.
+    pub fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// A new step: other events.
+    pub fn begin(&mut self) {
+        self.ways.clear();
+        self.step = self.step.wrapping_add(1);
+        if self.step == 0 {
+            self.memo.fill((0, NONE));
+            self.step = 1;
+        }
+    }
+
+    /// The first way of all that lead from `node` to a leaf, or [`NONE`].
+    pub fn from(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook) -> u32 {
+        self.find(chart, node, around, hook, 0)
+    }
+
+    fn find(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook, chain: usize) -> u32 {
+        let row = &chart.nodes[node as usize];
+        let is_connector = row.kind == Kind::Connector;
+        if is_connector && chart.unguarded {
+            let (step, found) = self.memo[node as usize];
+            if step == self.step {
+                return found;
+            }
+        }
+        if chain > limits::CONNECTOR_CHAIN {
+            hook.runaway(chart, NodeId(node));
+            return NONE;
+        }
+        let (mut first, mut last) = (NONE, NONE);
+        for edge in row.out.ids() {
+            self.work += 1;
+            let edge_row = &chart.edges[edge as usize];
+            if !enabled(chart, edge, edge_row, around, hook) {
+                continue;
+            }
+            let then = match chart.nodes[edge_row.tgt as usize].kind {
+                Kind::Leaf => NONE,
+                Kind::Connector => match self.find(chart, edge_row.tgt, around, hook, chain + 1) {
+                    NONE => continue,
+                    then => then,
+                },
+                Kind::Composite => continue,
+            };
+            let way = u32::try_from(self.ways.len()).expect("fewer ways than ids");
+            self.ways.push(Way { edge, then, other: NONE });
+            if first == NONE {
+                first = way;
+            } else {
+                self.ways[last as usize].other = way;
+            }
+            last = way;
+            // At a state only the first way matters. Looking at the others has no effect unless guards run.
+            if chart.unguarded && !is_connector {
+                break;
+            }
+        }
+        if is_connector && chart.unguarded {
+            self.memo[node as usize] = (self.step, first);
+        }
+        first
+    }
+}
+
+/// Whether `edge` may be taken: its guard first, then its events.
+fn enabled(chart: &Chart, edge: u32, row: &EdgeRow, around: &mut Around<'_>, hook: &mut impl Hook) -> bool {
+    if let Some(guard) = row.guard
+        && !hook.guard(guard, EdgeId(edge), &mut around.view(chart))
+    {
+        return false;
+    }
+    if row.null {
+        return true;
+    }
+    let listed = row.events.of(&chart.triggers);
+    let events = around.events;
+    events.iter().any(|event| {
+        lists(listed, *event)
+            || row.predicates.len > 0
+                && row.predicates.of(&chart.predicates).iter().any(|p| hook.predicate(*p, *event, &mut around.view(chart)))
+    })
+}
+
+/// Whether the sorted list has the event.
+fn lists(sorted: &[EventId], event: EventId) -> bool {
+    // Up to a cache line of ids is gone through faster than searched.
+    if sorted.len() <= 16 { sorted.contains(&event) } else { sorted.binary_search(&event).is_ok() }
+}

@@ -1,0 +1,180 @@
+//! A coordinator alone, stepped line by line: what `davit sim` does (design §16). Pure: lines in, observations out.
+
+use super::chart::{Chart, NodeId};
+use super::hook::{Hook, Raised};
+use super::machine::{Ended, Machine, Mode, Stepped};
+use super::{EdgeId, EventId};
+use crate::limits;
+use crate::model::names::{EventName, NameError};
+use crate::time::Time;
+use serde::Serialize;
+use std::fmt;
+use std::time::Duration;
+
+/// What one input line led to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Observation {
+    /// Full names of the active states, from the root to the leaf; empty before the chart was entered.
+    pub active: Vec<String>,
+    /// The mode of the leaf; `null` while nothing is active.
+    pub mode: Option<Mode>,
+    /// Events left inside for the next step, in order.
+    pub queue: Vec<String>,
+    /// `exit STATE` and `entry STATE` in the order of execution, each `raise NAME` right after what raised it.
+    pub actions: Vec<String>,
+    /// A transition was taken; the first entry counts as one.
+    pub transition: bool,
+    /// What `step` returned: nothing is left to do.
+    pub idle: bool,
+    /// What rFSM would have reported (a conflict at a connector, a failed entry). Not part of the JSON.
+    #[serde(skip)]
+    pub notes: Vec<String>,
+}
+
+/// Why a line was not understood. Nothing happened then.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SimError {
+    /// `advance` without a number of seconds.
+    #[error("`{0}` is not understood: it is written `advance SECONDS`, with a number that is not negative")]
+    Advance(String),
+    /// Not an event.
+    #[error(transparent)]
+    Event(#[from] NameError),
+}
+
+/// A machine that is stepped by lines of text, on a clock of its own.
+#[derive(Debug, Clone)]
+pub struct Sim<'c> {
+    chart: &'c Chart,
+    machine: Machine,
+    now: Time,
+}
+
+impl<'c> Sim<'c> {
+    /// A machine not yet entered, at time 0.
+    pub fn new(chart: &'c Chart) -> Self {
+        Self { chart, machine: Machine::new(chart), now: Time::default() }
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// The simulated time.
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    /// Does what a line says: `run` runs to idle; `advance 0.5` moves the clock by half a second and does one step; any
+    /// other line is a set of events separated by blanks, queued in that order, and one step. The first line also
+    /// enters the machine.
+    ///
+    /// # Errors
+    /// [`SimError`] for a line that says none of these; the machine is as before.
+    pub fn line(&mut self, line: &str) -> Result<Observation, SimError> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let mut trace = Trace::default();
+        let stepped = match words[..] {
+            ["run"] => self.machine.run(self.chart, self.now, &mut trace),
+            ["advance", ..] => {
+                let seconds = match words[1..] {
+                    [number] => number.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0),
+                    _ => None,
+                };
+                let seconds = seconds.ok_or_else(|| SimError::Advance(line.trim().to_owned()))?;
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // finite, not negative; saturates
+                let nanos = (seconds * 1e9).round() as u64;
+                self.now = self.now + Duration::from_nanos(nanos);
+                self.machine.step(self.chart, self.now, 1, &mut trace)
+            }
+            _ => {
+                let events: Vec<EventId> = words
+                    .iter()
+                    .map(|word| EventName::new(word).map(|name| self.chart.event(name)))
+                    .collect::<Result<_, _>>()?;
+                let lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
+                if lost > 0 {
+                    trace.notes.push(format!(
+                        "{lost} events found no room: a set holds at most {}",
+                        limits::CHART_QUEUE
+                    ));
+                }
+                self.machine.step(self.chart, self.now, 1, &mut trace)
+            }
+        };
+        Ok(self.observe(stepped, trace))
+    }
+
+    fn observe(&self, stepped: Stepped, mut trace: Trace) -> Observation {
+        if stepped.ended == Ended::Endless {
+            trace.notes.push(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
+        }
+        Observation {
+            active: self.machine.active().iter().map(|node| self.chart.fqn(*node).to_string()).collect(),
+            mode: self.machine.mode(),
+            queue: self.machine.queue().events().iter().map(|event| self.chart.event_text(*event)).collect(),
+            actions: trace.actions,
+            transition: stepped.transition,
+            idle: stepped.idle,
+            notes: trace.notes,
+        }
+    }
+}
+
+/// For people: one line an action, then where it stands.
+impl fmt::Display for Observation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for action in &self.actions {
+            writeln!(f, "  {action}")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "  note: {note}")?;
+        }
+        match (self.active.last(), self.mode) {
+            (Some(leaf), Some(Mode::Active)) => write!(f, "= {leaf} (active)")?,
+            (Some(leaf), _) => write!(f, "= {leaf} (done)")?,
+            (None, _) => f.write_str("= not entered")?,
+        }
+        if !self.queue.is_empty() {
+            write!(f, ", waiting: {}", self.queue.join(" "))?;
+        }
+        if !self.transition {
+            f.write_str(", no transition")?;
+        }
+        if self.idle {
+            f.write_str(", idle")?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes down what happens.
+#[derive(Debug, Default)]
+struct Trace {
+    actions: Vec<String>,
+    notes: Vec<String>,
+}
+
+impl Hook for Trace {
+    fn entered(&mut self, chart: &Chart, state: NodeId) {
+        self.actions.push(format!("entry {}", chart.fqn(state)));
+    }
+
+    fn exited(&mut self, chart: &Chart, state: NodeId) {
+        self.actions.push(format!("exit {}", chart.fqn(state)));
+    }
+
+    fn raised(&mut self, _: &Chart, raised: Raised) {
+        self.actions.push(format!("raise {}", raised.name));
+    }
+
+    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
+        let targets: Vec<String> = ways.map(|edge| chart.fqn(chart.ends(edge).1).to_string()).collect();
+        self.notes.push(format!("conflicting transitions from src {} to {}", chart.fqn(connector), targets.join(", ")));
+    }
+
+    fn not_entered(&mut self, chart: &Chart) {
+        self.notes.push(format!("failed to enter, no valid path from {}", chart.fqn(chart.initial())));
+    }
+}

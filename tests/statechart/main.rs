@@ -1,0 +1,4 @@
+//! Statecharts: rFSM's behaviour, test by test, and a second, plain interpreter beside the engine.
+
+mod rfsm;
+mod support;
