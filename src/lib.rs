@@ -7,6 +7,6 @@ pub mod libraries;
 pub mod limits;
 pub mod model;
 pub mod platform;
-pub mod statechart;
 pub mod session;
+pub mod statechart;
 pub mod time;

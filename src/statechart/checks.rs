@@ -67,7 +67,11 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
         findings.push(
             Finding::error(
                 codes::CHART_LONG_CHAIN,
-                format!("more than {} connectors follow one another from `{}`", limits::CONNECTOR_CHAIN, chart.fqn(node)),
+                format!(
+                    "more than {} connectors follow one another from `{}`",
+                    limits::CONNECTOR_CHAIN,
+                    chart.fqn(node)
+                ),
             )
             .at(chart.origin(node))
             .path(chart.fqn(node).to_string())
@@ -121,7 +125,10 @@ fn no_way_out(chart: &Chart, findings: &mut Findings) {
             findings.push(
                 Finding::warning(
                     codes::CHART_NO_OUTGOING,
-                    format!("the connector `{}` has no outgoing transition, so no path leads through it", chart.fqn(node)),
+                    format!(
+                        "the connector `{}` has no outgoing transition, so no path leads through it",
+                        chart.fqn(node)
+                    ),
                 )
                 .at(chart.origin(node))
                 .path(chart.fqn(node).to_string())
@@ -303,10 +310,13 @@ fn never_fails(chart: &Chart, edge: u32, always: &mut [Option<bool>]) -> bool {
 fn root_exit(chart: &Chart, findings: &mut Findings) {
     if let Some(site) = chart.raises.iter().find(|site| site.when == super::When::Exit(NodeId::ROOT)) {
         findings.push(
-            Finding::warning(codes::CHART_ROOT_EXIT, format!("`{}` is never raised: the root is never left", site.name))
-                .at(site.origin)
-                .path("root")
-                .help("put it into a state inside the root"),
+            Finding::warning(
+                codes::CHART_ROOT_EXIT,
+                format!("`{}` is never raised: the root is never left", site.name),
+            )
+            .at(site.origin)
+            .path("root")
+            .help("put it into a state inside the root"),
         );
     }
 }

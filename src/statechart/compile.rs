@@ -3,16 +3,16 @@
 //! What `init` rejects is an error here. What it only complains about is a warning. Beyond rFSM, circles of connectors
 //! (which overflow its stack) and transitions of the root (on which it trips) are refused.
 
-use super::chart::{
-    Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When,
-};
+use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When};
 use super::resolve::Names;
 use super::{EdgeId, NodeId, checks, order};
 use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{self, Finding, Findings, Origin};
 use crate::model::names::{EventName, Ident};
-use crate::model::statechart::{Action, FunctionId, INITIAL, Node, ROOT, Since, State, Statechart, Transition, Trigger};
+use crate::model::statechart::{
+    Action, FunctionId, INITIAL, Node, ROOT, Since, State, Statechart, Transition, Trigger,
+};
 use rustc_hash::FxHashMap;
 
 /// The chart in tables, and all that is wrong or doubtful with it.
@@ -117,7 +117,8 @@ impl<'m> Builder<'m> {
             );
             return;
         }
-        self.written.extend(state.transitions.iter().enumerate().map(|(number, transition)| (node, number, transition)));
+        self.written
+            .extend(state.transitions.iter().enumerate().map(|(number, transition)| (node, number, transition)));
         let composite = !state.children.is_empty();
         self.kinds[node as usize] = if composite { Kind::Composite } else { Kind::Leaf };
         for child in &state.children {
@@ -219,10 +220,13 @@ impl<'m> Builder<'m> {
     ) -> Option<u32> {
         let Some((text, origin)) = end else {
             self.findings.push(
-                Finding::error(codes::CHART_MISSING_END, format!("a transition in `{}` has no `{which}`", self.fqn(scope)))
-                    .at(transition.origin)
-                    .path(path)
-                    .help(format!("write {which} = \"NAME\"")),
+                Finding::error(
+                    codes::CHART_MISSING_END,
+                    format!("a transition in `{}` has no `{which}`", self.fqn(scope)),
+                )
+                .at(transition.origin)
+                .path(path)
+                .help(format!("write {which} = \"NAME\"")),
             );
             return None;
         };
@@ -253,10 +257,13 @@ impl<'m> Builder<'m> {
     fn edge(&mut self, transition: &'m Transition, src: u32, mut tgt: u32, path: &str) {
         if src == 0 {
             self.findings.push(
-                Finding::error(codes::CHART_FROM_ROOT, "a transition cannot start at the root: rFSM fails when it is taken")
-                    .at(transition.origin)
-                    .path(path)
-                    .help("put all states into one state inside the root and start the transition there"),
+                Finding::error(
+                    codes::CHART_FROM_ROOT,
+                    "a transition cannot start at the root: rFSM fails when it is taken",
+                )
+                .at(transition.origin)
+                .path(path)
+                .help("put all states into one state inside the root and start the transition there"),
             );
             return;
         }
@@ -272,7 +279,9 @@ impl<'m> Builder<'m> {
                     .at(origin)
                     .also(self.origins[tgt as usize], "this state has no initial connector")
                     .path(path)
-                    .help(format!("write a transition from `initial` in `{target}`, or make one of its states the target")),
+                    .help(format!(
+                        "write a transition from `initial` in `{target}`, or make one of its states the target"
+                    )),
                 );
                 return;
             };
@@ -383,7 +392,10 @@ impl<'m> Builder<'m> {
                     self.findings.push(
                         Finding::warning(
                             codes::CHART_TIMER_AT_CONNECTOR,
-                            format!("`{timed}` never comes: `{}` is a connector, no time is spent in it", self.fqn(src)),
+                            format!(
+                                "`{timed}` never comes: `{}` is a connector, no time is spent in it",
+                                self.fqn(src)
+                            ),
                         )
                         .at(*origin)
                         .path(self.fqn(src)),
@@ -403,7 +415,10 @@ impl<'m> Builder<'m> {
                             self.findings.push(
                                 Finding::warning(
                                     codes::CHART_TWO_TIMERS,
-                                    format!("`{}` has two time events; only the last one written is ever raised", self.fqn(src)),
+                                    format!(
+                                        "`{}` has two time events; only the last one written is ever raised",
+                                        self.fqn(src)
+                                    ),
                                 )
                                 .at(entry.2)
                                 .labelled("never raised")

@@ -1,9 +1,9 @@
 //! One run of a chart: rFSM's `step` and `run` (`rfsm.md` §5, §6, §7, §9).
 
+use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
 use super::hook::{Doo, Hook, Place, Raised, View};
 use super::search::{Around, Search};
-use super::EdgeId;
 use crate::limits;
 use crate::time::Time;
 
@@ -295,8 +295,7 @@ impl Machine {
     }
 
     fn find(&mut self, chart: &Chart, node: u32, hook: &mut impl Hook) -> u32 {
-        let mut around =
-            Around { active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue };
+        let mut around = Around { active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue };
         self.search.from(chart, node, &mut around, hook)
     }
 

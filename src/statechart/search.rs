@@ -9,10 +9,10 @@
 //! and a net of connectors costs its number of transitions, not its number of paths. With guards every visit counts,
 //! because guards may do things.
 
+use super::EdgeId;
 use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
 use super::hook::{Hook, View};
 use super::machine::Queue;
-use super::EdgeId;
 use crate::limits;
 
 /// One way on from a node: a transition and, if it ends at a connector, the ways on from there.
@@ -139,7 +139,11 @@ fn enabled(chart: &Chart, edge: u32, row: &EdgeRow, around: &mut Around<'_>, hoo
     events.iter().any(|event| {
         lists(listed, *event)
             || row.predicates.len > 0
-                && row.predicates.of(&chart.predicates).iter().any(|p| hook.predicate(*p, *event, &mut around.view(chart)))
+                && row
+                    .predicates
+                    .of(&chart.predicates)
+                    .iter()
+                    .any(|p| hook.predicate(*p, *event, &mut around.view(chart)))
     })
 }
 

@@ -95,10 +95,9 @@ impl<'c> Sim<'c> {
                     .collect::<Result<_, _>>()?;
                 let lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
                 if lost > 0 {
-                    trace.notes.push(format!(
-                        "{lost} events found no room: a set holds at most {}",
-                        limits::CHART_QUEUE
-                    ));
+                    trace
+                        .notes
+                        .push(format!("{lost} events found no room: a set holds at most {}", limits::CHART_QUEUE));
                 }
                 self.machine.step(self.chart, self.now, 1, &mut trace)
             }
