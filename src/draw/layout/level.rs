@@ -1,92 +1,52 @@
 //! One level: the children of a group (or of the picture) and the parts of edges that run between them.
 
+use super::chains::{Border, Chain, Layered, Side, Vertex, layer_count, spans};
 use super::order::{Segment, order};
 use super::place::{Tie, place};
 use super::rank::ranks;
-use super::{LINE, Rect, Route, Run, header, label_size, text_size};
+use super::{LINE, Run, header, label_size, text_size};
 use crate::draw::picture::{Direction, Picture, Shape};
 use std::collections::BTreeMap;
 
 /// The place of an item in its level: its start and its extent, along and across.
 #[derive(Debug, Clone, Copy, Default)]
-struct Slot {
-    along: f64,
-    across: f64,
-    len: f64,
-    wide: f64,
+pub(super) struct Slot {
+    pub(super) along: f64,
+    pub(super) across: f64,
+    pub(super) len: f64,
+    pub(super) wide: f64,
 }
 
 /// The part of an edge in one level.
 #[derive(Debug, Clone)]
-struct Part {
-    edge: usize,
+pub(super) struct Part {
+    pub(super) edge: usize,
     /// Parts are joined in this order: from the innermost level of the source outwards, then inwards to the target.
-    stage: i64,
-    runs: Vec<Run>,
-    label: Option<Slot>,
-    looped: Option<usize>,
+    pub(super) stage: i64,
+    pub(super) runs: Vec<Run>,
+    pub(super) label: Option<Slot>,
+    pub(super) looped: Option<usize>,
 }
 
 /// A level with coordinates, relative to its own start.
 #[derive(Debug, Default)]
-struct Laid {
-    items: Vec<(usize, Slot)>,
-    parts: Vec<Part>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Side {
-    Start,
-    End,
-}
-
-/// An edge that comes from or goes to something outside this level.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Border {
-    edge: usize,
-    /// The item of this level that it leaves from or goes to.
-    item: usize,
-    side: Side,
-    /// Whether the edge's source is inside.
-    outgoing: bool,
-    stage: i64,
-    labelled: bool,
+pub(super) struct Laid {
+    pub(super) items: Vec<(usize, Slot)>,
+    pub(super) parts: Vec<Part>,
 }
 
 /// All levels of a picture.
 pub(super) struct Levels<'a> {
-    picture: &'a Picture,
+    pub(super) picture: &'a Picture,
     /// Of each group, at its index + 1; of the picture at 0.
-    children: Vec<Vec<usize>>,
+    pub(super) children: Vec<Vec<usize>>,
     edges: Vec<Vec<usize>>,
     depth: Vec<i64>,
-    laid: Vec<Laid>,
+    pub(super) laid: Vec<Laid>,
 }
 
-fn slot_of(level: Option<usize>) -> usize {
+pub(super) fn slot_of(level: Option<usize>) -> usize {
     level.map_or(0, |g| g + 1)
-}
-
-/// A vertex of the layered graph: an item, or a place where an edge passes a layer.
-#[derive(Debug, Clone, Copy, Default)]
-struct Vertex {
-    layer: usize,
-    len: f64,
-    wide: f64,
-}
-
-/// An edge as a chain of vertices, first to last layer.
-struct Chain {
-    edge: usize,
-    stage: i64,
-    vertices: Vec<usize>,
-    /// Whether the edge runs from the last vertex to the first.
-    backwards: bool,
-    /// Whether its ends turn round beside the items (out-port and in-port of a connection that runs backwards).
-    turns: Option<(usize, usize)>,
-    label: Option<usize>,
-    starts_at_border: bool,
-    ends_at_border: bool,
 }
 
 impl<'a> Levels<'a> {
@@ -148,12 +108,13 @@ impl<'a> Levels<'a> {
         !self.picture.nodes[node].ins.is_empty() || !self.picture.nodes[node].outs.is_empty()
     }
 
-    /// Lays out a level whose edges to the outside are `borders`. Answers its extent, along and across.
-    pub(super) fn lay(&mut self, level: Option<usize>, borders: &[Border]) -> (f64, f64) {
-        let (size, _) = self.lay_with_ports(level, borders);
-        size
+    /// Lays out everything. Answers its extent, along and across.
+    pub(super) fn lay(&mut self) -> (f64, f64) {
+        self.lay_with_ports(None, &[]).0
     }
 
+    /// Lays out a level whose edges to the outside are `borders`. Answers its extent and where each of them meets the
+    /// border (edge, whether its source is inside).
     #[allow(clippy::too_many_lines)]
     fn lay_with_ports(
         &mut self,
@@ -188,7 +149,7 @@ impl<'a> Levels<'a> {
             }
         }
         let rank = ranks(items.len(), &inner.iter().map(|(_, a, b)| (*a, *b)).collect::<Vec<_>>());
-        let layer_count = rank.iter().max().map_or(0, |r| r + 1) * 2 + 3;
+        let layer_count = layer_count(&rank);
         let layer_of = |i: usize| rank[i] * 2 + 2;
 
         // Groups first: their extent, and where edges meet their border.
@@ -244,94 +205,8 @@ impl<'a> Levels<'a> {
             }
         }
 
-        let mut layers: Vec<Vec<usize>> = vec![Vec::new(); layer_count];
-        for (i, v) in vertices.iter().enumerate() {
-            layers[v.layer].push(i);
-        }
-        let mut chains: Vec<Chain> = Vec::new();
-        let mut near: Vec<(usize, usize)> = Vec::new();
-        let pass = |layers: &mut Vec<Vec<usize>>, vertices: &mut Vec<Vertex>, layer: usize| {
-            vertices.push(Vertex { layer, len: 0.0, wide: 6.0 });
-            layers[layer].push(vertices.len() - 1);
-            vertices.len() - 1
-        };
-        for &(e, a, b) in &inner {
-            let edge = &picture.edges[e];
-            let backwards = rank[a] > rank[b] || a == b;
-            let (upper, lower) = if backwards { (b, a) } else { (a, b) };
-            let turning = backwards && edge.from_port.is_some();
-            let mut chain = Vec::new();
-            let (first, last) = (layer_of(upper), layer_of(lower));
-            if turning {
-                for layer in first..=last {
-                    chain.push(pass(&mut layers, &mut vertices, layer));
-                }
-                near.push((chain[0], upper));
-                near.push((chain[chain.len() - 1], lower));
-            } else {
-                chain.push(upper);
-                for layer in first + 1..last {
-                    chain.push(pass(&mut layers, &mut vertices, layer));
-                }
-                chain.push(lower);
-            }
-            chains.push(Chain {
-                edge: e,
-                stage: 0,
-                label: None,
-                vertices: chain,
-                backwards,
-                turns: turning.then_some((a, b)),
-                starts_at_border: false,
-                ends_at_border: false,
-            });
-        }
-        for b in &borders {
-            let item = index[&b.item];
-            let mut chain = Vec::new();
-            let at = layer_of(item);
-            let start = b.side == Side::Start;
-            if start {
-                for layer in 0..at {
-                    chain.push(pass(&mut layers, &mut vertices, layer));
-                }
-                chain.push(item);
-            } else {
-                chain.push(item);
-                for layer in at + 1..layer_count {
-                    chain.push(pass(&mut layers, &mut vertices, layer));
-                }
-            }
-            chains.push(Chain {
-                edge: b.edge,
-                stage: b.stage,
-                label: b.labelled.then_some(0),
-                vertices: chain,
-                backwards: start == b.outgoing,
-                turns: None,
-                starts_at_border: start,
-                ends_at_border: !start,
-            });
-        }
-        // A label stands where its edge passes between two ranks, in the middle of its way.
-        for chain in &mut chains {
-            let lines = &picture.edges[chain.edge].label;
-            let carries = chain.label.take().is_some() || (!chain.starts_at_border && !chain.ends_at_border);
-            if lines.is_empty() || !carries {
-                continue;
-            }
-            let between: Vec<usize> =
-                chain.vertices.iter().copied().filter(|v| *v >= items.len() && vertices[*v].layer % 2 == 1).collect();
-            if let Some(&v) = between.get(between.len() / 2) {
-                let (w, h) = label_size(lines);
-                let (len, wide) = match picture.direction {
-                    Direction::Right => (w, h),
-                    Direction::Down => (h, w),
-                };
-                vertices[v] = Vertex { len: len + 6.0, wide, ..vertices[v] };
-                chain.label = Some(v);
-            }
-        }
+        let Layered { vertices, mut layers, chains, near } =
+            Layered::new(picture, vertices, &rank, &inner, &borders, &index);
 
         // Where a chain meets an item: a port's row, the place on a group's border, or (not known yet) somewhere.
         let fixed = |chain: &Chain, v: usize, source: bool| -> Option<f64> {
@@ -383,7 +258,9 @@ impl<'a> Levels<'a> {
         // Edges without a port share the side of their item in the order of their other ends.
         let mut first_at: Vec<f64> = chains.iter().map(|_| 0.0).collect();
         let mut last_at = first_at.clone();
-        let mut sharing: BTreeMap<(usize, Side), Vec<(usize, usize, bool)>> = BTreeMap::new();
+        // (place of the other end, chain, whether it is the chain's first vertex) of the users of one side.
+        type Users = Vec<(usize, usize, bool)>;
+        let mut sharing: BTreeMap<(usize, Side), Users> = BTreeMap::new();
         for (c, chain) in chains.iter().enumerate() {
             let n = chain.vertices.len();
             if chain.turns.is_some() || n < 2 {
@@ -454,28 +331,15 @@ impl<'a> Levels<'a> {
                 reach[layer] = reach[layer].max((a - b).abs());
             }
         }
-        let mut start = vec![0.0f64; layer_count];
-        let mut end = vec![0.0f64; layer_count];
         let pads = self.pads(level);
-        let mut at = pads.0;
-        let some = |l: usize| !layers[l].is_empty();
-        for l in 0..layer_count {
-            start[l] = at;
-            at += layers[l].iter().map(|v| vertices[*v].len).fold(0.0, f64::max);
-            end[l] = at;
-            let used_before = (0..=l).any(some);
-            let used_after = (l + 1..layer_count).any(some);
-            if used_before && used_after {
-                at += (13.0 + reach[l] * 0.09).min(58.0);
-            }
-        }
-        let along_size = at + pads.1;
+        let (start, end) = spans(&layers, &vertices, &reach, pads.0);
+        let at = end.last().copied().unwrap_or(pads.0);
+        let mut along_size = at + pads.1;
         let low = (0..vertices.len()).map(|v| middles[v] - wides[v] / 2.0).fold(f64::INFINITY, f64::min);
         let high = (0..vertices.len()).map(|v| middles[v] + wides[v] / 2.0).fold(f64::NEG_INFINITY, f64::max);
         let content = if vertices.is_empty() { 0.0 } else { high - low };
         let mut across_size = content + pads.2 + pads.3;
         let mut offset = pads.2 - if vertices.is_empty() { 0.0 } else { low };
-        let mut along_size = along_size;
         if let Some(group) = level {
             let wanted = text_size(picture, group).0;
             match picture.direction {
@@ -581,57 +445,6 @@ impl<'a> Levels<'a> {
         match self.picture.direction {
             Direction::Down => (top, 16.0, 18.0, 18.0),
             Direction::Right => (16.0, 16.0, top, 16.0),
-        }
-    }
-
-    /// Writes the coordinates of a level that begins at `origin` (along, across) and of all levels in it.
-    pub(super) fn write(&self, level: Option<usize>, origin: (f64, f64), nodes: &mut [Rect], routes: &mut [Route]) {
-        let mut parts = vec![Vec::new(); routes.len()];
-        self.write_level(level, origin, nodes, routes, &mut parts);
-        for (route, mut parts) in routes.iter_mut().zip(parts) {
-            parts.sort_by_key(|(stage, _)| *stage);
-            route.runs = parts.into_iter().flat_map(|(_, runs)| runs).collect();
-        }
-        for (route, edge) in routes.iter_mut().zip(&self.picture.edges) {
-            if route.looped.is_some() {
-                route.looped = Some(nodes[edge.from]);
-            }
-        }
-    }
-
-    fn write_level(
-        &self,
-        level: Option<usize>,
-        (along, across): (f64, f64),
-        nodes: &mut [Rect],
-        routes: &mut [Route],
-        parts: &mut [Vec<(i64, Vec<Run>)>],
-    ) {
-        let rect = |s: &Slot| match self.picture.direction {
-            Direction::Right => Rect { x: s.along + along, y: s.across + across, w: s.len, h: s.wide },
-            Direction::Down => Rect { x: s.across + across, y: s.along + along, w: s.wide, h: s.len },
-        };
-        let laid = &self.laid[slot_of(level)];
-        for (node, slot) in &laid.items {
-            nodes[*node] = rect(slot);
-            if self.picture.nodes[*node].shape == Shape::Group && !self.children[node + 1].is_empty() {
-                self.write_level(Some(*node), (along + slot.along, across + slot.across), nodes, routes, parts);
-            }
-        }
-        for part in &laid.parts {
-            if let Some(label) = &part.label {
-                routes[part.edge].label = Some(rect(label));
-            }
-            if part.looped.is_some() {
-                routes[part.edge].looped = Some(Rect::default());
-            }
-            let moved = part.runs.iter().map(|r| Run {
-                from: r.from + along,
-                to: r.to + along,
-                across: r.across + across,
-                heading: r.heading,
-            });
-            parts[part.edge].push((part.stage, moved.collect()));
         }
     }
 }

@@ -5,6 +5,8 @@
 //! cut at the borders it crosses: in each level its part is an edge to the border, and the place where it meets the
 //! border is where the parent's part begins.
 
+mod absolute;
+mod chains;
 mod level;
 mod order;
 mod place;
@@ -110,7 +112,7 @@ pub fn label_size(lines: &[String]) -> (f64, f64) {
 /// Coordinates for `picture`.
 pub fn layout(picture: &Picture) -> Layout {
     let mut levels = level::Levels::new(picture);
-    let size = levels.lay(None, &[]);
+    let size = levels.lay();
     let mut nodes = vec![Rect::default(); picture.nodes.len()];
     let mut routes = vec![Route::default(); picture.edges.len()];
     levels.write(None, (0.0, 0.0), &mut nodes, &mut routes);
