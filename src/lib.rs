@@ -2,6 +2,7 @@
 //! again.
 
 pub mod cli;
+pub mod coordinator;
 pub mod draw;
 pub mod libraries;
 pub mod limits;

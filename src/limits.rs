@@ -37,3 +37,10 @@ pub const CHART_DEPTH: usize = 100;
 
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;
+
+/// Answers and operators' events that may wait for a coordinator. Requests are answered once each, and a person types.
+pub const INBOX_CONTROL: usize = 1024;
+
+/// Events of monitors and components that may wait for a coordinator: some milliseconds of reacting. What waits longer is
+/// no news any more.
+pub const INBOX_REPORT: usize = 4096;

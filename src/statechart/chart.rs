@@ -224,6 +224,11 @@ impl Chart {
         (0..u32::try_from(self.nodes.len()).unwrap_or(NONE)).map(NodeId)
     }
 
+    /// The node of that number.
+    pub fn node(&self, index: usize) -> Option<NodeId> {
+        u32::try_from(index).ok().filter(|_| index < self.nodes.len()).map(NodeId)
+    }
+
     /// What a node is.
     pub fn kind(&self, node: NodeId) -> Kind {
         self.nodes[node.index()].kind

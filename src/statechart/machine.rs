@@ -145,6 +145,11 @@ impl Machine {
         self.queue.push(event)
     }
 
+    /// Forgets the events left for the next step.
+    pub fn drop_queue(&mut self) {
+        self.queue.events.clear();
+    }
+
     /// The events left for the next step.
     pub fn queue(&self) -> &Queue {
         &self.queue

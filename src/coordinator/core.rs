@@ -1,0 +1,192 @@
+//! The coordinator without its thread: one event in, batches of names out.
+
+use crate::limits;
+use crate::model::finding::Finding;
+use crate::model::names::EventName;
+use crate::model::{codes, finding};
+use crate::statechart::{Chart, Hook, Machine, NodeId, Raised, Step};
+use crate::time::Time;
+use std::sync::Arc;
+
+/// For whom an answer is: one visit of one state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Tag {
+    /// The state that asked.
+    pub owner: NodeId,
+    /// The how-manieth visit of it.
+    pub visit: u32,
+}
+
+impl From<Raised> for Tag {
+    fn from(raised: Raised) -> Self {
+        Self { owner: raised.owner, visit: raised.visit }
+    }
+}
+
+/// Who hears of what a coordinator does. It is called from the coordinator's thread and must not wait.
+pub trait Listener {
+    /// One step raised these names, in this order. What a step raises belongs together: an undo and a push of one batch
+    /// are one transaction (design §5).
+    fn raised(&mut self, chart: &Chart, batch: &[Raised]);
+
+    /// A transition was taken (or the chart was entered). `active` are the states active now, from the root inwards. Called
+    /// before [`raised`](Self::raised) of the same step.
+    fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
+        let _ = (chart, active);
+    }
+
+    /// An event triggered nothing.
+    fn unmatched(&mut self, event: EventName) {
+        let _ = event;
+    }
+
+    /// An answer came for a visit that is over; it was not delivered.
+    fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {
+        let _ = (chart, event, tag);
+    }
+
+    /// The chart behaved badly.
+    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+        let _ = (chart, trouble);
+    }
+}
+
+/// What a chart does that it should not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// It could not be entered. The next event tries again.
+    NotEntered,
+    /// It did not come to rest within [`limits::CHART_RUN`] turns. What it still had inside was dropped.
+    Runaway,
+}
+
+impl Trouble {
+    /// The trouble as a finding.
+    pub fn finding(self, chart: &Chart) -> Finding {
+        let initial = chart.initial();
+        let (node, code, message) = match self {
+            Self::NotEntered => {
+                (initial, codes::CHART_NOT_ENTERED, "the coordinator could not be entered: no path from `initial`".to_owned())
+            }
+            Self::Runaway => (
+                NodeId::ROOT,
+                codes::CHART_RUNAWAY,
+                format!("the coordinator did not come to rest within {} steps and was stopped", limits::CHART_RUN),
+            ),
+        };
+        Finding::new(finding::Severity::Error, code, message).at(chart.origin(node)).path(chart.fqn(node).to_string())
+    }
+}
+
+/// What became of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delivered {
+    /// It triggered a transition.
+    Taken,
+    /// It triggered nothing.
+    Unmatched,
+    /// It was an answer for a visit that is over: not delivered.
+    Stale,
+}
+
+/// A coordinator that is driven by calls.
+#[derive(Debug, Clone)]
+pub struct Core {
+    chart: Arc<Chart>,
+    machine: Machine,
+    batch: Vec<Raised>,
+}
+
+/// Collects what one step raises.
+struct Collect<'a>(&'a mut Vec<Raised>);
+
+impl Hook for Collect<'_> {
+    fn raised(&mut self, _: &Chart, raised: Raised) {
+        self.0.push(raised);
+    }
+}
+
+impl Core {
+    /// A coordinator that has not begun.
+    pub fn new(chart: Arc<Chart>) -> Self {
+        let machine = Machine::new(&chart);
+        // No step raises more than there are places that raise.
+        let batch = Vec::with_capacity(chart.raises().len());
+        Self { chart, machine, batch }
+    }
+
+    /// The chart.
+    pub fn chart(&self) -> &Arc<Chart> {
+        &self.chart
+    }
+
+    /// Where it stands.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Enters the chart and lets it come to rest.
+    pub fn start(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) {
+        self.settle(now, listener);
+    }
+
+    /// Delivers one event and lets the chart come to rest. The event is alone in its step, so that it cannot be lost to
+    /// another one that wins (an answer, say, to an operator's command).
+    pub fn deliver(
+        &mut self,
+        event: EventName,
+        tag: Option<Tag>,
+        now: Time,
+        listener: &mut (impl Listener + ?Sized),
+    ) -> Delivered {
+        if let Some(tag) = tag.filter(|tag| !self.machine.is_present(&self.chart, tag.owner, tag.visit)) {
+            listener.stale(&self.chart, event, tag);
+            return Delivered::Stale;
+        }
+        self.machine.send(self.chart.event(event));
+        if matches!(self.settle(now, listener), Step::Taken | Step::Entered) {
+            Delivered::Taken
+        } else {
+            listener.unmatched(event);
+            Delivered::Unmatched
+        }
+    }
+
+    /// Lets time events that are due happen.
+    pub fn tick(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) {
+        self.settle(now, listener);
+    }
+
+    /// When [`tick`](Self::tick) is next needed if no event comes; none: not at all.
+    pub fn next_deadline(&self) -> Option<Time> {
+        self.machine.next_deadline(&self.chart)
+    }
+
+    /// Turns until nothing is left to do; answers what the first one did.
+    fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> Step {
+        let mut first = None;
+        for _ in 0..limits::CHART_RUN {
+            let step = self.machine.turn(&self.chart, now, &mut Collect(&mut self.batch));
+            first = first.or(Some(step));
+            match step {
+                Step::Taken | Step::Entered => listener.moved(&self.chart, self.machine.active()),
+                Step::NotEntered => {
+                    listener.trouble(&self.chart, Trouble::NotEntered);
+                    return step;
+                }
+                Step::Unmatched | Step::Quiet { .. } => (),
+            }
+            if !self.batch.is_empty() {
+                listener.raised(&self.chart, &self.batch);
+                self.batch.clear();
+            }
+            // A time event that came due in an idle turn waits inside for the next one.
+            if matches!(step, Step::Quiet { idle: true }) && self.machine.queue().events().is_empty() {
+                return first.unwrap_or(step);
+            }
+        }
+        self.machine.drop_queue();
+        listener.trouble(&self.chart, Trouble::Runaway);
+        first.unwrap_or(Step::Unmatched)
+    }
+}

@@ -1,0 +1,304 @@
+//! The coordinator's own thread.
+
+use super::core::{Core, Listener, Trouble};
+use super::inbox::{Dropped, Inbox, Incoming, Refused};
+use super::{Delivered, Tag};
+use crate::model::names::EventName;
+use crate::statechart::{Chart, NodeId, Raised};
+use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A running coordinator. Cloning makes another handle of the same one; it ends when it is told to, not when the handles
+/// are gone.
+#[derive(Clone)]
+pub struct Coordinator {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    clock: Clock,
+    chart: Arc<Chart>,
+    inbox: Mutex<Inbox>,
+    bell: Signal,
+    /// Index of the active leaf plus one; 0 before the chart was entered. The leaf tells the whole active configuration.
+    leaf: AtomicUsize,
+    detached: AtomicBool,
+    /// Held while the coordinator reacts; whoever holds it knows that no name is being raised.
+    commanding: Mutex<()>,
+    delivered: AtomicU64,
+    stale: AtomicU64,
+    waiting: Mutex<Waiting>,
+    thread: Mutex<Thread>,
+}
+
+/// Who waits for which state, by number.
+#[derive(Default)]
+struct Waiting {
+    next: u64,
+    all: Vec<(u64, NodeId, Sender<()>)>,
+}
+
+#[derive(Default)]
+struct Thread {
+    join: Option<Join>,
+    id: Option<std::thread::ThreadId>,
+}
+
+/// How waiting for a state ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waited {
+    /// The state is or was active.
+    Reached,
+    /// The deadline came first.
+    TimedOut,
+    /// The coordinator was detached first.
+    Detached,
+}
+
+/// Nothing that is locked here is left half-changed by a panic of a listener.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Coordinator {
+    /// Starts a thread that enters the chart, and then reacts to what is [delivered](Self::deliver).
+    pub fn start(name: &str, chart: Arc<Chart>, clock: &Clock, listener: impl Listener + Send + 'static) -> Self {
+        let shared = Arc::new(Shared {
+            clock: clock.clone(),
+            chart,
+            inbox: Mutex::new(Inbox::new()),
+            bell: clock.signal(),
+            leaf: AtomicUsize::new(0),
+            detached: AtomicBool::new(false),
+            commanding: Mutex::new(()),
+            delivered: AtomicU64::new(0),
+            stale: AtomicU64::new(0),
+            waiting: Mutex::new(Waiting::default()),
+            thread: Mutex::new(Thread::default()),
+        });
+        let coordinator = Self { shared };
+        let mut thread = lock(&coordinator.shared.thread);
+        let shared = coordinator.shared.clone();
+        thread.join = Some(clock.spawn(name, move || shared.run(listener)));
+        thread.id = thread.join.as_ref().map(|join| join.thread().id());
+        drop(thread);
+        coordinator
+    }
+
+    /// The chart it runs.
+    pub fn chart(&self) -> &Arc<Chart> {
+        &self.shared.chart
+    }
+
+    /// Puts an event into the inbox. Never waits.
+    ///
+    /// # Errors
+    /// [`Refused`]: the lane is full (counted), or the coordinator has been detached.
+    pub fn deliver(&self, incoming: Incoming) -> Result<(), Refused> {
+        if self.is_detached() {
+            return Err(Refused::Detached);
+        }
+        lock(&self.shared.inbox).push(incoming)?;
+        self.shared.bell.notify();
+        Ok(())
+    }
+
+    /// The active leaf; none before the chart was entered. Takes no lock.
+    pub fn leaf(&self) -> Option<NodeId> {
+        self.shared.leaf()
+    }
+
+    /// Full names of the active states, from the root to the leaf; empty before the chart was entered. Takes no lock.
+    pub fn active(&self) -> Vec<String> {
+        let chart = &self.shared.chart;
+        let mut names: Vec<String> =
+            std::iter::successors(self.leaf(), |n| chart.parent(*n)).map(|n| chart.fqn(n).to_string()).collect();
+        names.reverse();
+        names
+    }
+
+    /// Whether a state is active. Takes no lock.
+    pub fn is_active(&self, state: NodeId) -> bool {
+        self.leaf().is_some_and(|leaf| self.shared.chart.is_inside(leaf, state))
+    }
+
+    /// Waits until `state` is active: now, or after any step until the deadline, however short it stays so.
+    pub fn wait_for_state(&self, state: NodeId, deadline: Time) -> Waited {
+        let (told, tell) = self.shared.clock.channel(1);
+        let number = {
+            let mut waiting = lock(&self.shared.waiting);
+            waiting.next += 1;
+            let number = waiting.next;
+            waiting.all.push((number, state, told));
+            number
+        };
+        // Looked at only now, so that a step in between is seen by one or the other.
+        let waited = if self.is_active(state) {
+            Waited::Reached
+        } else if self.is_detached() {
+            Waited::Detached
+        } else {
+            match tell.recv_deadline(deadline) {
+                Ok(()) => Waited::Reached,
+                Err(RecvError::Timeout) => Waited::TimedOut,
+                Err(RecvError::Closed) => Waited::Detached,
+            }
+        };
+        lock(&self.shared.waiting).all.retain(|(n, _, _)| *n != number);
+        waited
+    }
+
+    /// Events that found no room.
+    pub fn dropped(&self) -> Dropped {
+        lock(&self.shared.inbox).dropped()
+    }
+
+    /// Events that were delivered to the chart so far.
+    pub fn delivered(&self) -> u64 {
+        self.shared.delivered.load(Ordering::Relaxed)
+    }
+
+    /// Answers that came for visits that were over.
+    pub fn stale(&self) -> u64 {
+        self.shared.stale.load(Ordering::Relaxed)
+    }
+
+    /// Whether it was detached (or has ended).
+    pub fn is_detached(&self) -> bool {
+        self.shared.detached.load(Ordering::SeqCst)
+    }
+
+    /// Takes the command from it: when this returns, its listener hears nothing from it any more (a call from the listener
+    /// itself lets the present step end). Its last state stays readable; its thread ends by itself.
+    pub fn detach(&self) {
+        self.shared.detached.store(true, Ordering::SeqCst);
+        self.shared.bell.notify();
+        let own = lock(&self.shared.thread).id == Some(std::thread::current().id());
+        if !own {
+            drop(lock(&self.shared.commanding));
+        }
+        lock(&self.shared.waiting).all.clear();
+    }
+
+    /// Detaches it and waits for its thread to end.
+    ///
+    /// # Errors
+    /// [`JoinError`]: it had not ended by the deadline, or its listener panicked.
+    pub fn stop(&self, deadline: Time) -> Result<(), JoinError> {
+        self.detach();
+        let join = lock(&self.shared.thread).join.take();
+        join.map_or(Ok(()), |join| join.join(deadline))
+    }
+}
+
+impl std::fmt::Debug for Coordinator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Coordinator").field("leaf", &self.leaf()).field("detached", &self.is_detached()).finish()
+    }
+}
+
+impl Shared {
+    fn leaf(&self) -> Option<NodeId> {
+        let number = self.leaf.load(Ordering::SeqCst).checked_sub(1)?;
+        self.chart.node(number)
+    }
+
+    fn run(&self, listener: impl Listener) {
+        let _ended = Ended(self);
+        let mut core = Core::new(self.chart.clone());
+        let mut listener = Told { shared: self, listener };
+        self.react(|| core.start(self.clock.now(), &mut listener));
+        while !self.detached.load(Ordering::SeqCst) {
+            let next = lock(&self.inbox).pop();
+            let now = self.clock.now();
+            if let Some(incoming) = next {
+                self.react(|| {
+                    if core.deliver(incoming.event, incoming.tag, now, &mut listener) != Delivered::Stale {
+                        self.delivered.fetch_add(1, Ordering::Relaxed);
+                    }
+                });
+                continue;
+            }
+            match core.next_deadline() {
+                Some(due) if due <= now => self.react(|| core.tick(now, &mut listener)),
+                due => {
+                    self.bell.wait(due.unwrap_or(Time::NEVER));
+                }
+            }
+        }
+    }
+
+    fn react(&self, reaction: impl FnOnce()) {
+        let _commanding = lock(&self.commanding);
+        if !self.detached.load(Ordering::SeqCst) {
+            reaction();
+        }
+    }
+}
+
+/// However the thread ends, nobody waits for it any more.
+struct Ended<'a>(&'a Shared);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        self.0.detached.store(true, Ordering::SeqCst);
+        lock(&self.0.inbox).clear();
+        lock(&self.0.waiting).all.clear();
+    }
+}
+
+/// Between core and listener: publishes where the chart stands, and lets nothing through once detached.
+struct Told<'a, L> {
+    shared: &'a Shared,
+    listener: L,
+}
+
+impl<L> Told<'_, L> {
+    fn silent(&self) -> bool {
+        self.shared.detached.load(Ordering::SeqCst)
+    }
+}
+
+impl<L: Listener> Listener for Told<'_, L> {
+    fn raised(&mut self, chart: &Chart, batch: &[Raised]) {
+        if !self.silent() {
+            self.listener.raised(chart, batch);
+        }
+    }
+
+    fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
+        if self.silent() {
+            return;
+        }
+        self.shared.leaf.store(active.last().map_or(0, |leaf| leaf.index() + 1), Ordering::SeqCst);
+        lock(&self.shared.waiting).all.retain(|(_, state, told)| {
+            let reached = active.contains(state);
+            if reached {
+                // One place, one value: it cannot be full, and whoever stopped waiting does not mind.
+                let _ = told.try_send(());
+            }
+            !reached
+        });
+        self.listener.moved(chart, active);
+    }
+
+    fn unmatched(&mut self, event: EventName) {
+        if !self.silent() {
+            self.listener.unmatched(event);
+        }
+    }
+
+    fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {
+        self.shared.stale.fetch_add(1, Ordering::Relaxed);
+        if !self.silent() {
+            self.listener.stale(chart, event, tag);
+        }
+    }
+
+    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+        if !self.silent() {
+            self.listener.trouble(chart, trouble);
+        }
+    }
+}
