@@ -65,9 +65,11 @@ impl Trouble {
     pub fn finding(self, chart: &Chart) -> Finding {
         let initial = chart.initial();
         let (node, code, message) = match self {
-            Self::NotEntered => {
-                (initial, codes::CHART_NOT_ENTERED, "the coordinator could not be entered: no path from `initial`".to_owned())
-            }
+            Self::NotEntered => (
+                initial,
+                codes::CHART_NOT_ENTERED,
+                "the coordinator could not be entered: no path from `initial`".to_owned(),
+            ),
             Self::Runaway => (
                 NodeId::ROOT,
                 codes::CHART_RUNAWAY,

@@ -76,10 +76,7 @@ fn one_step_raises_one_batch_and_says_who_asked() {
     assert_eq!(log.take(), ["enable_copying<root.copying#1 eight_DOF<root.copying.eight#1"]);
     core.deliver(event("e_5dof"), None, Time(0), &mut log);
     // The undo and the effect belong to the state around both, the push to the state entered; all are one transaction.
-    assert_eq!(
-        log.take(),
-        ["eight_DOF.undo<root.copying#1 switching<root.copying#1 five_DOF<root.copying.five#1"]
-    );
+    assert_eq!(log.take(), ["eight_DOF.undo<root.copying#1 switching<root.copying#1 five_DOF<root.copying.five#1"]);
     core.deliver(event("e_misaligned"), None, Time(0), &mut log);
     assert_eq!(log.take(), ["five_DOF.undo<root#1 enable_copying.undo<root#1"]);
     assert_eq!(core.deliver(event("e_unheard_of"), None, Time(0), &mut log), Delivered::Unmatched);
@@ -195,7 +192,11 @@ fn it_runs_on_its_own_thread_and_is_woken_by_events_and_by_time() {
     assert_eq!(coordinator.active(), ["root", "root.on"]);
     assert!(coordinator.is_active(on) && coordinator.is_active(NodeId::ROOT) && !coordinator.is_active(off));
     let entered = clock.now();
-    assert_eq!(coordinator.wait_for_state(off, entered + Duration::from_secs(2)), Waited::TimedOut, "not *more* than 2 s");
+    assert_eq!(
+        coordinator.wait_for_state(off, entered + Duration::from_secs(2)),
+        Waited::TimedOut,
+        "not *more* than 2 s"
+    );
     assert_eq!(coordinator.wait_for_state(off, Time::NEVER), Waited::Reached);
     assert_eq!(clock.now(), entered + Duration::from_nanos(2_000_000_001));
     assert_eq!(log.take(), ["light<root.on#1"]);
@@ -234,11 +235,7 @@ fn waiting_sees_a_state_that_is_passed_in_one_run() {
 fn detached_it_raises_nothing_more() {
     let clock = Clock::simulated();
     let _guard = clock.enter();
-    let chart = Arc::new(compiled(vec![
-        s("a", vec![Part::Entry("raised")]),
-        t("initial", "a", ""),
-        t("a", "a", "e"),
-    ]));
+    let chart = Arc::new(compiled(vec![s("a", vec![Part::Entry("raised")]), t("initial", "a", ""), t("a", "a", "e")]));
     let a = chart.find("a").unwrap();
     let log = Log::default();
     let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
