@@ -1,0 +1,492 @@
+//! The declaration of a component type, and the making of components, by one and the same constructor.
+//!
+//! [`Component::new`] runs in one of two ways: once *describing* (the builder notes every word), then *making* one
+//! component each time (the builder only hands out ports and properties; docs, units and limits cost nothing).
+
+use super::beat::Beat;
+use super::component::{Answer, Arguments, Component, Context, HookResult, Reply, Returned};
+use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
+use super::property::{Prop, PropEnd};
+use super::value::PortValue;
+use crate::model::{
+    ComponentType, Direction, Effect, EventName, Ident, Irreversible, OperationType, Origin, PortType, PropertyType,
+    Transition, Tunable, TypeName, Value, ValueType,
+};
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+/// A port's end at the configurator.
+pub(crate) enum PortEnd {
+    In(Box<dyn InEnd>),
+    Out(Box<dyn OutEnd>),
+}
+
+pub(crate) type HookFn<C> = fn(&mut C, &mut Context) -> HookResult;
+pub(crate) type OperationFn<C> = Box<dyn Fn(&mut C, &mut Context, &[Value]) -> Option<Reply> + Send + Sync>;
+/// An operation that runs in the caller's thread, beside the component's updates.
+pub(crate) type CallerFn = Arc<dyn Fn(&[Value]) -> Reply + Send + Sync>;
+
+/// What all components of a type share, in terms of their Rust type.
+pub(crate) struct Table<C> {
+    /// Ports in the order of declaration, with the index in the order of names.
+    ports: Vec<(Ident, usize)>,
+    properties: Vec<(Ident, usize)>,
+    /// In the order of names; none: runs in the caller's thread.
+    pub(crate) operations: Vec<Option<OperationFn<C>>>,
+    pub(crate) hooks: [Option<HookFn<C>>; 4],
+}
+
+pub(crate) fn hook_index(transition: Transition) -> usize {
+    match transition {
+        Transition::Configure => 0,
+        Transition::Start => 1,
+        Transition::Stop => 2,
+        Transition::Cleanup => 3,
+    }
+}
+
+/// Declares the members of a component. Words about a member come before it:
+/// `b.doc("Force on the tool.").unit("N").input("f")`.
+pub struct Builder<C> {
+    mode: Mode<C>,
+}
+
+enum Mode<C> {
+    Describe(Box<Description<C>>),
+    Make(Making<C>),
+}
+
+struct Description<C> {
+    ty: ComponentType,
+    words: Words,
+    ports: Vec<Ident>,
+    properties: Vec<Ident>,
+    operations: Vec<(Ident, Option<OperationFn<C>>)>,
+    hooks: [Option<HookFn<C>>; 4],
+}
+
+#[derive(Default)]
+struct Words {
+    doc: String,
+    unit: Option<Arc<str>>,
+    min: Option<f64>,
+    max: Option<f64>,
+    tunable: Tunable,
+    buffered: bool,
+    effect: Option<Effect>,
+}
+
+struct Making<C> {
+    table: Arc<Table<C>>,
+    beat: Arc<Beat>,
+    values: Vec<Value>,
+    made: Ends,
+    next_port: usize,
+    next_property: usize,
+    error: Option<String>,
+}
+
+/// The configurator's ends of one component's members, in the order of names.
+pub(crate) struct Ends {
+    pub(crate) ports: Vec<Option<PortEnd>>,
+    pub(crate) properties: Vec<Option<Box<dyn PropEnd>>>,
+    pub(crate) callers: Vec<(Ident, CallerFn)>,
+}
+
+fn ident(name: &str) -> Ident {
+    Ident::new(name).expect("the name of a member")
+}
+
+impl<C: Component> Builder<C> {
+    /// The type as [`Component::new`] declares it.
+    pub(crate) fn describe_type(name: &str) -> (ComponentType, Table<C>) {
+        let description = Description {
+            ty: ComponentType::new(name, ""),
+            words: Words::default(),
+            ports: Vec::new(),
+            properties: Vec::new(),
+            operations: Vec::new(),
+            hooks: [None; 4],
+        };
+        let mut builder = Self { mode: Mode::Describe(Box::new(description)) };
+        drop(C::new(&mut builder));
+        let Mode::Describe(mut d) = builder.mode else { unreachable!("the mode never changes") };
+        let ports: Vec<Ident> = d.ty.ports.keys().copied().collect();
+        let properties: Vec<Ident> = d.ty.properties.keys().copied().collect();
+        let indexed = |order: &[Ident], sorted: &[Ident]| {
+            order.iter().map(|n| (*n, sorted.binary_search(n).expect("declared"))).collect::<Vec<_>>()
+        };
+        d.operations.sort_by_key(|(name, _)| *name);
+        for operation in d.ty.operations.values() {
+            if let Effect::Undo(undo) = &operation.effect {
+                assert!(d.ty.operations.contains_key(undo), "{name}: there is no operation `{undo}` to undo another");
+            }
+        }
+        let table = Table {
+            ports: indexed(&d.ports, &ports),
+            properties: indexed(&d.properties, &properties),
+            operations: d.operations.into_iter().map(|(_, f)| f).collect(),
+            hooks: d.hooks,
+        };
+        (d.ty, table)
+    }
+
+    /// One component, with these property values (in the order of names).
+    ///
+    /// # Errors
+    /// In words, when a value does not fit its property's Rust type.
+    pub(crate) fn make(
+        table: &Arc<Table<C>>,
+        beat: &Arc<Beat>,
+        values: Vec<Value>,
+    ) -> Result<(C, Ends, Vec<Value>), String> {
+        let mut ports = Vec::with_capacity(table.ports.len());
+        ports.resize_with(table.ports.len(), || None);
+        let mut properties = Vec::with_capacity(table.properties.len());
+        properties.resize_with(table.properties.len(), || None);
+        let made = Ends { ports, properties, callers: Vec::new() };
+        if values.len() != table.properties.len() {
+            return Err(format!("{} values for {} properties", values.len(), table.properties.len()));
+        }
+        let making = Making {
+            table: table.clone(),
+            beat: beat.clone(),
+            values,
+            made,
+            next_port: 0,
+            next_property: 0,
+            error: None,
+        };
+        let mut builder = Self { mode: Mode::Make(making) };
+        let component = C::new(&mut builder);
+        let Mode::Make(making) = builder.mode else { unreachable!("the mode never changes") };
+        match making.error {
+            Some(error) => Err(error),
+            None => Ok((component, making.made, making.values)),
+        }
+    }
+
+    fn words(&mut self, f: impl FnOnce(&mut Words)) -> &mut Self {
+        if let Mode::Describe(d) = &mut self.mode {
+            f(&mut d.words);
+        }
+        self
+    }
+
+    fn ty(&mut self, f: impl FnOnce(&mut ComponentType)) -> &mut Self {
+        if let Mode::Describe(d) = &mut self.mode {
+            f(&mut d.ty);
+        }
+        self
+    }
+
+    // ---- words about the type ----------------------------------------------------------------------------------
+
+    /// What the type is for; `davit types` prints it.
+    pub fn describe(&mut self, doc: &str) -> &mut Self {
+        self.ty(|ty| ty.doc = doc.to_owned())
+    }
+
+    /// It moves something.
+    pub fn actuator(&mut self) -> &mut Self {
+        self.ty(|ty| ty.actuator = true)
+    }
+
+    /// Components of type `other` start before those of this type.
+    ///
+    /// # Panics
+    /// When `other` is no type name.
+    pub fn start_after(&mut self, other: &str) -> &mut Self {
+        self.ty(|ty| ty.start_after.push(TypeName::new(other).expect("a component type's name")))
+    }
+
+    /// Components of type `other` stop after those of this type.
+    ///
+    /// # Panics
+    /// When `other` is no type name.
+    pub fn stop_before(&mut self, other: &str) -> &mut Self {
+        self.ty(|ty| ty.stop_before.push(TypeName::new(other).expect("a component type's name")))
+    }
+
+    /// Which moves of its run state cannot be undone.
+    pub fn irreversible(&mut self, what: Irreversible) -> &mut Self {
+        self.ty(|ty| ty.irreversible = what)
+    }
+
+    // ---- hooks -------------------------------------------------------------------------------------------------
+
+    /// What configuring means: opening a device, reading a file. Runs on a worker, while the component is not running,
+    /// under a deadline. Without it configuring is immediate. All four hooks alike.
+    pub fn on_configure(&mut self, hook: HookFn<C>) -> &mut Self {
+        self.hook(Transition::Configure, hook)
+    }
+
+    /// What starting means; it runs before the first update.
+    pub fn on_start(&mut self, hook: HookFn<C>) -> &mut Self {
+        self.hook(Transition::Start, hook)
+    }
+
+    /// What stopping means; it runs after the last update has ended. When it fails the component runs on.
+    pub fn on_stop(&mut self, hook: HookFn<C>) -> &mut Self {
+        self.hook(Transition::Stop, hook)
+    }
+
+    /// What cleaning up means: closing what configuring opened.
+    pub fn on_cleanup(&mut self, hook: HookFn<C>) -> &mut Self {
+        self.hook(Transition::Cleanup, hook)
+    }
+
+    fn hook(&mut self, transition: Transition, hook: HookFn<C>) -> &mut Self {
+        if let Mode::Describe(d) = &mut self.mode {
+            d.hooks[hook_index(transition)] = Some(hook);
+        }
+        self
+    }
+
+    // ---- words about the next member ---------------------------------------------------------------------------
+
+    /// What the member is.
+    pub fn doc(&mut self, doc: &str) -> &mut Self {
+        self.words(|w| w.doc = doc.to_owned())
+    }
+
+    /// The unit of a port or property.
+    pub fn unit(&mut self, unit: &str) -> &mut Self {
+        self.words(|w| w.unit = Some(Arc::from(unit)))
+    }
+
+    /// The smallest and largest value of a property, of every number in it.
+    pub fn range(&mut self, range: RangeInclusive<f64>) -> &mut Self {
+        self.words(|w| (w.min, w.max) = (Some(*range.start()), Some(*range.end())))
+    }
+
+    /// The smallest value of a property.
+    pub fn min(&mut self, min: f64) -> &mut Self {
+        self.words(|w| w.min = Some(min))
+    }
+
+    /// The largest value of a property.
+    pub fn max(&mut self, max: f64) -> &mut Self {
+        self.words(|w| w.max = Some(max))
+    }
+
+    /// When a property may be set.
+    pub fn tunable(&mut self, tunable: Tunable) -> &mut Self {
+        self.words(|w| w.tunable = tunable)
+    }
+
+    /// The in-port is read as a queue: it takes only buffered connections, any number of them.
+    pub fn buffered(&mut self) -> &mut Self {
+        self.words(|w| w.buffered = true)
+    }
+
+    /// The operation leaves nothing behind that would have to be undone.
+    pub fn no_effect(&mut self) -> &mut Self {
+        self.words(|w| w.effect = Some(Effect::None))
+    }
+
+    /// The operation is undone by another one of the same component.
+    pub fn undone_by(&mut self, operation: &str) -> &mut Self {
+        self.words(|w| w.effect = Some(Effect::Undo(ident(operation))))
+    }
+
+    // ---- members -----------------------------------------------------------------------------------------------
+
+    /// An in-port.
+    pub fn input<T: PortValue>(&mut self, name: &str) -> In<T> {
+        match &mut self.mode {
+            Mode::Describe(d) => {
+                d.port(name, Direction::In, T::value_type());
+                In::loose()
+            }
+            Mode::Make(m) => {
+                let (port, end) = In::new(&m.beat);
+                m.put_port(name, PortEnd::In(end));
+                port
+            }
+        }
+    }
+
+    /// An out-port.
+    pub fn output<T: PortValue>(&mut self, name: &str) -> Out<T> {
+        match &mut self.mode {
+            Mode::Describe(d) => {
+                d.port(name, Direction::Out, T::value_type());
+                Out::loose()
+            }
+            Mode::Make(m) => {
+                let (port, end) = Out::new(&m.beat);
+                m.put_port(name, PortEnd::Out(end));
+                port
+            }
+        }
+    }
+
+    /// An in-port for events: a queue.
+    pub fn event_input(&mut self, name: &str) -> EventIn {
+        self.input(name)
+    }
+
+    /// An out-port for events.
+    pub fn event_output(&mut self, name: &str) -> EventOut {
+        EventOut::over(self.output(name))
+    }
+
+    /// A property with a default.
+    pub fn property<T: PortValue>(&mut self, name: &str, default: T) -> Prop<T> {
+        self.any_property(name, default, true)
+    }
+
+    /// A property that must be given when the component is created. `stand_in` is never anybody's value: it is what the
+    /// component has while its type is described.
+    pub fn required_property<T: PortValue>(&mut self, name: &str, stand_in: T) -> Prop<T> {
+        self.any_property(name, stand_in, false)
+    }
+
+    fn any_property<T: PortValue>(&mut self, name: &str, value: T, is_default: bool) -> Prop<T> {
+        match &mut self.mode {
+            Mode::Describe(d) => {
+                d.property(name, is_default.then(|| value.to_value()), T::value_type(), T::limits());
+                Prop::loose(value)
+            }
+            Mode::Make(m) => {
+                let (index, given) = m.next_value(name);
+                let fitting = given.and_then(T::from_value);
+                if fitting.is_none() {
+                    m.error = Some(format!("the value given for `{name}` does not fit"));
+                }
+                let (property, end) = Prop::new(fitting.unwrap_or(value));
+                m.made.properties[index] = Some(end);
+                property
+            }
+        }
+    }
+
+    /// An operation, run in the component's own activity between two updates (on a worker while it is not running).
+    ///
+    /// The function is the type's, not the component's: it gets the component as its first argument.
+    pub fn operation<A: Arguments, R: Returned>(
+        &mut self,
+        name: &str,
+        f: impl Fn(&mut C, &mut Context, A) -> Answer<R> + Send + Sync + 'static,
+    ) -> &mut Self {
+        if let Mode::Describe(d) = &mut self.mode {
+            let erased: OperationFn<C> = Box::new(move |component, cx, args| {
+                let Some(args) = A::from_values(args) else {
+                    return Some(Reply::Refused("an argument does not fit".to_owned()));
+                };
+                match f(component, cx, args) {
+                    Answer::Done(value) => Some(Reply::Done(value.into_value())),
+                    Answer::Failed(text) => Some(Reply::Failed(text)),
+                    Answer::Pending => None,
+                }
+            });
+            d.operation(name, A::types(), R::value_type(), Some(erased));
+        }
+        self
+    }
+
+    /// An operation that runs in the caller's thread, also while the component is updated: it answers for its own
+    /// synchronisation, and so gets nothing but what it captures. It never answers [`Answer::Pending`].
+    pub fn caller_operation<A: Arguments, R: Returned>(
+        &mut self,
+        name: &str,
+        f: impl Fn(A) -> Answer<R> + Send + Sync + 'static,
+    ) -> &mut Self {
+        match &mut self.mode {
+            Mode::Describe(d) => d.operation(name, A::types(), R::value_type(), None),
+            Mode::Make(m) => {
+                let erased: CallerFn = Arc::new(move |args| match A::from_values(args).map(&f) {
+                    None => Reply::Refused("an argument does not fit".to_owned()),
+                    Some(Answer::Done(value)) => Reply::Done(value.into_value()),
+                    Some(Answer::Failed(text)) => Reply::Failed(text),
+                    Some(Answer::Pending) => Reply::Failed("it cannot answer later".to_owned()),
+                });
+                m.made.callers.push((ident(name), erased));
+            }
+        }
+        self
+    }
+
+    /// An event's name, to be raised later.
+    ///
+    /// # Panics
+    /// When `name` is no event name.
+    pub fn event(&self, name: &str) -> EventName {
+        EventName::new(name).expect("an event's name")
+    }
+}
+
+impl<C> Description<C> {
+    fn port(&mut self, name: &str, direction: Direction, ty: ValueType) {
+        let words = std::mem::take(&mut self.words);
+        let name = ident(name);
+        let port = PortType {
+            direction,
+            ty,
+            unit: words.unit,
+            buffered: words.buffered,
+            doc: words.doc,
+            origin: Origin::NONE,
+        };
+        assert!(self.ty.ports.insert(name, port).is_none(), "{}: `{name}` is declared twice", self.ty.name);
+        self.ports.push(name);
+    }
+
+    fn property(&mut self, name: &str, default: Option<Value>, ty: ValueType, limits: Option<(f64, f64)>) {
+        let words = std::mem::take(&mut self.words);
+        let name = ident(name);
+        let mut property = PropertyType {
+            ty,
+            default: None,
+            min: words.min.or(limits.map(|l| l.0)),
+            max: words.max.or(limits.map(|l| l.1)),
+            tunable: words.tunable,
+            unit: words.unit,
+            doc: words.doc,
+            origin: Origin::NONE,
+        };
+        property.default = default.map(|value| match property.fit(value) {
+            Ok(value) => value,
+            Err(error) => panic!("{}: the default of `{name}`: {error}", self.ty.name),
+        });
+        assert!(self.ty.properties.insert(name, property).is_none(), "{}: `{name}` is declared twice", self.ty.name);
+        self.properties.push(name);
+    }
+
+    fn operation(
+        &mut self,
+        name: &str,
+        args: Vec<ValueType>,
+        returns: Option<ValueType>,
+        f: Option<OperationFn<C>>,
+    ) {
+        let words = std::mem::take(&mut self.words);
+        let name = ident(name);
+        let effect = words.effect.unwrap_or(Effect::Irreversible);
+        let operation = OperationType { args, returns, effect, doc: words.doc, origin: Origin::NONE };
+        assert!(self.ty.operations.insert(name, operation).is_none(), "{}: `{name}` is declared twice", self.ty.name);
+        self.operations.push((name, f));
+    }
+}
+
+impl<C> Making<C> {
+    fn put_port(&mut self, name: &str, end: PortEnd) {
+        let (declared, index) = self.table.ports.get(self.next_port).copied().unwrap_or_else(|| undeclared(name));
+        assert!(declared.as_str() == name, "declared `{name}` where the type has `{declared}`");
+        self.next_port += 1;
+        self.made.ports[index] = Some(end);
+    }
+
+    fn next_value(&mut self, name: &str) -> (usize, Option<&Value>) {
+        let next = self.table.properties.get(self.next_property).copied();
+        let (declared, index) = next.unwrap_or_else(|| undeclared(name));
+        assert!(declared.as_str() == name, "declared `{name}` where the type has `{declared}`");
+        self.next_property += 1;
+        (index, self.values.get(index))
+    }
+}
+
+fn undeclared(name: &str) -> ! {
+    panic!("declared `{name}`, which was not declared when the type was described")
+}

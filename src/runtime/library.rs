@@ -1,0 +1,196 @@
+//! Libraries: named sets of component types. A catalogue starts nothing.
+
+use super::beat::Beat;
+use super::builder::{Builder, Ends, Table, hook_index};
+use super::component::{Component, Context, HookResult, Reply};
+use crate::model::{Catalogue, ComponentType, Ident, Transition, TypeName, Value};
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// A component, without its Rust type.
+pub(crate) trait Body: Send {
+    fn update(&mut self, cx: &mut Context);
+    fn hook(&mut self, transition: Transition, cx: &mut Context) -> HookResult;
+    /// Calls the operation of that index; none: it will answer by its ticket.
+    fn operation(&mut self, index: usize, args: &[Value], cx: &mut Context) -> Option<Reply>;
+}
+
+struct Typed<C> {
+    component: C,
+    table: Arc<Table<C>>,
+}
+
+impl<C: Component> Body for Typed<C> {
+    fn update(&mut self, cx: &mut Context) {
+        self.component.update(cx);
+    }
+
+    fn hook(&mut self, transition: Transition, cx: &mut Context) -> HookResult {
+        match self.table.hooks[hook_index(transition)] {
+            Some(hook) => hook(&mut self.component, cx),
+            None => Ok(()),
+        }
+    }
+
+    fn operation(&mut self, index: usize, args: &[Value], cx: &mut Context) -> Option<Reply> {
+        match self.table.operations.get(index) {
+            Some(Some(f)) => f(&mut self.component, cx, args),
+            _ => Some(Reply::Refused("there is no such operation here".to_owned())),
+        }
+    }
+}
+
+/// A component with the configurator's ends of its members and the values of its properties.
+pub(crate) struct Made {
+    pub(crate) body: Box<dyn Body>,
+    pub(crate) ends: Ends,
+    pub(crate) values: Vec<Value>,
+}
+
+type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<Made, String> + Send + Sync>;
+
+/// A component type that this program can make.
+pub struct Kind {
+    /// Its description.
+    pub ty: Arc<ComponentType>,
+    /// Which transitions call the component's own code; the others are immediate.
+    hooks: [bool; 4],
+    /// Ports and properties by name, in the order of the ends.
+    pub(crate) ports: Vec<Ident>,
+    pub(crate) properties: Vec<Ident>,
+    pub(crate) operations: Vec<Ident>,
+    make: Maker,
+}
+
+impl std::fmt::Debug for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Kind({})", self.ty.name)
+    }
+}
+
+impl Kind {
+    /// The type that `C` declares, under a name.
+    ///
+    /// # Panics
+    /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits. A library
+    /// is written by a programmer and described at every start of the program.
+    pub fn of<C: Component>(name: &str) -> Self {
+        let (ty, table) = Builder::<C>::describe_type(name);
+        let table = Arc::new(table);
+        let hooks = table.hooks.map(|hook| hook.is_some());
+        let (ports, properties) = (ty.ports.keys().copied().collect(), ty.properties.keys().copied().collect());
+        let operations = ty.operations.keys().copied().collect();
+        let make: Maker = Box::new(move |beat, values| {
+            let (component, ends, values) = Builder::make(&table, beat, values)?;
+            Ok(Made { body: Box::new(Typed { component, table: table.clone() }), ends, values })
+        });
+        Self { ty: Arc::new(ty), hooks, ports, properties, operations, make }
+    }
+
+    /// Whether the transition calls the component's own code.
+    pub fn has_hook(&self, transition: Transition) -> bool {
+        self.hooks[hook_index(transition)]
+    }
+
+    pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<Made, String> {
+        (self.make)(beat, values)
+    }
+}
+
+/// A named set of component types.
+#[derive(Debug, Clone)]
+pub struct Library {
+    name: Ident,
+    kinds: Vec<Arc<Kind>>,
+}
+
+impl Library {
+    /// An empty library.
+    ///
+    /// # Panics
+    /// When `name` is no plain name.
+    pub fn new(name: &str) -> Self {
+        Self { name: Ident::new(name).expect("a library's name"), kinds: Vec::new() }
+    }
+
+    /// With the component type `C`, under the name that deployments use: `Gain`, `youbot.Dynamics`.
+    ///
+    /// # Panics
+    /// When the declaration is wrong; see [`Kind::of`].
+    #[must_use]
+    pub fn with<C: Component>(mut self, type_name: &str) -> Self {
+        self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
+        self
+    }
+
+    /// Its name.
+    pub fn name(&self) -> Ident {
+        self.name
+    }
+
+    /// Its types.
+    pub fn kinds(&self) -> &[Arc<Kind>] {
+        &self.kinds
+    }
+
+    /// Its types' descriptions.
+    pub fn catalogue(&self) -> Catalogue {
+        let mut catalogue = Catalogue::new();
+        for kind in &self.kinds {
+            catalogue.insert(kind.ty.clone());
+        }
+        catalogue
+    }
+}
+
+/// The libraries a program has built in.
+#[derive(Debug, Clone, Default)]
+pub struct Libraries(Vec<Library>);
+
+impl Libraries {
+    /// None.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// With one more; a later library's type replaces an earlier one's of the same name, a later library an earlier one
+    /// of the same name.
+    #[must_use]
+    pub fn with(mut self, library: Library) -> Self {
+        self.0.retain(|other| other.name != library.name);
+        self.0.push(library);
+        self
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Library> {
+        self.0.iter()
+    }
+
+    /// The library of that name.
+    pub fn get(&self, name: Ident) -> Option<&Library> {
+        self.0.iter().find(|library| library.name == name)
+    }
+
+    /// Only those named, in this order.
+    ///
+    /// # Errors
+    /// The first name that is none of a library.
+    pub fn select(&self, names: &[Ident]) -> Result<Self, Ident> {
+        names.iter().map(|name| self.get(*name).cloned().ok_or(*name)).collect::<Result<Vec<_>, _>>().map(Self)
+    }
+
+    /// All types' descriptions.
+    pub fn catalogue(&self) -> Catalogue {
+        let mut catalogue = Catalogue::new();
+        for library in &self.0 {
+            catalogue.extend(&library.catalogue());
+        }
+        catalogue
+    }
+
+    /// All types by name.
+    pub(crate) fn kinds(&self) -> FxHashMap<TypeName, Arc<Kind>> {
+        self.0.iter().flat_map(|library| &library.kinds).map(|kind| (kind.ty.name, kind.clone())).collect()
+    }
+}

@@ -1,0 +1,250 @@
+//! The links of a port: a list that the component's thread owns and that the configurator changes while it runs.
+//!
+//! The configurator leaves orders (add, remove) in an inbox; the owner takes them all with one exchange before it uses the
+//! list, and leaves what it no longer needs in an outbox, where the configurator picks it up. So no thread ever waits for
+//! another, and the owner neither allocates nor frees: nodes are made and dropped by the configurator.
+//!
+//! There is one owner and, at a time, one configurator (the embedded platform's registry lock sees to it; [`Sender`] needs
+//! `&mut`).
+
+use std::ptr::null_mut;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicPtr, Ordering};
+
+struct Node<L> {
+    next: Option<Box<Self>>,
+    id: u64,
+    /// The link to add; none: remove the one with this number.
+    link: Option<L>,
+}
+
+struct Boxes<L> {
+    /// Orders, oldest first. Filled by the configurator, emptied by either.
+    inbox: AtomicPtr<Node<L>>,
+    /// What may be dropped. Filled by the owner, emptied by the configurator.
+    outbox: AtomicPtr<Node<L>>,
+}
+
+// SAFETY: the pointers are owned chains of boxes, handed over whole by acquire-release exchanges.
+unsafe impl<L: Send> Sync for Boxes<L> {}
+unsafe impl<L: Send> Send for Boxes<L> {}
+
+fn take<L>(slot: &AtomicPtr<Node<L>>) -> Option<Box<Node<L>>> {
+    let taken = slot.swap(null_mut(), Ordering::AcqRel);
+    // SAFETY: what is not null came from `put` below and has just been taken out: it is ours alone.
+    (!taken.is_null()).then(|| unsafe { Box::from_raw(taken) })
+}
+
+/// Puts a chain in an empty slot. Only one side fills a slot, and the other only empties it, so it is still empty.
+fn put<L>(slot: &AtomicPtr<Node<L>>, chain: Option<Box<Node<L>>>) {
+    if let Some(chain) = chain {
+        slot.store(Box::into_raw(chain), Ordering::Release);
+    }
+}
+
+/// Frees a chain one node at a time: the compiler's own drop would recurse.
+fn free<L>(mut chain: Option<Box<Node<L>>>) {
+    while let Some(mut node) = chain {
+        chain = node.next.take();
+    }
+}
+
+impl<L> Drop for Boxes<L> {
+    fn drop(&mut self) {
+        free(take(&self.inbox));
+        free(take(&self.outbox));
+    }
+}
+
+/// The configurator's side.
+pub struct Sender<L>(Arc<Boxes<L>>);
+
+/// The owner's side.
+pub struct Links<L> {
+    boxes: Arc<Boxes<L>>,
+    first: Option<Box<Node<L>>>,
+}
+
+/// An empty list.
+pub fn links<L>() -> (Sender<L>, Links<L>) {
+    let boxes = Arc::new(Boxes { inbox: AtomicPtr::new(null_mut()), outbox: AtomicPtr::new(null_mut()) });
+    (Sender(boxes.clone()), Links { boxes, first: None })
+}
+
+impl<L> Sender<L> {
+    /// Adds a link at the end of the list.
+    pub fn add(&mut self, id: u64, link: L) {
+        self.order(Box::new(Node { next: None, id, link: Some(link) }));
+    }
+
+    /// Removes the link of that number.
+    pub fn remove(&mut self, id: u64) {
+        self.order(Box::new(Node { next: None, id, link: None }));
+    }
+
+    fn order(&mut self, node: Box<Node<L>>) {
+        free(take(&self.0.outbox));
+        let mut chain = take(&self.0.inbox);
+        // A link the owner has not even seen is taken back: orders of a port that nobody uses do not pile up.
+        if node.link.is_none() && remove_from(&mut chain, node.id).is_some() {
+            put(&self.0.inbox, chain);
+            return;
+        }
+        append(&mut chain, node);
+        put(&self.0.inbox, chain);
+    }
+}
+
+fn append<L>(chain: &mut Option<Box<Node<L>>>, node: Box<Node<L>>) {
+    let mut end = chain;
+    while let Some(next) = end {
+        end = &mut next.next;
+    }
+    *end = Some(node);
+}
+
+fn remove_from<L>(chain: &mut Option<Box<Node<L>>>, id: u64) -> Option<Box<Node<L>>> {
+    let mut at = chain;
+    while at.as_ref().is_some_and(|node| node.id != id || node.link.is_none()) {
+        at = &mut at.as_mut().expect("looked at just now").next;
+    }
+    let mut removed = at.take()?;
+    *at = removed.next.take();
+    Some(removed)
+}
+
+impl<L> Links<L> {
+    /// Follows the orders that have come. One load when there are none.
+    #[inline]
+    pub fn refresh(&mut self) -> bool {
+        if self.boxes.inbox.load(Ordering::Relaxed).is_null() {
+            return false;
+        }
+        self.follow();
+        true
+    }
+
+    #[cold]
+    fn follow(&mut self) {
+        let mut orders = take(&self.boxes.inbox);
+        let mut waste = take(&self.boxes.outbox);
+        while let Some(mut order) = orders {
+            orders = order.next.take();
+            if order.link.is_some() {
+                append(&mut self.first, order);
+            } else {
+                if let Some(mut removed) = remove_from(&mut self.first, order.id) {
+                    removed.next = waste;
+                    waste = Some(removed);
+                }
+                order.next = waste;
+                waste = Some(order);
+            }
+        }
+        put(&self.boxes.outbox, waste);
+    }
+
+    /// The first link.
+    #[inline]
+    pub fn first_mut(&mut self) -> Option<&mut L> {
+        self.first.as_mut().and_then(|node| node.link.as_mut())
+    }
+
+    /// All links, in the order in which they were added.
+    #[inline]
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut L> {
+        let mut next = self.first.as_deref_mut();
+        std::iter::from_fn(move || {
+            let node = next.take()?;
+            next = node.next.as_deref_mut();
+            node.link.as_mut()
+        })
+    }
+}
+
+impl<L> Drop for Links<L> {
+    fn drop(&mut self) {
+        free(self.first.take());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(list: &mut Links<u64>) -> Vec<u64> {
+        list.refresh();
+        list.iter_mut().map(|l| *l).collect()
+    }
+
+    #[test]
+    fn orders_are_followed_in_order() {
+        let (mut sender, mut list) = links();
+        assert!(!list.refresh());
+        sender.add(1, 10);
+        sender.add(2, 20);
+        sender.add(3, 30);
+        sender.remove(2);
+        assert_eq!(seen(&mut list), [10, 30]);
+        sender.remove(1);
+        sender.add(1, 11);
+        assert_eq!(seen(&mut list), [30, 11]);
+        sender.remove(7);
+        sender.remove(3);
+        sender.remove(1);
+        assert_eq!(seen(&mut list), [] as [u64; 0]);
+    }
+
+    #[test]
+    fn orders_nobody_follows_do_not_pile_up() {
+        let (mut sender, mut list) = links();
+        for id in 0..100_000 {
+            sender.add(id, id);
+            sender.remove(id);
+        }
+        sender.add(7, 7);
+        assert_eq!(seen(&mut list), [7]);
+    }
+
+    #[test]
+    fn links_are_dropped_once_wherever_they_are() {
+        let counter = Arc::new(());
+        let (mut sender, mut list) = links();
+        for id in 0..4 {
+            sender.add(id, counter.clone());
+        }
+        list.refresh();
+        sender.remove(1);
+        sender.add(9, counter.clone());
+        list.refresh();
+        sender.remove(2);
+        sender.add(10, counter.clone());
+        assert_eq!(Arc::strong_count(&counter), 1 + 4 - 1 + 2);
+        drop(list);
+        drop(sender);
+        assert_eq!(Arc::strong_count(&counter), 1);
+    }
+
+    #[test]
+    fn a_list_changed_while_it_is_used() {
+        let (mut sender, mut list) = links::<u64>();
+        let thread = std::thread::spawn(move || {
+            for round in 0..20_000 {
+                sender.add(round, round);
+                if round >= 3 {
+                    sender.remove(round - 3);
+                }
+            }
+            sender.add(u64::MAX, u64::MAX);
+        });
+        loop {
+            let now = seen(&mut list);
+            assert!(now.windows(2).all(|pair| pair[0] < pair[1]) && now.len() <= 5, "{now:?}");
+            if now.last() == Some(&u64::MAX) {
+                assert_eq!(now.len(), 4);
+                break;
+            }
+        }
+        thread.join().unwrap();
+    }
+}

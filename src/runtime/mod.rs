@@ -1,0 +1,26 @@
+//! The embedded component runtime (design §11): components as Rust types in this process.
+//!
+//! For those who write components: [`Component`], [`Builder`], the ports [`In`], [`Out`], [`EventOut`], [`Prop`],
+//! [`Context`], [`Answer`]; [`record!`](crate::record) for structs that travel through ports; [`Library`] to give types to
+//! a program. For those who run them: the platform adapter `platform::embedded`.
+//!
+//! What is absent: a running component shares no lock with the configurator; a component knows no other component, no
+//! configuration and no coordinator; nothing reads a clock but the one it was given.
+
+pub mod beat;
+pub mod builder;
+pub mod component;
+pub mod latest;
+pub mod library;
+pub mod links;
+pub mod port;
+pub mod property;
+pub mod value;
+
+pub use beat::{Notice, NoticeSink, Notices};
+pub use builder::Builder;
+pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, Returned, Ticket};
+pub use library::{Kind, Libraries, Library};
+pub use port::{EventIn, EventOut, In, Out, Sample};
+pub use property::Prop;
+pub use value::PortValue;

@@ -1,0 +1,280 @@
+//! Rust types as values of the model: what travels through ports, is a property, an argument or a result.
+
+use crate::model::{EventName, Ident, Value, ValueType};
+use std::sync::Arc;
+
+/// A Rust type whose values are values of the model. Implemented for `bool`, the integer types, `f64`, `f32`, `String`,
+/// `Arc<str>`, [`EventName`], arrays, `Vec`, nalgebra's `SVector` (`float[N]`) and structs made with [`record!`](crate::record).
+///
+/// Two Rust types of the same [`ValueType`] (`i32` and `i64`; `[f64; 3]` and `Vector3<f64>`) may be connected; samples
+/// are then converted on their way, which costs an allocation or more. Ports of one Rust type convert nothing.
+pub trait PortValue: Clone + Send + 'static {
+    /// The model's type of these values.
+    fn value_type() -> ValueType;
+
+    /// The value.
+    fn to_value(&self) -> Value;
+
+    /// The value as this type; none when it is not of [`PortValue::value_type`], or does not fit (300 is no `u8`).
+    fn from_value(value: &Value) -> Option<Self>;
+}
+
+impl PortValue for bool {
+    fn value_type() -> ValueType {
+        ValueType::Bool
+    }
+    fn to_value(&self) -> Value {
+        Value::Bool(*self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Bool(v) => Some(*v),
+            _ => None,
+        }
+    }
+}
+
+macro_rules! integers {
+    ($($ty:ty),*) => {$(
+        impl PortValue for $ty {
+            fn value_type() -> ValueType {
+                ValueType::Int
+            }
+            /// The largest `int` stands for what is larger still.
+            fn to_value(&self) -> Value {
+                Value::Int(i64::try_from(*self).unwrap_or(i64::MAX))
+            }
+            fn from_value(value: &Value) -> Option<Self> {
+                match value {
+                    Value::Int(v) => Self::try_from(*v).ok(),
+                    _ => None,
+                }
+            }
+        }
+    )*};
+}
+integers!(i8, i16, i32, i64, u8, u16, u32, u64, usize);
+
+impl PortValue for f64 {
+    fn value_type() -> ValueType {
+        ValueType::Float
+    }
+    fn to_value(&self) -> Value {
+        Value::Float(*self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_f64()
+    }
+}
+
+impl PortValue for f32 {
+    fn value_type() -> ValueType {
+        ValueType::Float
+    }
+    fn to_value(&self) -> Value {
+        Value::Float(f64::from(*self))
+    }
+    #[allow(clippy::cast_possible_truncation)]
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_f64().map(|v| v as Self)
+    }
+}
+
+impl PortValue for String {
+    fn value_type() -> ValueType {
+        ValueType::Str
+    }
+    fn to_value(&self) -> Value {
+        Value::str(self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Str(v) => Some(v.to_string()),
+            _ => None,
+        }
+    }
+}
+
+impl PortValue for Arc<str> {
+    fn value_type() -> ValueType {
+        ValueType::Str
+    }
+    fn to_value(&self) -> Value {
+        Value::Str(self.clone())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Str(v) => Some(v.clone()),
+            _ => None,
+        }
+    }
+}
+
+impl PortValue for EventName {
+    fn value_type() -> ValueType {
+        ValueType::Event
+    }
+    fn to_value(&self) -> Value {
+        Value::str(self.as_str())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Str(v) => Self::new(v).ok(),
+            _ => None,
+        }
+    }
+}
+
+impl<T: PortValue, const N: usize> PortValue for [T; N] {
+    fn value_type() -> ValueType {
+        ValueType::Array(Box::new(T::value_type()), Some(N))
+    }
+    fn to_value(&self) -> Value {
+        Value::Array(self.iter().map(T::to_value).collect())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        let Value::Array(values) = value else { return None };
+        if values.len() != N {
+            return None;
+        }
+        let mut fits = true;
+        let converted: [Option<T>; N] = std::array::from_fn(|i| {
+            let element = T::from_value(&values[i]);
+            fits &= element.is_some();
+            element
+        });
+        fits.then(|| converted.map(|element| element.expect("all elements fit")))
+    }
+}
+
+impl<T: PortValue> PortValue for Vec<T> {
+    fn value_type() -> ValueType {
+        ValueType::Array(Box::new(T::value_type()), None)
+    }
+    fn to_value(&self) -> Value {
+        Value::Array(self.iter().map(T::to_value).collect())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Array(values) => values.iter().map(T::from_value).collect(),
+            _ => None,
+        }
+    }
+}
+
+impl<const N: usize> PortValue for nalgebra::SVector<f64, N> {
+    fn value_type() -> ValueType {
+        <[f64; N]>::value_type()
+    }
+    fn to_value(&self) -> Value {
+        Value::floats(self.as_slice())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        <[f64; N]>::from_value(value).map(Self::from)
+    }
+}
+
+/// The field `name` of a record, for [`record!`](crate::record).
+#[doc(hidden)]
+pub fn field<T: PortValue>(value: &Value, name: &str) -> Option<T> {
+    match value {
+        Value::Record(fields) => fields.iter().find(|(n, _)| n.as_str() == name).and_then(|(_, v)| T::from_value(v)),
+        _ => None,
+    }
+}
+
+/// The name of a field, for [`record!`](crate::record).
+#[doc(hidden)]
+pub fn field_name(name: &str) -> Ident {
+    Ident::new(name).expect("a Rust field's name is a name")
+}
+
+/// Structs that are records of the model: `{pos: float[5], stamp: float}`.
+///
+/// ```
+/// davit::record! {
+///     /// What the joints measure.
+///     #[derive(Copy, Default)]
+///     pub struct JointState {
+///         /// Angles, rad.
+///         pub pos: [f64; 5],
+///         /// Speeds, rad/s.
+///         pub vel: [f64; 5],
+///     }
+/// }
+/// use davit::runtime::PortValue;
+/// assert_eq!(JointState::value_type().to_string(), "{pos: float[5], vel: float[5]}");
+/// ```
+///
+/// `Debug`, `Clone` and `PartialEq` are derived; more may be asked for.
+#[macro_export]
+macro_rules! record {
+    ($($(#[$attribute:meta])* $vis:vis struct $name:ident {
+        $($(#[$field_attribute:meta])* $field_vis:vis $field:ident : $ty:ty),+ $(,)?
+    })+) => {$(
+        $(#[$attribute])*
+        #[derive(Debug, Clone, PartialEq)]
+        $vis struct $name {
+            $($(#[$field_attribute])* $field_vis $field: $ty,)+
+        }
+
+        impl $crate::runtime::PortValue for $name {
+            fn value_type() -> $crate::model::ValueType {
+                $crate::model::ValueType::Record(vec![$((
+                    $crate::runtime::value::field_name(stringify!($field)),
+                    <$ty as $crate::runtime::PortValue>::value_type(),
+                )),+])
+            }
+            fn to_value(&self) -> $crate::model::Value {
+                $crate::model::Value::Record(vec![$((
+                    $crate::runtime::value::field_name(stringify!($field)),
+                    $crate::runtime::PortValue::to_value(&self.$field),
+                )),+])
+            }
+            fn from_value(value: &$crate::model::Value) -> Option<Self> {
+                Some(Self { $($field: $crate::runtime::value::field(value, stringify!($field))?),+ })
+            }
+        }
+    )+};
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Debug;
+
+    crate::record! {
+        struct Pose {
+            at: [f64; 3],
+            id: u8,
+        }
+    }
+
+    fn there_and_back<T: PortValue + PartialEq + Debug>(v: &T) {
+        let value = v.to_value();
+        assert!(value.is_of(&T::value_type()), "{value} is no {}", T::value_type());
+        assert_eq!(T::from_value(&value).as_ref(), Some(v));
+    }
+
+    #[test]
+    fn values_come_back() {
+        there_and_back(&true);
+        there_and_back(&-3_i32);
+        there_and_back(&2.5);
+        there_and_back(&"text".to_owned());
+        there_and_back(&[[1.0, 2.0], [3.0, 4.0]]);
+        there_and_back(&vec![1_u8, 2, 3]);
+        there_and_back(&nalgebra::Vector3::new(1.0, 2.0, 3.0));
+        there_and_back(&EventName::new("e_done").unwrap());
+        there_and_back(&vec![Pose { at: [1.0, 2.0, 3.0], id: 7 }]);
+        assert_eq!(Pose::value_type().to_string(), "{at: float[3], id: int}");
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        assert_eq!(u8::from_value(&Value::Int(300)), None);
+        assert_eq!(<[f64; 2]>::from_value(&Value::floats(&[1.0])), None);
+        assert_eq!(<[u8; 2]>::from_value(&Value::Array(vec![Value::Int(1), Value::Int(-1)])), None);
+        assert_eq!(Pose::from_value(&Value::Record(vec![])), None);
+    }
+}
