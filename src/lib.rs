@@ -8,6 +8,7 @@ pub mod libraries;
 pub mod limits;
 pub mod model;
 pub mod platform;
+pub mod runtime;
 pub mod session;
 pub mod statechart;
 pub mod time;

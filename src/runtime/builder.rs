@@ -454,13 +454,7 @@ impl<C> Description<C> {
         self.properties.push(name);
     }
 
-    fn operation(
-        &mut self,
-        name: &str,
-        args: Vec<ValueType>,
-        returns: Option<ValueType>,
-        f: Option<OperationFn<C>>,
-    ) {
+    fn operation(&mut self, name: &str, args: Vec<ValueType>, returns: Option<ValueType>, f: Option<OperationFn<C>>) {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);
         let effect = words.effect.unwrap_or(Effect::Irreversible);

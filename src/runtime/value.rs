@@ -17,6 +17,11 @@ pub trait PortValue: Clone + Send + 'static {
 
     /// The value as this type; none when it is not of [`PortValue::value_type`], or does not fit (300 is no `u8`).
     fn from_value(value: &Value) -> Option<Self>;
+
+    /// The smallest and largest number a Rust type can hold where the model's type holds more; they limit properties.
+    fn limits() -> Option<(f64, f64)> {
+        None
+    }
 }
 
 impl PortValue for bool {
@@ -49,6 +54,13 @@ macro_rules! integers {
                     Value::Int(v) => Self::try_from(*v).ok(),
                     _ => None,
                 }
+            }
+            #[allow(clippy::cast_precision_loss, clippy::cast_lossless)]
+            fn limits() -> Option<(f64, f64)> {
+                (Self::BITS < 64 || Self::MIN == 0).then(|| {
+                    // The model's numbers end where an i64 does; the largest f64 below that is 2^63 - 1024.
+                    (Self::MIN as f64, (Self::MAX as f64).min(9_223_372_036_854_774_784.0))
+                })
             }
         }
     )*};
@@ -145,6 +157,9 @@ impl<T: PortValue, const N: usize> PortValue for [T; N] {
         });
         fits.then(|| converted.map(|element| element.expect("all elements fit")))
     }
+    fn limits() -> Option<(f64, f64)> {
+        T::limits()
+    }
 }
 
 impl<T: PortValue> PortValue for Vec<T> {
@@ -159,6 +174,9 @@ impl<T: PortValue> PortValue for Vec<T> {
             Value::Array(values) => values.iter().map(T::from_value).collect(),
             _ => None,
         }
+    }
+    fn limits() -> Option<(f64, f64)> {
+        T::limits()
     }
 }
 
