@@ -4,6 +4,8 @@
 pub mod cli;
 pub mod coordinator;
 pub mod draw;
+pub mod diagnostics;
+pub mod lang;
 pub mod libraries;
 pub mod limits;
 pub mod model;

@@ -44,3 +44,33 @@ pub const INBOX_CONTROL: usize = 1024;
 /// Events of monitors and components that may wait for a coordinator: some milliseconds of reacting. What waits longer is
 /// no news any more.
 pub const INBOX_REPORT: usize = 4096;
+
+/// Findings shown on a terminal in one go; more are counted, since nobody reads on.
+pub const FINDINGS_SHOWN: usize = 50;
+
+/// Bytes of one text file. A generated deployment of 100,000 components takes about 10 MB; a file past this is refused
+/// by its size, before it is read.
+pub const FILE_BYTES: u64 = 32 * 1024 * 1024;
+
+/// Levels of nesting of a text: values and statecharts written by people stay below ten.
+pub const TEXT_DEPTH: usize = 64;
+
+/// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
+pub const TEXT_NODES: usize = 4_000_000;
+
+/// Findings collected from the texts of one deployment; past it reading stops, since the rest follows from the first.
+pub const FINDINGS: usize = 1_000;
+
+/// Instructions of the Lua machine one file may take. A written configuration takes a few; a generated deployment of
+/// 100,000 components some millions.
+pub const LUA_INSTRUCTIONS: u64 = 20_000_000;
+
+/// Bytes the Lua state of one file may hold.
+pub const LUA_BYTES: usize = 128 * 1024 * 1024;
+
+/// Longest time one Lua file may run: the backstop for library calls, which count as one instruction however long they
+/// take.
+pub const LUA_TIME: Duration = Duration::from_millis(1500);
+
+/// Longest string the Lua library functions make at once, in bytes.
+pub const LUA_STRING: usize = 1024 * 1024;

@@ -1,0 +1,192 @@
+//! Finding tokens in a text: how far a Lua call reaches, and where a word stands in it.
+
+use std::ops::Range;
+
+/// A token of Lua, as far as places need it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Token {
+    Name,
+    /// A string with the range of its content.
+    Text(Range<usize>),
+    Open,
+    Close,
+    Other,
+}
+
+/// Length of a long bracket's opening (`[[`, `[==[`) at `at`, with its level.
+fn long_bracket(text: &[u8], at: usize) -> Option<(usize, usize)> {
+    let level = text.get(at + 1..)?.iter().take_while(|b| **b == b'=').count();
+    (text.get(at) == Some(&b'[') && text.get(at + 1 + level) == Some(&b'[')).then_some((level + 2, level))
+}
+
+/// The end of the content of a long bracket, and the end of the bracket.
+fn long_end(text: &[u8], from: usize, level: usize) -> (usize, usize) {
+    let mut i = from;
+    while i < text.len() {
+        let closes = text[i] == b']'
+            && text[i + 1..].iter().take(level).filter(|b| **b == b'=').count() == level
+            && text.get(i + 1 + level) == Some(&b']');
+        if closes {
+            return (i, i + level + 2);
+        }
+        i += 1;
+    }
+    (text.len(), text.len())
+}
+
+/// The next token at or after `at`, with its bytes; none at the end. Comments are skipped.
+fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, Token)> {
+    loop {
+        let byte = *text.get(at)?;
+        if byte.is_ascii_whitespace() {
+            at += 1;
+        } else if text[at..].starts_with(b"--") {
+            at = match long_bracket(text, at + 2) {
+                Some((length, level)) => long_end(text, at + 2 + length, level).1,
+                None => text[at..].iter().position(|b| *b == b'\n').map_or(text.len(), |n| at + n),
+            };
+        } else if byte.is_ascii_alphabetic() || byte == b'_' {
+            let length = text[at..].iter().take_while(|b| b.is_ascii_alphanumeric() || **b == b'_').count();
+            return Some((at..at + length, Token::Name));
+        } else if byte == b'"' || byte == b'\'' {
+            let mut end = at + 1;
+            while end < text.len() && text[end] != byte && text[end] != b'\n' {
+                end += if text[end] == b'\\' { 2 } else { 1 };
+            }
+            let end = end.min(text.len());
+            return Some((at..(end + 1).min(text.len()), Token::Text(at + 1..end)));
+        } else if let Some((length, level)) = long_bracket(text, at) {
+            let (content, end) = long_end(text, at + length, level);
+            return Some((at..end, Token::Text(at + length..content)));
+        } else {
+            let token = match byte {
+                b'(' | b'{' | b'[' => Token::Open,
+                b')' | b'}' | b']' => Token::Close,
+                _ => Token::Other,
+            };
+            return Some((at..at + 1, token));
+        }
+    }
+}
+
+/// From the start of `span` (a name that is called) to the bracket that closes the call, with `:undo(…)` after it.
+pub fn balanced(text: &str, span: Range<usize>) -> Range<usize> {
+    let bytes = text.as_bytes();
+    let (mut at, mut depth, mut end) = (span.end, 0_usize, span.end);
+    while let Some((token, kind)) = next_token(bytes, at) {
+        match kind {
+            Token::Open => depth += 1,
+            Token::Close if depth <= 1 => {
+                end = token.end;
+                match next_token(bytes, end) {
+                    Some((next, Token::Other)) if bytes[next.start] == b':' => depth = 0,
+                    _ => break,
+                }
+            }
+            Token::Close => depth -= 1,
+            Token::Other if depth == 0 && !matches!(bytes[token.start], b':' | b'.') => break,
+            _ => {}
+        }
+        at = token.end;
+        if depth > 0 {
+            end = at;
+        }
+    }
+    span.start..end.max(span.end)
+}
+
+/// The `nth` name `word` in a range; the last one when there are fewer.
+pub fn find_name(text: &str, range: Range<usize>, word: &str, nth: usize) -> Option<Range<usize>> {
+    let bytes = text.as_bytes().get(..range.end)?;
+    let mut at = range.start;
+    let (mut found, mut count) = (None, 0);
+    while let Some((token, kind)) = next_token(bytes, at) {
+        if kind == Token::Name && &bytes[token.clone()] == word.as_bytes() {
+            found = Some(token.clone());
+            if count == nth {
+                break;
+            }
+            count += 1;
+        }
+        at = token.end;
+    }
+    found.filter(|span| text.get(span.clone()).is_some())
+}
+
+/// The first token in a range that is `word`: a name, or a string with that content; else one that contains it.
+pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>> {
+    if word.is_empty() {
+        return None;
+    }
+    let bytes = text.as_bytes().get(..range.end)?;
+    let mut at = range.start;
+    let mut part = None;
+    while let Some((token, kind)) = next_token(bytes, at) {
+        at = token.end;
+        let content = match kind {
+            Token::Name => token.clone(),
+            Token::Text(content) => content,
+            _ => continue,
+        };
+        let Some(content_text) = text.get(content.clone()) else { continue };
+        if content_text == word {
+            return Some(token).filter(|span| text.get(span.clone()).is_some());
+        }
+        if part.is_none()
+            && let Some(inside) = content_text.find(word)
+        {
+            part = Some(content.start + inside..content.start + inside + word.len());
+        }
+    }
+    // Words that are no token of Lua (`youbot.setControlMode`, unquoted in YAML).
+    part.or_else(|| text.get(range.clone())?.find(word).map(|i| range.start + i..range.start + i + word.len()))
+}
+
+/// After a key was found: the bytes of its value (`key = { … }`), else what remains.
+pub fn reach_of_key(text: &str, key: &Range<usize>, end: usize) -> Range<usize> {
+    let bytes = text.as_bytes().get(..end).unwrap_or_default();
+    match next_token(bytes, key.end) {
+        Some((equals, Token::Other)) if bytes[equals.start] == b'=' => match next_token(bytes, equals.end) {
+            Some((open, Token::Open)) => {
+                let value = balanced(text, open.start..open.start);
+                value.start..value.end.min(end)
+            }
+            Some((value, _)) => value,
+            None => key.end..end,
+        },
+        _ => key.clone(),
+    }
+}
+
+/// The end of the word that starts at `at`: to the next blank or bracket, at least one character.
+pub fn token_end(text: &str, at: usize) -> usize {
+    let rest = &text[at..];
+    let first = rest.chars().next().map_or(0, |c| if c == '\n' { 0 } else { c.len_utf8() });
+    let length = rest
+        .find(|c: char| c.is_whitespace() || matches!(c, ',' | '(' | ')' | '{' | '}' | '[' | ']'))
+        .unwrap_or(rest.len());
+    at + length.max(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_end_where_they_close() {
+        let text = "f(\")\", [[)]], --[[ ) ]] { g() }):undo('x') , h()";
+        assert_eq!(&text[balanced(text, 0..1)], "f(\")\", [[)]], --[[ ) ]] { g() }):undo('x')");
+        assert_eq!(balanced("f", 0..1), 0..1);
+        assert_eq!(balanced("f(((", 0..1), 0..4);
+        assert_eq!(&"f 'x', y"[balanced("f 'x', y", 0..1)], "f");
+    }
+
+    #[test]
+    fn never_panics_on_any_cut() {
+        let (text, tail) = ("é = { 'ü\\", "--[==[ x ]=] \"ö");
+        let text = format!("{text}{tail}");
+        for (i, _) in text.char_indices() {
+            let _ = (balanced(&text, i..i), find(&text, i..text.len(), "x"), token_end(&text, i));
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! From findings to words: where a model element was written, and the one rendering of findings.
+//!
+//! A [`SourceMap`] turns the [`Origin`](crate::model::Origin)s that model elements carry into places in texts. Loading
+//! notes lines only; columns are worked out when something is shown, so a file without findings pays nothing for them.
+//! This room judges nothing and reads no file.
+
+mod extent;
+mod render;
+mod source_map;
+
+pub use render::{RenderOptions, explain, render, render_with, to_json};
+pub use source_map::{FileId, Language, Location, SourceFile, SourceMap};

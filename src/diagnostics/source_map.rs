@@ -1,0 +1,290 @@
+//! Where model elements were written.
+
+use super::extent;
+use crate::model::Origin;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A file of a source map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FileId(pub u32);
+
+/// What a file is written in: says how its tokens are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// Lua: only lines are known when it is loaded.
+    Lua,
+    /// YAML: every place is known exactly.
+    Yaml,
+}
+
+/// A text that was read.
+#[derive(Debug, Clone)]
+pub struct SourceFile {
+    /// Its name as the user gave it.
+    pub name: Arc<str>,
+    /// Its content; empty when it could not be read.
+    pub text: Arc<str>,
+    /// What it is written in.
+    pub language: Language,
+    /// Byte offsets at which lines begin.
+    line_starts: Vec<u32>,
+}
+
+impl SourceFile {
+    /// Byte range of a line (from 1), without its line break; the end of the text when there is no such line.
+    pub fn line(&self, line: u32) -> Range<usize> {
+        let index = line.saturating_sub(1) as usize;
+        let Some(start) = self.line_starts.get(index) else {
+            return self.text.len()..self.text.len();
+        };
+        let start = *start as usize;
+        let end = self.line_starts.get(index + 1).map_or(self.text.len(), |next| *next as usize);
+        let text = &self.text[start..end];
+        start..start + text.trim_end_matches(['\n', '\r']).len()
+    }
+
+    /// Byte offsets at which lines begin.
+    pub(super) fn line_starts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.line_starts.iter().map(|start| *start as usize)
+    }
+
+    /// The line (from 1) that holds a byte.
+    pub fn line_of(&self, offset: usize) -> u32 {
+        u32::try_from(self.line_starts.partition_point(|start| *start as usize <= offset)).unwrap_or(u32::MAX).max(1)
+    }
+}
+
+/// How a place is known.
+#[derive(Debug, Clone)]
+enum Place {
+    /// Nowhere: the place of [`Origin::NONE`].
+    Nowhere,
+    /// The whole file.
+    File(FileId),
+    /// A line (from 1) and a column (from 0, in characters), with a length in characters (0: to be found).
+    Exact { file: FileId, line: u32, column: u32, length: u32 },
+    /// The `nth` call of `word` on a line.
+    Call { file: FileId, line: u32, nth: u32, word: &'static str },
+    /// The first token `word` inside the place `parent`.
+    Within { parent: Origin, word: Box<str> },
+}
+
+/// A place in a text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// The file.
+    pub file: FileId,
+    /// The line, from 1.
+    pub line: u32,
+    /// The column, from 1, in characters.
+    pub column: u32,
+    /// The bytes of the place.
+    pub span: Range<usize>,
+}
+
+/// All texts that were read, and where the elements of the model stand in them.
+#[derive(Debug, Clone)]
+pub struct SourceMap {
+    files: Vec<SourceFile>,
+    places: Vec<Place>,
+}
+
+impl Default for SourceMap {
+    fn default() -> Self {
+        Self { files: Vec::new(), places: vec![Place::Nowhere] }
+    }
+}
+
+impl SourceMap {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a text.
+    pub fn add_file(&mut self, name: impl Into<Arc<str>>, text: impl Into<Arc<str>>, language: Language) -> FileId {
+        let text: Arc<str> = text.into();
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let after_breaks = breaks.map(|(i, _)| u32::try_from(i + 1).unwrap_or(u32::MAX));
+        let line_starts = std::iter::once(0).chain(after_breaks).collect();
+        let id = FileId(u32::try_from(self.files.len()).unwrap_or(u32::MAX));
+        self.files.push(SourceFile { name: name.into(), text, language, line_starts });
+        id
+    }
+
+    /// The file of that id.
+    ///
+    /// # Panics
+    /// When the id is of another source map.
+    pub fn file(&self, id: FileId) -> &SourceFile {
+        &self.files[id.0 as usize]
+    }
+
+    /// All files, in the order they were added.
+    pub fn files(&self) -> &[SourceFile] {
+        &self.files
+    }
+
+    fn add(&mut self, place: Place) -> Origin {
+        let origin = Origin(u32::try_from(self.places.len()).unwrap_or(0));
+        self.places.push(place);
+        origin
+    }
+
+    /// The place of a whole file.
+    pub fn whole_file(&mut self, file: FileId) -> Origin {
+        self.add(Place::File(file))
+    }
+
+    /// A line (from 1), a column (from 0) and a length, both in characters. Length 0 means up to the token's end.
+    pub fn exact(&mut self, file: FileId, line: u32, column: u32, length: u32) -> Origin {
+        self.add(Place::Exact { file, line, column, length })
+    }
+
+    /// The `nth` (from 0) call of `word` that stands on a line (from 1).
+    pub fn call(&mut self, file: FileId, line: u32, nth: u32, word: &'static str) -> Origin {
+        self.add(Place::Call { file, line, nth, word })
+    }
+
+    /// The token `word` inside the place `parent`; where that is not found, `parent` itself.
+    pub fn within(&mut self, parent: Origin, word: &str) -> Origin {
+        match self.places.get(parent.0 as usize) {
+            Some(Place::Call { .. } | Place::Within { .. } | Place::File(_)) => {
+                self.add(Place::Within { parent, word: word.into() })
+            }
+            _ => parent,
+        }
+    }
+
+    /// Whether a place is known exactly, without looking for its text.
+    pub fn is_exact(&self, origin: Origin) -> bool {
+        matches!(self.places.get(origin.0 as usize), Some(Place::Exact { .. }))
+    }
+
+    /// The file an origin stands in.
+    pub fn file_of(&self, mut origin: Origin) -> Option<FileId> {
+        loop {
+            match self.places.get(origin.0 as usize)? {
+                Place::Nowhere => return None,
+                Place::File(file) | Place::Exact { file, .. } | Place::Call { file, .. } => return Some(*file),
+                Place::Within { parent, .. } => origin = *parent,
+            }
+        }
+    }
+
+    /// Where an origin stands; none for [`Origin::NONE`].
+    pub fn locate(&self, origin: Origin) -> Option<Location> {
+        let mut words = Vec::new();
+        let mut at = origin;
+        while let Place::Within { parent, word } = self.places.get(at.0 as usize)? {
+            words.push(&**word);
+            at = *parent;
+        }
+        let (file, mut span) = self.base(at)?;
+        let source = self.file(file);
+        let mut inside = self.reach(at, file, &span);
+        while let Some(word) = words.pop() {
+            let Some(found) = extent::find(&source.text, inside.clone(), word) else { continue };
+            inside = extent::reach_of_key(&source.text, &found, inside.end);
+            span = found;
+        }
+        Some(self.location(file, span))
+    }
+
+    /// Where a part of the element at `origin` stands: the token `word` inside it, if it is there.
+    pub fn locate_part(&self, origin: Origin, word: &str) -> Option<Location> {
+        let whole = self.locate(origin)?;
+        let source = self.file(whole.file);
+        let inside = match source.language {
+            Language::Lua => extent::balanced(&source.text, whole.span.clone()),
+            Language::Yaml => whole.span,
+        };
+        Some(self.location(whole.file, extent::find(&source.text, inside, word)?))
+    }
+
+    fn location(&self, file: FileId, span: Range<usize>) -> Location {
+        let source = self.file(file);
+        let line = source.line_of(span.start);
+        let start = source.line(line).start;
+        let column = source.text.get(start..span.start).map_or(0, |t| t.chars().count());
+        Location { file, line, column: u32::try_from(column).unwrap_or(u32::MAX).saturating_add(1), span }
+    }
+
+    /// File and bytes of a place that is not inside another.
+    fn base(&self, origin: Origin) -> Option<(FileId, Range<usize>)> {
+        Some(match self.places.get(origin.0 as usize)? {
+            Place::Nowhere | Place::Within { .. } => return None,
+            Place::File(file) => (*file, 0..0),
+            Place::Exact { file, line, column, length } => {
+                let source = self.file(*file);
+                let line = source.line(*line);
+                let offset = |from: usize, chars: u32| {
+                    source.text[from..].char_indices().nth(chars as usize).map_or(source.text.len(), |(i, _)| from + i)
+                };
+                let start = offset(line.start, *column);
+                let end = if *length == 0 { extent::token_end(&source.text, start) } else { offset(start, *length) };
+                (*file, start..end)
+            }
+            Place::Call { file, line, nth, word } => {
+                let source = self.file(*file);
+                let line = source.line(*line);
+                let found = extent::find_name(&source.text, line.clone(), word, *nth as usize).unwrap_or_else(|| {
+                    let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
+                    line.start + indent..line.end
+                });
+                (*file, found)
+            }
+        })
+    }
+
+    /// The bytes in which parts of the element at `origin` are looked for.
+    fn reach(&self, origin: Origin, file: FileId, span: &Range<usize>) -> Range<usize> {
+        match self.places.get(origin.0 as usize) {
+            Some(Place::Call { .. }) => extent::balanced(&self.file(file).text, span.clone()),
+            Some(Place::File(_)) => 0..self.file(file).text.len(),
+            _ => span.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LUA: &str = "-- property_set(\"A.k\", 1)\nConfiguration {\n  post_conf_state = { 'compA:running' },\n  \
+                       property_set(\"A.k\", 1), property_set(\n    \"B.k\", 2),\n}\n";
+
+    fn at(map: &SourceMap, origin: Origin) -> (u32, u32, String) {
+        let location = map.locate(origin).unwrap();
+        (location.line, location.column, map.file(location.file).text[location.span].to_owned())
+    }
+
+    #[test]
+    fn tokens_of_lua_are_found() {
+        let mut map = SourceMap::new();
+        let file = map.add_file("a.lua", LUA, Language::Lua);
+        let call = map.call(file, 4, 1, "property_set");
+        let name = map.within(call, "B.k");
+        assert_eq!(at(&map, call), (4, 28, "property_set".to_owned()));
+        assert_eq!(at(&map, name), (5, 5, "\"B.k\"".to_owned()));
+        let absent = map.within(call, "A.k");
+        assert_eq!(at(&map, absent), (4, 28, "property_set".to_owned()), "outside the call");
+        let conf = map.call(file, 2, 0, "Configuration");
+        let list = map.within(conf, "post_conf_state");
+        let entry = map.within(list, "compA:running");
+        assert_eq!(at(&map, entry).1, 23);
+        assert_eq!(map.locate_part(call, "B.k").unwrap().line, 5);
+    }
+
+    #[test]
+    fn exact_places_count_characters() {
+        let mut map = SourceMap::new();
+        let file = map.add_file("a.yaml", "é: [ü, x]\n", Language::Yaml);
+        let x = map.exact(file, 1, 7, 1);
+        assert_eq!(at(&map, x), (1, 8, "x".to_owned()));
+        let beyond = map.exact(file, 9, 7, 1);
+        assert!(map.locate(beyond).is_some());
+        assert_eq!(map.locate(Origin::NONE), None);
+    }
+}

@@ -1,0 +1,359 @@
+//! Configurations: what both spellings mean.
+
+use super::{Unit, choice, name, text, time, truth, value, whole};
+use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::model::finding::did_you_mean;
+use crate::model::{
+    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, EventName, Finding, Ident, MemberRef,
+    OnFailure, Origin, Policy, RunState, StateEntry, Target, TypeName, Value, codes,
+};
+use std::collections::BTreeMap;
+
+/// The seven primitives, as they are written.
+pub const VERBS: &[&str] =
+    &["create", "destroy", "connect", "disconnect", "property_set", "port_write", "operation_call"];
+
+/// Longest FIFO of a connection.
+const LONGEST_BUFFER: i64 = 1_000_000;
+
+/// A map of named configurations, in the order given.
+pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
+    let Some(entries) = entries(cx, node, "the list of configurations", "engage: { changes: [...] }") else {
+        return Vec::new();
+    };
+    let mut all = Vec::with_capacity(entries.len());
+    for entry in entries {
+        let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
+        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+        let id = name::<ConfigId>(cx, &key, "a configuration's name", "enable_copying");
+        // Without a name its inside is still looked at, so that all findings come at once.
+        let inside = configuration(cx, id.unwrap_or_else(unnamed), entry.value, origin);
+        if let (Some(_), Some(configuration)) = (id, inside) {
+            all.push(configuration);
+        }
+    }
+    all
+}
+
+fn unnamed() -> ConfigId {
+    ConfigId::new("unnamed").expect("a name")
+}
+
+fn entries(cx: &mut Cx, node: Node, what: &str, example: &str) -> Option<Vec<Entry>> {
+    match node.kind {
+        Kind::Map(entries) => Some(entries),
+        Kind::List(list) if list.is_empty() => Some(Vec::new()),
+        _ => {
+            cx.wrong(&node, what, "a table of named values", example);
+            None
+        }
+    }
+}
+
+/// One configuration.
+pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> Option<Configuration> {
+    let (named, listed) = match node.kind {
+        Kind::Made("Configuration", named, listed) => (named, listed),
+        Kind::Map(named) => (named, Vec::new()),
+        Kind::List(list) if list.is_empty() => (Vec::new(), list),
+        _ => {
+            cx.wrong(&node, "a configuration", "a table", "name = Configuration { property_set(\"A.k\", 1.0) }");
+            return None;
+        }
+    };
+    let mut fields = Fields::new("a configuration", origin, named);
+    let mut c = Configuration::new(id);
+    c.origin = origin;
+    if let Some(entry) = fields.take_entry("pre_conf_state") {
+        c.pre = states(cx, entry);
+    }
+    let mut changes = listed;
+    if let Some(node) = fields.take("changes") {
+        match node.kind {
+            Kind::List(list) => changes.extend(list),
+            _ => cx.wrong(&node, "`changes`", "a list", "changes: [{ destroy: Dynamics }]"),
+        }
+    }
+    c.changes = Vec::with_capacity(changes.len());
+    c.changes.extend(changes.into_iter().filter_map(|node| change(cx, node)));
+    if let Some(entry) = fields.take_entry("post_conf_state") {
+        c.post = states(cx, entry);
+    }
+    if let Some(node) = fields.take("timeout") {
+        c.timeout = time(cx, &node, "`timeout`", Unit::Seconds, "timeout = 0.5");
+    }
+    if let Some(node) = fields.take("group") {
+        c.group = name::<Ident>(cx, &node, "`group`", "group = \"dof\"");
+    }
+    if let Some(node) = fields.take("safe") {
+        c.safe = truth(cx, &node, "`safe`", "safe = true").unwrap_or_default();
+    }
+    if let Some(node) = fields.take("on_failure") {
+        let choices = [("rollback", OnFailure::Rollback), ("hold", OnFailure::Hold)];
+        c.on_failure = choice(cx, &node, "`on_failure`", &choices).unwrap_or_default();
+    }
+    if let Some(node) = fields.take("confirm") {
+        c.confirm = confirm(cx, node);
+    }
+    if let Some(node) = fields.take("irreversible") {
+        c.irreversible = truth(cx, &node, "`irreversible`", "irreversible = true").unwrap_or_default();
+    }
+    if let Some(node) = fields.take("description") {
+        c.description = text(cx, &node, "`description`", "description = \"what it is for\"");
+    }
+    fields.finish(cx);
+    Some(c)
+}
+
+fn confirm(cx: &mut Cx, node: Node) -> Option<Confirm> {
+    const EXAMPLE: &str = "confirm = { event = \"e_aligned\", within = 2.0 }";
+    let mut fields = Fields::of(cx, node, "`confirm`", EXAMPLE)?;
+    let event = fields.required(cx, "event", EXAMPLE);
+    let within = fields.required(cx, "within", EXAMPLE);
+    let event = event.and_then(|node| name::<EventName>(cx, &node, "`event`", "event = \"e_aligned\""));
+    let within = within.and_then(|node| time(cx, &node, "`within`", Unit::Seconds, "within = 2.0"));
+    fields.finish(cx);
+    Some(Confirm { event: event?, within: within? })
+}
+
+/// A pre- or post-state list: entries `'comp:state'`, then at most one keyed `comp = 'state'`.
+fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
+    const EXAMPLE: &str = "{ 'compA:running', '_default:stopped' }";
+    let list_origin = cx.part(entry.value.origin, &entry.key);
+    let (list, keyed) = match entry.value.kind {
+        Kind::List(list) => (list, Vec::new()),
+        Kind::Mixed(list, keyed) => (list, keyed),
+        Kind::Map(keyed) => (Vec::new(), keyed),
+        _ => {
+            cx.wrong(&entry.value, &format!("`{}`", entry.key), "a list of `component:state`", EXAMPLE);
+            return Vec::new();
+        }
+    };
+    if keyed.len() > 1 {
+        let as_list: Vec<String> = keyed
+            .iter()
+            .map(|e| match &e.value.kind {
+                Kind::Str(state) => format!("'{}:{state}'", e.key),
+                _ => format!("'{}:stopped'", e.key),
+            })
+            .collect();
+        cx.report(
+            Finding::error(
+                codes::CONF_KEYED_ENTRIES,
+                format!("`{}` has {} keyed entries, and keys have no order", entry.key, keyed.len()),
+            )
+            .at(list_origin)
+            .labelled("in which order?")
+            .help(format!("write them as a list, in the order wanted: `{{ {} }}`", as_list.join(", "))),
+        );
+    }
+    let mut out: Vec<StateEntry> = Vec::with_capacity(list.len() + keyed.len());
+    for node in list {
+        let Kind::Str(text) = &node.kind else {
+            cx.wrong(&node, "an entry of a state list", "a text `component:state`", EXAMPLE);
+            continue;
+        };
+        let origin = cx.inside(list_origin, node.origin, text);
+        let Some((who, state)) = text.rsplit_once(':') else {
+            cx.report(
+                Finding::error(codes::CONF_BAD_STATE, format!("`{text}` does not say which state"))
+                    .at(origin)
+                    .help(format!("write `component:state`, as in `{EXAMPLE}`")),
+            );
+            continue;
+        };
+        out.extend(state_entry(cx, who.trim(), state.trim(), origin));
+    }
+    for entry in keyed {
+        let Kind::Str(state) = &entry.value.kind else {
+            cx.wrong(&entry.value, "the state of a component", "a text", "_default = 'running'");
+            continue;
+        };
+        let origin = cx.inside(list_origin, entry.origin, &entry.key);
+        out.extend(state_entry(cx, &entry.key, state, origin));
+    }
+    let mut defaults = out.iter().filter(|e| e.target == Target::Default);
+    if let (Some(first), Some(second)) = (defaults.next(), defaults.next()) {
+        let finding = Finding::error(codes::CONF_DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
+            .at(second.origin)
+            .also(first.origin, "first here")
+            .help("it stands for every component not named in the list, so it can only have one state: keep one");
+        cx.report(finding);
+    }
+    out
+}
+
+fn state_entry(cx: &mut Cx, who: &str, state: &str, origin: Origin) -> Option<StateEntry> {
+    let target = if who == "_default" {
+        Some(Target::Default)
+    } else {
+        let node = Node::new(Kind::Str(who.into()), origin);
+        name::<ComponentName>(cx, &node, "a component", "compA:running").map(Target::Component)
+    };
+    let state = match RunState::from_name(state) {
+        Some(RunState::Faulted) => {
+            cx.report(
+                Finding::error(codes::CONF_BAD_STATE, "no configuration can demand `faulted`")
+                    .at(origin)
+                    .help("components become faulted by themselves; demand `unconfigured` to bring one out of it"),
+            );
+            None
+        }
+        Some(state) => Some(state),
+        None => {
+            let help = did_you_mean(state, "states", RunState::NAMES.iter().copied());
+            cx.report(Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help));
+            None
+        }
+    };
+    Some(StateEntry { target: target?, state: state?, origin })
+}
+
+/// One change.
+fn change(cx: &mut Cx, node: Node) -> Option<Change> {
+    const EXAMPLE: &str = "- property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] }";
+    let origin = node.origin;
+    let (verb, fields) = match node.kind {
+        Kind::Made(verb, entries, _) if VERBS.contains(&verb) => (verb, Fields::new(verb, origin, entries)),
+        Kind::Map(mut entries) if entries.len() == 1 => {
+            let Entry { key, origin: key_origin, value } = entries.pop()?;
+            let Some(verb) = VERBS.iter().find(|verb| ***verb == *key) else {
+                cx.report(
+                    Finding::error(codes::CONF_UNKNOWN_CHANGE, format!("there is no change `{key}`"))
+                        .at(key_origin)
+                        .help(did_you_mean(&key, "changes", VERBS.iter().copied())),
+                );
+                return None;
+            };
+            (*verb, Fields::of(cx, value, verb, EXAMPLE)?)
+        }
+        Kind::Map(entries) if entries.len() > 1 => {
+            cx.report(
+                Finding::error(codes::CONF_UNKNOWN_CHANGE, "an entry of `changes` is one change, this has several keys")
+                    .at(entries[1].origin)
+                    .labelled("a second one")
+                    .help(format!("begin each change with its own `-`: `{EXAMPLE}`")),
+            );
+            return None;
+        }
+        _ => {
+            cx.wrong(&node, "an element of a configuration", "a change", "property_set(\"Dynamics.force_gain\", { 0.1, 0.1, 0.1 })");
+            return None;
+        }
+    };
+    Some(Change { kind: primitive(cx, verb, fields)?, origin })
+}
+
+fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKind> {
+    let kind = match verb {
+        "create" => {
+            let component = component(cx, &mut fields);
+            let ty = fields.required(cx, "type", "type: youbot.Dynamics");
+            let ty = ty.and_then(|node| name::<TypeName>(cx, &node, "a component type", "youbot.Dynamics"));
+            let activity = fields
+                .take("activity")
+                .and_then(|node| name::<Ident>(cx, &node, "`activity`", "activity = \"control\""));
+            let properties = fields.take("properties").map(|node| properties(cx, node)).unwrap_or_default();
+            component.zip(ty).map(|(component, ty)| ChangeKind::Create { component, ty, activity, properties })
+        }
+        "destroy" => component(cx, &mut fields).map(|component| ChangeKind::Destroy { component }),
+        "connect" | "disconnect" => {
+            let from = member(cx, &mut fields, "from", "Kin.jacobian");
+            let to = member(cx, &mut fields, "to", "Dynamics.jacobian");
+            if verb == "disconnect" {
+                from.zip(to).map(|(from, to)| ChangeKind::Disconnect { from, to })
+            } else {
+                let policy = fields.take("policy").map_or(Some(Policy::Data), |node| policy(cx, node));
+                from.zip(to).zip(policy).map(|((from, to), policy)| ChangeKind::Connect { from, to, policy })
+            }
+        }
+        "property_set" => {
+            let property = member(cx, &mut fields, "property", "Dynamics.force_gain");
+            let value = required_value(cx, &mut fields, "a property's value");
+            property.zip(value).map(|(property, value)| ChangeKind::PropertySet { property, value })
+        }
+        "port_write" => {
+            let port = member(cx, &mut fields, "port", "Cart_Impedance.ext_ref_mode");
+            let value = required_value(cx, &mut fields, "a port's value");
+            port.zip(value).map(|(port, value)| ChangeKind::PortWrite { port, value })
+        }
+        _ => {
+            let undo = fields.take("undo");
+            let call = call(cx, &mut fields);
+            let undo = match undo {
+                None => Some(None),
+                Some(node) => {
+                    Fields::of(cx, node, "`undo`", "undo: { operation: youbot.setControlMode, args: [0] }").and_then(
+                        |mut fields| {
+                            let undo = self::call(cx, &mut fields);
+                            fields.finish(cx);
+                            undo.map(Some)
+                        },
+                    )
+                }
+            };
+            call.zip(undo).map(|(call, undo)| ChangeKind::OperationCall { call, undo })
+        }
+    };
+    fields.finish(cx);
+    kind
+}
+
+fn component(cx: &mut Cx, fields: &mut Fields) -> Option<ComponentName> {
+    let node = fields.required(cx, "component", "component: Dynamics")?;
+    name(cx, &node, "a component", "Dynamics")
+}
+
+fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) -> Option<MemberRef> {
+    let node = fields.required(cx, key, &format!("{key}: {example}"))?;
+    name(cx, &node, key, example)
+}
+
+fn required_value(cx: &mut Cx, fields: &mut Fields, what: &str) -> Option<Value> {
+    let node = fields.required(cx, "value", "value: 0.5")?;
+    value(cx, node, what)
+}
+
+fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
+    let operation = member(cx, fields, "operation", "youbot.setControlMode");
+    let args = match fields.take("args") {
+        None => Some(Vec::new()),
+        Some(Node { kind: Kind::List(list), .. }) => {
+            let length = list.len();
+            let args: Vec<Value> = list.into_iter().filter_map(|node| value(cx, node, "an argument")).collect();
+            (args.len() == length).then_some(args)
+        }
+        Some(node) => {
+            cx.wrong(&node, "`args`", "a list", "args: [6]");
+            None
+        }
+    };
+    Some(Call { operation: operation?, args: args? })
+}
+
+fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
+    const EXAMPLE: &str = "{ buffer = 64 }";
+    if let Kind::Str(_) = node.kind {
+        return choice(cx, &node, "the policy of a connection", &[("data", Policy::Data)]);
+    }
+    let mut fields = Fields::of(cx, node, "the policy of a connection", EXAMPLE)?;
+    let length = fields.required(cx, "buffer", EXAMPLE);
+    let length = length.and_then(|node| whole(cx, &node, "the length of a buffer", 1..=LONGEST_BUFFER, EXAMPLE));
+    fields.finish(cx);
+    u32::try_from(length?).ok().map(Policy::Buffer)
+}
+
+fn properties(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Value> {
+    let Some(entries) = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }") else {
+        return BTreeMap::new();
+    };
+    let mut out = BTreeMap::new();
+    for entry in entries {
+        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+        let field = name::<Ident>(cx, &key, "a property", "friction_comp = 0.9");
+        if let (Some(field), Some(value)) = (field, value(cx, entry.value, "a property's value")) {
+            out.insert(field, value);
+        }
+    }
+    out
+}

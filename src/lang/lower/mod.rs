@@ -1,0 +1,242 @@
+//! Loose tree → model: every name, type, time and choice is checked here, once, for both languages.
+
+pub mod chart;
+pub mod configuration;
+pub mod deployment;
+pub mod types;
+
+use super::tree::{Cx, Kind, Node};
+use crate::model::finding::did_you_mean;
+use crate::model::names::NameError;
+use crate::model::{Finding, Ident, Value, codes};
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A name of any kind.
+pub fn name<T: FromStr<Err = NameError>>(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<T> {
+    let Kind::Str(text) = &node.kind else {
+        cx.wrong(node, what, "a name (a text)", example);
+        return None;
+    };
+    match text.parse() {
+        Ok(name) => Some(name),
+        Err(error) => {
+            bad_name(cx, node, &error, example);
+            None
+        }
+    }
+}
+
+fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
+    let origin = cx.place(node);
+    let shown: String = error.text.chars().take(60).collect();
+    cx.report(
+        Finding::error(codes::TEXT_BAD_NAME, format!("`{shown}` is not a {}", error.kind))
+            .at(origin)
+            .labelled(error.reason)
+            .help(format!("write it like `{example}`")),
+    );
+}
+
+/// A text.
+pub fn text(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<String> {
+    let Kind::Str(text) = &node.kind else {
+        cx.wrong(node, what, "a text", example);
+        return None;
+    };
+    Some(text.to_string())
+}
+
+/// A truth value.
+pub fn truth(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<bool> {
+    let Kind::Bool(v) = node.kind else {
+        cx.wrong(node, what, "true or false", example);
+        return None;
+    };
+    Some(v)
+}
+
+/// A finite number.
+pub fn number(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<f64> {
+    match node.kind {
+        #[allow(clippy::cast_precision_loss)]
+        Kind::Int(v) => Some(v as f64),
+        Kind::Float(v) if v.is_finite() => Some(v),
+        Kind::Float(v) => {
+            not_finite(cx, node, v);
+            None
+        }
+        _ => {
+            cx.wrong(node, what, "a number", example);
+            None
+        }
+    }
+}
+
+fn not_finite(cx: &mut Cx, node: &Node, v: f64) {
+    cx.report(
+        Finding::error(codes::TEXT_NOT_FINITE, format!("{v} is not a finite number"))
+            .at(node.origin)
+            .help("values of a robot's system are finite: look at the calculation that led here"),
+    );
+}
+
+/// A whole number in a range.
+pub fn whole(cx: &mut Cx, node: &Node, what: &str, range: std::ops::RangeInclusive<i64>, example: &str) -> Option<i64> {
+    match node.kind {
+        Kind::Int(v) if range.contains(&v) => Some(v),
+        Kind::Int(v) => {
+            let (min, max) = (range.start(), range.end());
+            let origin = cx.place(node);
+            cx.report(
+                Finding::error(codes::TEXT_BAD_VALUE, format!("{what} must be from {min} to {max}, this is {v}"))
+                    .at(origin)
+                    .help(format!("write it like `{example}`")),
+            );
+            None
+        }
+        _ => {
+            cx.wrong(node, what, "a whole number", example);
+            None
+        }
+    }
+}
+
+/// One of a few words.
+pub fn choice<T: Copy>(cx: &mut Cx, node: &Node, what: &str, choices: &[(&'static str, T)]) -> Option<T> {
+    let words = choices.iter().map(|(word, _)| *word);
+    let Kind::Str(text) = &node.kind else {
+        let all: Vec<_> = words.map(|w| format!("`{w}`")).collect();
+        cx.wrong(node, what, &format!("a text, one of {}", all.join(", ")), choices[0].0);
+        return None;
+    };
+    if let Some((_, value)) = choices.iter().find(|(word, _)| *word == &**text) {
+        return Some(*value);
+    }
+    let origin = cx.place(node);
+    cx.report(
+        Finding::error(codes::TEXT_BAD_VALUE, format!("{what} cannot be `{text}`"))
+            .at(origin)
+            .help(did_you_mean(text, "values", words)),
+    );
+    None
+}
+
+/// The unit a time is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// Seconds.
+    Seconds,
+    /// Milliseconds.
+    Milliseconds,
+}
+
+/// Longest time that is not taken for a mistake in the unit: a day.
+const LONGEST: f64 = 86_400.0;
+
+/// A time: a positive number of the unit, at most a day.
+pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> Option<Duration> {
+    let (word, factor) = match unit {
+        Unit::Seconds => ("seconds", 1.0),
+        Unit::Milliseconds => ("milliseconds", 1e-3),
+    };
+    let mut refuse = |cx: &mut Cx, message: String, help: String| {
+        let origin = cx.place(node);
+        cx.report(Finding::error(codes::TEXT_BAD_TIME, message).at(origin).labelled(format!("in {word}")).help(help));
+        None
+    };
+    if let Kind::Str(text) = &node.kind {
+        let help = match parse_time(text) {
+            Some(seconds) => {
+                let shown = seconds / factor;
+                format!("write the number alone: `{}`", example.replace(char::is_numeric, "#").replace("#.#", "#").replace('#', &shown.to_string()))
+            }
+            None => format!("write it like `{example}`"),
+        };
+        return refuse(cx, format!("{what} is a number of {word}, this is the text `{text}`"), help);
+    }
+    let v = number(cx, node, what, example)?;
+    if v <= 0.0 {
+        return refuse(cx, format!("{what} must be more than 0 {word}, this is {v}"), format!("write it like `{example}`"));
+    }
+    if v * factor > LONGEST {
+        let help = format!("it is a number of {word}: was another unit meant? Write it like `{example}`");
+        return refuse(cx, format!("{what} of {v} {word} is longer than a day"), help);
+    }
+    let nanos = (v * factor * 1e9).round();
+    if nanos < 1.0 {
+        return refuse(cx, format!("{what} of {v} {word} is shorter than a nanosecond"), format!("write it like `{example}`"));
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    Some(Duration::from_nanos(nanos as u64))
+}
+
+/// The seconds that a text such as `500ms` means.
+fn parse_time(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let number: f64 = text[..end].parse().ok()?;
+    Some(match text[end..].trim() {
+        "" | "s" | "sec" | "seconds" => number,
+        "ms" => number / 1e3,
+        "us" | "µs" => number / 1e6,
+        "ns" => number / 1e9,
+        "min" => number * 60.0,
+        _ => return None,
+    })
+}
+
+/// A value of a property, a port or an argument.
+pub fn value(cx: &mut Cx, node: Node, what: &str) -> Option<Value> {
+    match node.kind {
+        Kind::Bool(v) => Some(Value::Bool(v)),
+        Kind::Int(v) => Some(Value::Int(v)),
+        Kind::Float(v) if v.is_finite() => Some(Value::Float(v)),
+        Kind::Float(v) => {
+            not_finite(cx, &node, v);
+            None
+        }
+        Kind::Str(v) => Some(Value::Str(Arc::from(v))),
+        Kind::List(list) => {
+            let length = list.len();
+            let values: Vec<_> = list.into_iter().filter_map(|v| value(cx, v, what)).collect();
+            (values.len() == length).then_some(Value::Array(values))
+        }
+        Kind::Map(entries) if entries.is_empty() => Some(Value::Array(Vec::new())),
+        Kind::Map(entries) => {
+            let length = entries.len();
+            let mut fields: Vec<(Ident, Value)> = Vec::with_capacity(length);
+            for entry in entries {
+                let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+                let field = name::<Ident>(cx, &key, "a field of a record", "{ x = 1.0 }");
+                if let (Some(field), Some(v)) = (field, value(cx, entry.value, what)) {
+                    fields.push((field, v));
+                }
+            }
+            // By name: the order of a Lua table is not known, and both languages must give the same model.
+            fields.sort_by_key(|(name, _)| *name);
+            (fields.len() == length).then_some(Value::Record(fields))
+        }
+        Kind::Mixed(..) => {
+            cx.report(
+                Finding::error(codes::TEXT_WRONG_TYPE, format!("{what} mixes list and record"))
+                    .at(node.origin)
+                    .help("write either elements (`{ 1, 2 }`) or named fields (`{ x = 1, y = 2 }`)"),
+            );
+            None
+        }
+        Kind::Null | Kind::Made(..) | Kind::Handle(_) | Kind::Function | Kind::Poison => {
+            cx.wrong(&node, what, "a value (bool, number, text, list or record)", "0.5");
+            None
+        }
+    }
+}
+
+/// One or several of something: a list, or one alone.
+pub fn one_or_more(node: Node) -> Vec<Node> {
+    match node.kind {
+        Kind::List(list) => list,
+        _ => vec![node],
+    }
+}

@@ -1,0 +1,234 @@
+//! The loose tree both languages are read into: shapes and places, no meaning yet.
+
+use crate::diagnostics::{FileId, SourceMap};
+use crate::limits;
+use crate::model::finding::did_you_mean;
+use crate::model::{Finding, Findings, Origin, codes};
+use std::borrow::Cow;
+
+/// A piece of text with the place where it was written.
+#[derive(Debug, Clone)]
+pub struct Node {
+    /// What it is.
+    pub kind: Kind,
+    /// Where it stands. In Lua that of the constructor around it: only lines of calls are known there.
+    pub origin: Origin,
+}
+
+/// The shape of a node.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// Nothing: `nil`, an empty YAML value.
+    Null,
+    /// `true`, `false`
+    Bool(bool),
+    /// A number without a point.
+    Int(i64),
+    /// A number with one. May be NaN or infinite.
+    Float(f64),
+    /// A text.
+    Str(Box<str>),
+    /// Elements in order. Lua's `{}` is an empty one.
+    List(Vec<Node>),
+    /// Named elements.
+    Map(Vec<Entry>),
+    /// Lua's table with both: elements, then named ones.
+    Mixed(Vec<Node>, Vec<Entry>),
+    /// What a constructor made: its name, its named fields, its elements.
+    Made(&'static str, Vec<Entry>, Vec<Node>),
+    /// What a constructor made, before it is put in its place.
+    Handle(u32),
+    /// A Lua function.
+    Function,
+    /// What a finding has been made about already.
+    Poison,
+}
+
+/// A named element.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// The name.
+    pub key: Cow<'static, str>,
+    /// Where the name stands.
+    pub origin: Origin,
+    /// The element.
+    pub value: Node,
+}
+
+impl Node {
+    /// A node.
+    pub fn new(kind: Kind, origin: Origin) -> Self {
+        Self { kind, origin }
+    }
+
+    /// What it is, for messages: `a string ("abc")`.
+    pub fn describe(&self) -> String {
+        match &self.kind {
+            Kind::Null => "nothing".to_owned(),
+            Kind::Bool(v) => format!("a bool ({v})"),
+            Kind::Int(v) => format!("an int ({v})"),
+            Kind::Float(v) => format!("a float ({v:?})"),
+            Kind::Str(v) => format!("a string ({:?})", v.chars().take(32).collect::<String>()),
+            Kind::List(v) => format!("a list of {}", v.len()),
+            Kind::Map(_) | Kind::Mixed(..) => "a table of named values".to_owned(),
+            Kind::Made(verb, ..) => format!("a `{verb}`"),
+            Kind::Handle(_) => "something made by a constructor".to_owned(),
+            Kind::Function => "a function".to_owned(),
+            Kind::Poison => "something that could not be read".to_owned(),
+        }
+    }
+}
+
+/// What reading and lowering work with: the source map and the findings so far.
+#[derive(Debug, Default)]
+pub struct Cx {
+    /// The texts and the places in them.
+    pub sources: SourceMap,
+    /// What was found.
+    pub findings: Findings,
+    /// Whether some text could not be read or parsed at all.
+    pub unreadable: bool,
+}
+
+impl Cx {
+    /// Adds a finding, unless there are too many.
+    pub fn report(&mut self, finding: Finding) {
+        if self.findings.len() < limits::FINDINGS {
+            self.findings.push(finding);
+        }
+    }
+
+    /// Adds a finding that says that a text could not be read.
+    pub fn refuse(&mut self, finding: Finding) {
+        self.unreadable = true;
+        self.report(finding);
+    }
+
+    /// The place of a word of an element.
+    pub fn part(&mut self, origin: Origin, word: &str) -> Origin {
+        self.sources.within(origin, word)
+    }
+
+    /// The place of an element of a list: its own where the language knows it, else its text inside the list.
+    pub fn inside(&mut self, list: Origin, own: Origin, word: &str) -> Origin {
+        if self.sources.is_exact(own) { own } else { self.sources.within(list, word) }
+    }
+
+    /// The place of a node: its own text inside the constructor around it.
+    pub fn place(&mut self, node: &Node) -> Origin {
+        match &node.kind {
+            Kind::Str(text) => self.sources.within(node.origin, text),
+            Kind::Int(v) => self.sources.within(node.origin, &v.to_string()),
+            _ => node.origin,
+        }
+    }
+
+    /// Reports that a node is not of the kind wanted; `example` is a line as it should be.
+    pub fn wrong(&mut self, node: &Node, what: &str, expected: &str, example: &str) {
+        if matches!(node.kind, Kind::Poison) {
+            return;
+        }
+        let origin = self.place(node);
+        let message = format!("{what} must be {expected}, this is {}", node.describe());
+        let quoted = matches!(node.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_) | Kind::Null);
+        let hint = if quoted && expected.contains("text") { " (quotes make a text of it)" } else { "" };
+        self.report(
+            Finding::error(codes::TEXT_WRONG_TYPE, message)
+                .at(origin)
+                .labelled(format!("expected {expected}"))
+                .help(format!("write it like `{example}`{hint}")),
+        );
+    }
+}
+
+/// The fields of a table while it is lowered: each is taken once, what remains is unknown.
+pub struct Fields {
+    /// What the table is, for messages: `a configuration`.
+    what: &'static str,
+    /// Its place.
+    pub origin: Origin,
+    entries: Vec<Option<Entry>>,
+    asked: Vec<&'static str>,
+}
+
+impl Fields {
+    /// The fields of a table.
+    pub fn new(what: &'static str, origin: Origin, entries: Vec<Entry>) -> Self {
+        Self { what, origin, entries: entries.into_iter().map(Some).collect(), asked: Vec::new() }
+    }
+
+    /// The fields of a node, or a finding that it has none.
+    pub fn of(cx: &mut Cx, node: Node, what: &'static str, example: &str) -> Option<Self> {
+        match node.kind {
+            Kind::Map(entries) | Kind::Made(_, entries, _) => Some(Self::new(what, node.origin, entries)),
+            Kind::List(list) if list.is_empty() => Some(Self::new(what, node.origin, Vec::new())),
+            _ => {
+                cx.wrong(&node, what, "a table of named values", example);
+                None
+            }
+        }
+    }
+
+    /// Takes a field with its name's place.
+    pub fn take_entry(&mut self, key: &'static str) -> Option<Entry> {
+        self.asked.push(key);
+        self.entries.iter_mut().find(|e| e.as_ref().is_some_and(|e| e.key == key)).and_then(Option::take)
+    }
+
+    /// Takes a field.
+    pub fn take(&mut self, key: &'static str) -> Option<Node> {
+        self.take_entry(key).map(|entry| entry.value)
+    }
+
+    /// Takes a field that must be there; a finding where it is not.
+    pub fn required(&mut self, cx: &mut Cx, key: &'static str, example: &str) -> Option<Node> {
+        let field = self.take(key);
+        if field.is_none() {
+            // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
+            let misspelt = self.entries.iter().flatten().any(|e| {
+                !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8
+            });
+            if !misspelt {
+                cx.report(
+                    Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.what))
+                        .at(self.origin)
+                        .labelled(format!("without `{key}`"))
+                        .help(format!("add `{example}`")),
+                );
+            }
+        }
+        field
+    }
+
+    /// Reports what was not taken.
+    pub fn finish(self, cx: &mut Cx) {
+        let Self { what, entries, asked, .. } = self;
+        for entry in entries.into_iter().flatten() {
+            if asked.contains(&&*entry.key) {
+                cx.report(
+                    Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{}` stands twice in {what}", entry.key))
+                        .at(entry.origin)
+                        .help("keep one of them"),
+                );
+                continue;
+            }
+            let origin = cx.part(entry.origin, &entry.key);
+            let help = did_you_mean(&entry.key, "keys", asked.iter().copied());
+            cx.report(
+                Finding::error(codes::TEXT_UNKNOWN_KEY, format!("{what} has no `{}`", entry.key))
+                    .at(origin)
+                    .labelled("unknown key")
+                    .help(help),
+            );
+        }
+    }
+}
+
+/// A file that is being read: its id and the place of the whole.
+#[derive(Debug, Clone, Copy)]
+pub struct Reading {
+    /// The file.
+    pub file: FileId,
+    /// The place of the whole file.
+    pub whole: Origin,
+}
