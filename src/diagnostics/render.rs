@@ -225,7 +225,8 @@ impl Diagnostic for Report {
         self.source.as_ref().map(|source| source as &dyn SourceCode)
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        (!self.labels.is_empty()).then(|| Box::new(self.labels.iter().cloned()) as Box<dyn Iterator<Item = LabeledSpan>>)
+        (!self.labels.is_empty())
+            .then(|| Box::new(self.labels.iter().cloned()) as Box<dyn Iterator<Item = LabeledSpan>>)
     }
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
         (!self.related.is_empty())
@@ -311,7 +312,8 @@ mod tests {
         let (map, call, name, other) = sources();
         let finding = Finding::error(CODE, "no property `A.k`").at(call).also(name, "first seen here").help("write it");
         let text = render(&[finding, Finding::warning(CODE, "two").at(name).also(other, "the other")], &map, false);
-        for part in ["davit::text::wrong_type", "c.lua:2:16", "first seen here", "d.yaml:1:7", "write it", "the other"] {
+        for part in ["davit::text::wrong_type", "c.lua:2:16", "first seen here", "d.yaml:1:7", "write it", "the other"]
+        {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
         assert!(!text.contains('\u{1b}'));

@@ -62,6 +62,8 @@ enum Place {
     Nowhere,
     /// The whole file.
     File(FileId),
+    /// A line (from 1).
+    Line { file: FileId, line: u32 },
     /// A line (from 1) and a column (from 0, in characters), with a length in characters (0: to be found).
     Exact { file: FileId, line: u32, column: u32, length: u32 },
     /// The `nth` call of `word` on a line.
@@ -142,6 +144,11 @@ impl SourceMap {
         self.add(Place::Exact { file, line, column, length })
     }
 
+    /// A whole line (from 1).
+    pub fn exact_line(&mut self, file: FileId, line: u32) -> Origin {
+        self.add(Place::Line { file, line })
+    }
+
     /// The `nth` (from 0) call of `word` that stands on a line (from 1).
     pub fn call(&mut self, file: FileId, line: u32, nth: u32, word: &'static str) -> Origin {
         self.add(Place::Call { file, line, nth, word })
@@ -150,7 +157,7 @@ impl SourceMap {
     /// The token `word` inside the place `parent`; where that is not found, `parent` itself.
     pub fn within(&mut self, parent: Origin, word: &str) -> Origin {
         match self.places.get(parent.0 as usize) {
-            Some(Place::Call { .. } | Place::Within { .. } | Place::File(_)) => {
+            Some(Place::Call { .. } | Place::Within { .. } | Place::File(_) | Place::Line { .. }) => {
                 self.add(Place::Within { parent, word: word.into() })
             }
             _ => parent,
@@ -167,7 +174,9 @@ impl SourceMap {
         loop {
             match self.places.get(origin.0 as usize)? {
                 Place::Nowhere => return None,
-                Place::File(file) | Place::Exact { file, .. } | Place::Call { file, .. } => return Some(*file),
+                Place::File(file) | Place::Exact { file, .. } | Place::Line { file, .. } | Place::Call { file, .. } => {
+                    return Some(*file);
+                }
                 Place::Within { parent, .. } => origin = *parent,
             }
         }
@@ -226,6 +235,12 @@ impl SourceMap {
                 let end = if *length == 0 { extent::token_end(&source.text, start) } else { offset(start, *length) };
                 (*file, start..end)
             }
+            Place::Line { file, line } => {
+                let source = self.file(*file);
+                let line = source.line(*line);
+                let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
+                (*file, line.start + indent..line.end)
+            }
             Place::Call { file, line, nth, word } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
@@ -266,10 +281,10 @@ mod tests {
         let file = map.add_file("a.lua", LUA, Language::Lua);
         let call = map.call(file, 4, 1, "property_set");
         let name = map.within(call, "B.k");
-        assert_eq!(at(&map, call), (4, 28, "property_set".to_owned()));
+        assert_eq!(at(&map, call), (4, 27, "property_set".to_owned()));
         assert_eq!(at(&map, name), (5, 5, "\"B.k\"".to_owned()));
         let absent = map.within(call, "A.k");
-        assert_eq!(at(&map, absent), (4, 28, "property_set".to_owned()), "outside the call");
+        assert_eq!(at(&map, absent), (4, 27, "property_set".to_owned()), "outside the call");
         let conf = map.call(file, 2, 0, "Configuration");
         let list = map.within(conf, "post_conf_state");
         let entry = map.within(list, "compA:running");

@@ -185,9 +185,11 @@ impl Fields {
         let field = self.take(key);
         if field.is_none() {
             // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
-            let misspelt = self.entries.iter().flatten().any(|e| {
-                !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8
-            });
+            let misspelt = self
+                .entries
+                .iter()
+                .flatten()
+                .any(|e| !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8);
             if !misspelt {
                 cx.report(
                     Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.what))

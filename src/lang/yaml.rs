@@ -43,8 +43,7 @@ struct Reader<'a> {
 /// Reads the text of `reading`'s file. None, with findings, when it does not parse.
 pub fn read(cx: &mut Cx, reading: Reading) -> Option<Node> {
     let text = cx.sources.file(reading.file).text.clone();
-    let mut reader =
-        Reader { cx, reading, stack: Vec::new(), anchors: FxHashMap::default(), nodes: 0, root: None };
+    let mut reader = Reader { cx, reading, stack: Vec::new(), anchors: FxHashMap::default(), nodes: 0, root: None };
     match reader.run(&text) {
         Ok(()) => Some(reader.root.take().unwrap_or(Node::new(Kind::Null, reading.whole))),
         Err(finding) => {
@@ -90,16 +89,16 @@ impl Reader<'_> {
                 Event::SequenceEnd | Event::MappingEnd => self.close()?,
                 Event::Alias(anchor) => {
                     let origin = self.origin(span);
-                    let Some((node, nodes)) = self.anchors.get(&anchor) else {
+                    // The budget first: a copy of what is too large must not be made.
+                    self.nodes += self.anchors.get(&anchor).map_or(0, |(_, nodes)| *nodes);
+                    self.budget(origin)?;
+                    let Some((node, nodes)) = self.anchors.get(&anchor).cloned() else {
                         return Err(Box::new(
                             Finding::error(codes::TEXT_SYNTAX, "this alias stands inside what it names")
                                 .at(origin)
                                 .help("an alias can only name something that is complete"),
                         ));
                     };
-                    self.nodes += nodes;
-                    self.budget(origin)?;
-                    let (node, nodes) = (node.clone(), *nodes);
                     self.place(node, nodes)?;
                 }
                 Event::Nothing | Event::StreamStart | Event::StreamEnd | Event::DocumentEnd => {}
@@ -242,7 +241,13 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn scalar(&mut self, text: &str, style: ScalarStyle, tag: Option<&Tag>, origin: Origin) -> Result<Kind, Box<Finding>> {
+    fn scalar(
+        &mut self,
+        text: &str,
+        style: ScalarStyle,
+        tag: Option<&Tag>,
+        origin: Origin,
+    ) -> Result<Kind, Box<Finding>> {
         if let Some(tag) = tag {
             if !tag.is_yaml_core_schema() {
                 return Err(refused_tag(tag, origin));
@@ -300,7 +305,11 @@ pub fn plain(text: &str) -> Option<Kind> {
             if digits(unsigned, 10) {
                 return text.parse().ok().map(Kind::Int);
             }
-            if is_float(unsigned) { text.parse().map_or_else(|_| Kind::Str(text.into()), Kind::Float) } else { Kind::Str(text.into()) }
+            if is_float(unsigned) {
+                text.parse().map_or_else(|_| Kind::Str(text.into()), Kind::Float)
+            } else {
+                Kind::Str(text.into())
+            }
         }
     })
 }

@@ -49,8 +49,141 @@ macro_rules! codes {
 
 codes! {
     // ---- text and files (lang) -------------------------------------------------------------------------------------
+    TEXT_NO_FILE = "text::no_file", "there is no such file",
+        "A file that was asked for, or that a deployment names, does not exist. Files named in a deployment are looked \
+         for from the folder of the deployment file. Correct the path; near names in that folder are suggested.";
+    TEXT_UNREADABLE = "text::unreadable", "a file cannot be read",
+        "The file exists, but it is a folder, or the system refuses to let it be read. Check its permissions and that \
+         the path names a text file.";
+    TEXT_TOO_LARGE = "text::too_large", "a file is too large",
+        "Files are refused by their size before they are read, so that a wrong path (a log, a disk image) cannot fill \
+         the memory. Check that it is the right file; a generated deployment can be split into several files.";
+    TEXT_NOT_UTF8 = "text::not_utf8", "a text is not UTF-8",
+        "All texts are read as UTF-8, and this one holds bytes that belong to no character. It may be saved in another \
+         encoding, or be no text at all. Save it as UTF-8.";
+    TEXT_UNKNOWN_LANGUAGE = "text::unknown_language", "the name of a file does not tell its language",
+        "The ending of a file says how it is read: `.lua` as Lua, `.yaml` or `.yml` as YAML; a deployment is always \
+         YAML. Rename the file, or name the right one.";
+    TEXT_SYNTAX = "text::syntax", "a text does not parse",
+        "The text is not Lua, or not YAML, at the place shown; the message is the parser's own. The mistake often stands \
+         just before that place: a bracket or a quote left open, a missing comma, a tab in YAML's indentation.";
+    TEXT_TOO_DEEP = "text::too_deep", "a text is nested too deeply",
+        "Tables inside tables are read up to a fixed depth, far beyond what any configuration or coordinator needs, so \
+         that no text can exhaust the stack of the program. A bracket is probably not closed, or a table contains \
+         itself.";
+    TEXT_TOO_MANY_NODES = "text::too_many_values", "a text unfolds to too many values",
+        "Aliases in YAML and loops in Lua can make millions of values out of a few lines. Their number is bounded, so \
+         that no text can exhaust the memory. Write less of them, or split the file.";
+    TEXT_SEVERAL_DOCUMENTS = "text::several_documents", "a YAML file holds several documents",
+        "A line `---` begins a new YAML document. Davit reads one document a file and does not guess which one is \
+         meant. Put the others into files of their own.";
+    TEXT_TAG = "text::tag", "a YAML tag means nothing here",
+        "Tags such as `!include` or `!!binary` ask the reader for something that Davit does not do. Remove the tag; the \
+         type of a value follows from the place where it stands.";
+    TEXT_DUPLICATE_KEY = "text::duplicate_key", "a key stands twice",
+        "The same key stands twice in one table, or the same file twice in one list. Which of the two was meant cannot \
+         be known, and silently taking the last one hides mistakes. Keep one of them.";
+    TEXT_UNKNOWN_KEY = "text::unknown_key", "a key is not known",
+        "A table has a key that means nothing at this place. It is refused rather than ignored, since it is nearly \
+         always misspelt or stands one level too high or too low. The nearest known key is suggested.";
+    TEXT_MISSING_KEY = "text::missing_key", "a required key is missing",
+        "A table lacks a key that it cannot do without. The help shows a line to add. Required keys of a deployment are \
+         davit, name, platform, libraries or types, configurations, coordinator, deploy, shutdown.";
+    TEXT_WRONG_TYPE = "text::wrong_type", "a value is of the wrong kind",
+        "A value is, say, a number where a text is wanted, or a table where a list is wanted. In YAML, a text that looks \
+         like a number or a truth value needs quotes; in Lua, a list has no holes and does not mix with named values.";
+    TEXT_BAD_NAME = "text::bad_name", "a name is not formed as it must be",
+        "Names consist of letters, digits and `_` and do not start with a digit; a member is written `Component.member`, \
+         a subsystem's component `left/Dynamics`. Names appear in events, sockets and logs, where other characters have \
+         a meaning of their own. Change the name, everywhere it is used.";
+    TEXT_BAD_VALUE = "text::bad_value", "a value is not one of those allowed",
+        "The place takes one of a few words, or a number in a range, and this is another. The help names the nearest \
+         word or the form that is wanted.";
+    TEXT_BAD_TIME = "text::bad_time", "a time is not a sensible number of its unit",
+        "Times are written as plain numbers; the unit belongs to the key: `timeout` and `within` are in seconds, keys \
+         ending in `_s` in seconds, in `_ms` in milliseconds. A time is more than zero and at most a day: anything else \
+         is taken for a mistake in the unit. Write `timeout: 0.5`, not `500ms`.";
+    TEXT_NOT_FINITE = "text::not_finite", "a number is NaN or infinite",
+        "Values that are not finite numbers are refused wherever they enter: no limit, comparison or controller treats \
+         them sensibly. Look at the calculation that led to it, such as a division by zero.";
+    TEXT_BAD_PARAMETER = "text::bad_parameter", "a parameter on the command line cannot be read",
+        "Parameters are given as `--set name=value` or `--set table.key=value`. The name is a name of Lua, the value is \
+         read as YAML: `--set gain=0.5`, `--set mode=fast`, `--set weights=[1.0, 2.0]`.";
+    TEXT_UNKNOWN_PARAMETER = "text::unknown_parameter", "nothing reads a parameter",
+        "A parameter was given, under `with:` or by `--set`, that no Lua file of the deployment reads. It is most likely \
+         misspelt, and the value meant for it would silently stay the old one. Correct the name, or remove it.";
+    TEXT_NOTHING = "text::nothing", "a file does not contain what it is named for",
+        "A file listed under `configurations` makes no configuration, or one under `coordinator` returns no state. \
+         A file of configurations calls `ConfiguratorConf { name = Configuration { … } }`, a coordinator's file ends \
+         with `return state { … }`. Perhaps the two files are exchanged.";
+    LUA_BYTECODE = "lua::bytecode", "a file is compiled Lua",
+        "Only Lua texts are read. Compiled Lua can break out of every sandbox, and it has no lines to point at. Give the \
+         source file.";
+    LUA_ERROR = "lua::error", "a Lua file fails while it runs",
+        "A Lua file is run once, from its beginning to its end, and this one raised an error on the way; the message is \
+         Lua's own. What had been made before is not used, since a file counts as a whole or not at all.";
+    LUA_UNDEFINED = "lua::undefined", "a name is not defined",
+        "A Lua file uses a name that nothing defines. In plain Lua it would be nil and the mistake would show much later, \
+         or never. Correct the spelling (the nearest name is suggested), define it in the file, or give it as a \
+         parameter: `with:` in the deployment, `--set name=value` on the command line.";
+    LUA_CLOSED = "lua::closed", "a part of Lua is closed here",
+        "Lua files describe a system and are read by every command, so they may not touch files, processes, the network \
+         or the clock, load other code, or call functions that no budget can stop (patterns). Write the data down, or \
+         give it as a parameter.";
+    LUA_INSTRUCTIONS = "lua::instructions", "a Lua file runs too long",
+        "A Lua file may take a fixed number of instructions and a fixed time, far more than any list of changes needs. \
+         This one took more: most likely a loop that does not end. Protected calls and coroutines do not lift the \
+         bound.";
+    LUA_MEMORY = "lua::memory", "a Lua file needs too much memory",
+        "A Lua file may hold a fixed number of bytes. This one grew past it: look for a table or a text that grows in a \
+         loop.";
+    LUA_ARGUMENTS = "lua::arguments", "a constructor was called with other arguments than it takes",
+        "The words of the language take fixed arguments: `create(component, type, { … })`, `destroy(component)`, \
+         `connect(from, to, policy)`, `disconnect(from, to)`, `property_set(property, value)`, `port_write(port, \
+         value)`, `operation_call(operation, …):undo(operation, …)`; `Configuration`, `ConfiguratorConf`, `state`, \
+         `trans` and `conn` take one table.";
+    LUA_UNUSED = "lua::unused", "a change stands in no configuration",
+        "A Lua file makes a change that no configuration holds, so it would silently never happen. Put it inside the \
+         braces of a `Configuration`, or remove it.";
+    LUA_BAD_RETURN = "lua::bad_return", "a Lua file returns something unexpected",
+        "A coordinator's file returns the state made by `state { … }`. A file of configurations returns nothing, or what \
+         `ConfiguratorConf` made. Anything else has no meaning here.";
+    LUA_PRINT = "lua::print", "a Lua file prints",
+        "A Lua file called `print`. Files are read by every command and may not write into its output, so what was \
+         printed is shown as a note. Remove the call when it is no longer needed.";
     // ---- deployment and types --------------------------------------------------------------------------------------
+    DEPLOY_MONITORS_LATER = "deploy::monitors_later", "monitors are not read yet",
+        "The deployment names files of monitors. This version does not evaluate them, so nothing will raise their \
+         events. Until then a component can watch its ports and raise events through an event port.";
+    TYPE_BAD_TYPE = "type::bad_type", "this is not a type of values",
+        "Types are `bool`, `int`, `float`, `string`, for ports also `event`, arrays `\"float[3]\"` and `\"float[]\"` (in \
+         quotes, since YAML has brackets of its own), and records `{x: float, y: float}`. Anything else cannot be \
+         checked, so it is refused.";
+    TYPE_BAD_DEFAULT = "type::bad_default", "a property's default or limits contradict its type",
+        "The default of a property must be of its type and lie within `min` and `max`, and `min` may not exceed `max`: \
+         a component could otherwise never be created without breaking its own rules. Correct the declaration.";
     // ---- configurations and plans ----------------------------------------------------------------------------------
+    CONF_KEYED_ENTRIES = "conf::keyed_entries", "two keyed entries in a state list have no order",
+        "A state list is applied in its order, but the named entries of a Lua table have none: with two or more keys, \
+         chance would decide which component changes first. Write them as a list: `{ 'compA:running', \
+         '_default:stopped' }`. One key alone is fine, and comes after the entries.";
+    CONF_DEFAULT_TWICE = "conf::default_twice", "`_default` stands twice in a state list",
+        "`_default` stands for every component that the list does not name, so it can be brought to one state only. \
+         Keep one of the entries, or name the components.";
+    CONF_BAD_STATE = "conf::bad_state", "this is not a run state that can be demanded",
+        "Run states are `unconfigured`, `stopped` and `running`; the names of RTT, ROS 2 and microblx are understood as \
+         well. `faulted` cannot be demanded: components get there by themselves. An entry of a state list is written \
+         `component:state`.";
+    CONF_UNKNOWN_CHANGE = "conf::unknown_change", "there is no such change",
+        "The changes are create, destroy, connect, disconnect, property_set, port_write and operation_call, one a list \
+         entry. Everything else a configuration does is said by its state lists.";
+    CONF_UNNAMED = "conf::unnamed", "a configuration has no name",
+        "A configuration is asked for by its name, and this one has none that could be used: it is not held by \
+         `ConfiguratorConf`, or another one of the same name took its place in the table (Lua keeps the last). One \
+         configuration alone in its file takes the file's name.";
+    CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
+        "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
+         them, and the requests for it.";
     // ---- stack -----------------------------------------------------------------------------------------------------
     // ---- coordinators (statecharts) --------------------------------------------------------------------------------
     CHART_NO_INITIAL = "chart::no_initial",
@@ -128,6 +261,16 @@ codes! {
     CHART_RUNAWAY = "chart::runaway",
         "The coordinator does not come to rest",
         "After an event a coordinator takes transitions until nothing is left to do. This one went on past the bound, and what it was doing was stopped there; it goes on with the next event. Completion events or time events lead round in a circle: look at the states named and let one transition wait for another event.";
+    CHART_FUNCTION = "chart::function", "a coordinator contains a function",
+        "Guards, actions and activities written as Lua functions need `trusted: true` and come in a later version; what \
+         they do could not be verified. A pure coordinator raises names of events where rFSM has functions: the work is \
+         done by components, conditions are watched by monitors, switches are made by configurations.";
+    CHART_UNNAMED = "chart::unnamed", "a state has no name",
+        "A state inside a state is written `name = state { … }`: transitions refer to it by that name. Without one it \
+         could never be entered.";
+    CHART_RESERVED_NAME = "chart::reserved_name", "a state has a name that means something else",
+        "The words entry, exit, doo, config, doc, type, new and rfsm have a meaning in a state's table, so a state of \
+         that name could not be told from it, or breaks references in rFSM. Choose another name.";
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
     // ---- youbot and standard libraries -----------------------------------------------------------------------------
     // ---- command line ----------------------------------------------------------------------------------------------

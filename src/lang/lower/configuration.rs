@@ -202,7 +202,9 @@ fn state_entry(cx: &mut Cx, who: &str, state: &str, origin: Origin) -> Option<St
         Some(state) => Some(state),
         None => {
             let help = did_you_mean(state, "states", RunState::NAMES.iter().copied());
-            cx.report(Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help));
+            cx.report(
+                Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help),
+            );
             None
         }
     };
@@ -229,15 +231,23 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
         }
         Kind::Map(entries) if entries.len() > 1 => {
             cx.report(
-                Finding::error(codes::CONF_UNKNOWN_CHANGE, "an entry of `changes` is one change, this has several keys")
-                    .at(entries[1].origin)
-                    .labelled("a second one")
-                    .help(format!("begin each change with its own `-`: `{EXAMPLE}`")),
+                Finding::error(
+                    codes::CONF_UNKNOWN_CHANGE,
+                    "an entry of `changes` is one change, this has several keys",
+                )
+                .at(entries[1].origin)
+                .labelled("a second one")
+                .help(format!("begin each change with its own `-`: `{EXAMPLE}`")),
             );
             return None;
         }
         _ => {
-            cx.wrong(&node, "an element of a configuration", "a change", "property_set(\"Dynamics.force_gain\", { 0.1, 0.1, 0.1 })");
+            cx.wrong(
+                &node,
+                "an element of a configuration",
+                "a change",
+                "property_set(\"Dynamics.force_gain\", { 0.1, 0.1, 0.1 })",
+            );
             return None;
         }
     };
@@ -282,15 +292,12 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
             let call = call(cx, &mut fields);
             let undo = match undo {
                 None => Some(None),
-                Some(node) => {
-                    Fields::of(cx, node, "`undo`", "undo: { operation: youbot.setControlMode, args: [0] }").and_then(
-                        |mut fields| {
-                            let undo = self::call(cx, &mut fields);
-                            fields.finish(cx);
-                            undo.map(Some)
-                        },
-                    )
-                }
+                Some(node) => Fields::of(cx, node, "`undo`", "undo: { operation: youbot.setControlMode, args: [0] }")
+                    .and_then(|mut fields| {
+                        let undo = self::call(cx, &mut fields);
+                        fields.finish(cx);
+                        undo.map(Some)
+                    }),
             };
             call.zip(undo).map(|(call, undo)| ChangeKind::OperationCall { call, undo })
         }

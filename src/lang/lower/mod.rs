@@ -141,7 +141,7 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
         Unit::Seconds => ("seconds", 1.0),
         Unit::Milliseconds => ("milliseconds", 1e-3),
     };
-    let mut refuse = |cx: &mut Cx, message: String, help: String| {
+    let refuse = |cx: &mut Cx, message: String, help: String| {
         let origin = cx.place(node);
         cx.report(Finding::error(codes::TEXT_BAD_TIME, message).at(origin).labelled(format!("in {word}")).help(help));
         None
@@ -150,7 +150,10 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
         let help = match parse_time(text) {
             Some(seconds) => {
                 let shown = seconds / factor;
-                format!("write the number alone: `{}`", example.replace(char::is_numeric, "#").replace("#.#", "#").replace('#', &shown.to_string()))
+                format!(
+                    "write the number alone: `{}`",
+                    example.replace(char::is_numeric, "#").replace("#.#", "#").replace('#', &shown.to_string())
+                )
             }
             None => format!("write it like `{example}`"),
         };
@@ -158,7 +161,11 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
     }
     let v = number(cx, node, what, example)?;
     if v <= 0.0 {
-        return refuse(cx, format!("{what} must be more than 0 {word}, this is {v}"), format!("write it like `{example}`"));
+        return refuse(
+            cx,
+            format!("{what} must be more than 0 {word}, this is {v}"),
+            format!("write it like `{example}`"),
+        );
     }
     if v * factor > LONGEST {
         let help = format!("it is a number of {word}: was another unit meant? Write it like `{example}`");
@@ -166,7 +173,11 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
     }
     let nanos = (v * factor * 1e9).round();
     if nanos < 1.0 {
-        return refuse(cx, format!("{what} of {v} {word} is shorter than a nanosecond"), format!("write it like `{example}`"));
+        return refuse(
+            cx,
+            format!("{what} of {v} {word} is shorter than a nanosecond"),
+            format!("write it like `{example}`"),
+        );
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     Some(Duration::from_nanos(nanos as u64))

@@ -1,0 +1,143 @@
+//! Where texts come from: the disk, or memory.
+
+use crate::diagnostics::Language;
+use crate::limits;
+use crate::model::{Code, Finding, codes};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+/// A set of files.
+#[derive(Debug, Clone, Default)]
+pub enum Sources {
+    /// The file system.
+    #[default]
+    Disk,
+    /// Texts by path; nothing else exists. For tests and for programs that make their files.
+    Memory(BTreeMap<PathBuf, Vec<u8>>),
+}
+
+impl Sources {
+    /// Texts in memory.
+    pub fn memory<P: Into<PathBuf>, T: Into<Vec<u8>>>(files: impl IntoIterator<Item = (P, T)>) -> Self {
+        Self::Memory(files.into_iter().map(|(path, text)| (path.into(), text.into())).collect())
+    }
+
+    /// The text of a file: by size, then by encoding; nothing past the limit is ever read.
+    ///
+    /// # Errors
+    /// A finding without a place.
+    pub fn read(&self, path: &Path) -> Result<String, Box<Finding>> {
+        let shown = path.display();
+        let refuse = |code: Code, message: String, help: String| Box::new(Finding::error(code, message).help(help));
+        let too_large = || {
+            let limit = limits::FILE_BYTES / 1024 / 1024;
+            refuse(
+                codes::TEXT_TOO_LARGE,
+                format!("{shown} is larger than {limit} MB"),
+                "split it, or check that it is the right file".to_owned(),
+            )
+        };
+        let bytes = match self {
+            Self::Memory(files) => match files.get(&normal(path)) {
+                Some(bytes) if bytes.len() as u64 > limits::FILE_BYTES => return Err(too_large()),
+                Some(bytes) => bytes.clone(),
+                None => return Err(refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), self.near(path))),
+            },
+            Self::Disk => {
+                let cannot = |error: std::io::Error| {
+                    if error.kind() == std::io::ErrorKind::NotFound {
+                        refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), self.near(path))
+                    } else {
+                        let help = "it must be a readable text file".to_owned();
+                        refuse(codes::TEXT_UNREADABLE, format!("{shown} cannot be read: {error}"), help)
+                    }
+                };
+                let meta = std::fs::metadata(path).map_err(cannot)?;
+                if meta.is_dir() {
+                    return Err(refuse(
+                        codes::TEXT_UNREADABLE,
+                        format!("{shown} is a folder"),
+                        "name a file in it".to_owned(),
+                    ));
+                }
+                if meta.len() > limits::FILE_BYTES {
+                    return Err(too_large());
+                }
+                let file = File::open(path).map_err(cannot)?;
+                let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).unwrap_or(0) + 1);
+                // Pipes and growing files have no honest length: stop one byte past the limit.
+                file.take(limits::FILE_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;
+                if bytes.len() as u64 > limits::FILE_BYTES {
+                    return Err(too_large());
+                }
+                bytes
+            }
+        };
+        String::from_utf8(bytes).map_err(|error| {
+            let valid = error.utf8_error().valid_up_to();
+            let line = error.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count() + 1;
+            if error.as_bytes().starts_with(b"\x1bLua") {
+                return refuse(
+                    codes::LUA_BYTECODE,
+                    format!("{shown} is compiled Lua"),
+                    "only texts are read: give the source file".to_owned(),
+                );
+            }
+            refuse(
+                codes::TEXT_NOT_UTF8,
+                format!("{shown} is not UTF-8: byte {valid} (line {line}) belongs to no character"),
+                "save the file as UTF-8".to_owned(),
+            )
+        })
+    }
+
+    /// Files near to a name that does not exist.
+    fn near(&self, path: &Path) -> String {
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        let names: Vec<String> = match self {
+            Self::Memory(files) => {
+                let folder = normal(&folder);
+                let inside = files.keys().filter(|p| p.parent() == Some(&folder));
+                inside.filter_map(|p| Some(p.file_name()?.to_str()?.to_owned())).collect()
+            }
+            Self::Disk => {
+                let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
+                let Ok(list) = std::fs::read_dir(folder) else {
+                    return format!("there is no folder {} either", folder.display());
+                };
+                let names = list.take(1_000).filter_map(|e| e.ok()?.file_name().into_string().ok());
+                let mut names: Vec<_> = names.filter(|n| language(Path::new(n)).is_some()).collect();
+                names.sort();
+                names
+            }
+        };
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        crate::model::finding::did_you_mean(name, "files", names.iter().map(String::as_str))
+    }
+}
+
+/// The language of a file, by its ending.
+pub fn language(path: &Path) -> Option<Language> {
+    match path.extension()?.to_str()? {
+        "lua" => Some(Language::Lua),
+        "yaml" | "yml" => Some(Language::Yaml),
+        _ => None,
+    }
+}
+
+/// `a/b/../c` → `a/c`, as far as that can be said without the disk.
+pub fn normal(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
+                out.pop();
+            }
+            part => out.push(part),
+        }
+    }
+    out
+}

@@ -1,0 +1,249 @@
+//! The entrances: a deployment with all its files, or one file alone.
+
+use super::files::{self, Sources};
+use super::lower::{chart, configuration, deployment};
+use super::lua;
+use super::params::Params;
+use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::yaml;
+use crate::diagnostics::{Language, SourceMap};
+use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Origin, Statechart, codes};
+use rustc_hash::FxHashMap;
+use std::path::{Path, PathBuf};
+
+/// How to load.
+#[derive(Debug, Clone, Default)]
+pub struct LoadOptions {
+    /// Parameters (`--set a.b=1` is `("a.b", "1")`): they override `with:`.
+    pub set: Vec<(String, String)>,
+}
+
+/// What loading a deployment gave.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The deployment; none when something in its texts refuses it.
+    pub deployment: Option<Deployment>,
+    /// What was found.
+    pub findings: Findings,
+    /// The texts, and where everything stands.
+    pub sources: SourceMap,
+    /// Whether a text could not be read or parsed at all (exit status 2); else what is wrong was judged (1).
+    pub unreadable: bool,
+}
+
+/// What loading a file of configurations gave.
+#[derive(Debug)]
+pub struct LoadedConfigurations {
+    /// Its configurations, in written order.
+    pub configurations: Vec<Configuration>,
+    /// What was found.
+    pub findings: Findings,
+    /// The text, and where everything stands.
+    pub sources: SourceMap,
+    /// As in [`Loaded`].
+    pub unreadable: bool,
+}
+
+/// What loading a coordinator's file gave.
+#[derive(Debug)]
+pub struct LoadedCoordinator {
+    /// The statechart.
+    pub coordinator: Option<Statechart>,
+    /// What was found.
+    pub findings: Findings,
+    /// The text, and where everything stands.
+    pub sources: SourceMap,
+    /// As in [`Loaded`].
+    pub unreadable: bool,
+}
+
+/// Loads a deployment file and all that it names.
+pub fn load(path: &Path, options: &LoadOptions) -> Loaded {
+    load_from(&Sources::Disk, path, options)
+}
+
+/// The same, from a given set of files.
+pub fn load_from(from: &Sources, path: &Path, options: &LoadOptions) -> Loaded {
+    let mut cx = Cx::default();
+    let deployment = load_deployment(&mut cx, from, path, options);
+    let deployment = deployment.filter(|_| !crate::model::finding::has_errors(&cx.findings));
+    Loaded { deployment, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+}
+
+/// Loads one file of configurations, Lua or YAML.
+pub fn load_configurations(from: &Sources, path: &Path, options: &LoadOptions) -> LoadedConfigurations {
+    let mut cx = Cx::default();
+    let mut params = Params::new(&mut cx, Vec::new(), &options.set);
+    let mut configurations = Vec::new();
+    if let Some(node) = configuration_tree(&mut cx, from, path, Origin::NONE, &mut params) {
+        configurations = configuration::configurations(&mut cx, node);
+        unique(&mut cx, &mut configurations);
+    }
+    params.finish(&mut cx);
+    LoadedConfigurations { configurations, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+}
+
+/// Loads one coordinator's file, Lua or YAML.
+pub fn load_coordinator(from: &Sources, path: &Path, options: &LoadOptions) -> LoadedCoordinator {
+    let mut cx = Cx::default();
+    let mut params = Params::new(&mut cx, Vec::new(), &options.set);
+    let coordinator = coordinator(&mut cx, from, path, Origin::NONE, &mut params);
+    params.finish(&mut cx);
+    let coordinator = coordinator.filter(|_| !crate::model::finding::has_errors(&cx.findings));
+    LoadedCoordinator { coordinator, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+}
+
+/// Reads a text into the source map. `named_at` is the place that named the file.
+fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -> Option<(Reading, Language)> {
+    let Some(language) = files::language(path) else {
+        let message = format!("{} is neither Lua nor YAML by its name", path.display());
+        let help = "files end in `.lua`, `.yaml` or `.yml`";
+        cx.refuse(Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, message).at(named_at).help(help));
+        return None;
+    };
+    match from.read(path) {
+        Ok(text) => {
+            let file = cx.sources.add_file(path.display().to_string(), text, language);
+            let whole = cx.sources.whole_file(file);
+            Some((Reading { file, whole }, language))
+        }
+        Err(finding) => {
+            cx.refuse(finding.at(named_at));
+            None
+        }
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The map of configurations of a file.
+fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Node> {
+    let (reading, language) = open(cx, from, path, named_at)?;
+    match language {
+        Language::Lua => {
+            let made = lua::read(cx, reading, params, &stem(path))?;
+            if made.configurations.is_none() {
+                nothing(cx, reading, "configuration", "`ConfiguratorConf { name = Configuration { … } }`");
+            }
+            made.configurations
+        }
+        Language::Yaml => {
+            let node = yaml::read(cx, reading)?;
+            only_key(cx, node, reading, "configurations", "a file of configurations")
+        }
+    }
+}
+
+fn nothing(cx: &mut Cx, reading: Reading, what: &str, how: &str) {
+    if !crate::model::finding::has_errors(&cx.findings) {
+        let finding = Finding::error(codes::TEXT_NOTHING, format!("there is no {what} in this file"));
+        cx.report(finding.at(reading.whole).help(format!("write {how}")));
+    }
+}
+
+/// The value of a file's one top-level key.
+fn only_key(cx: &mut Cx, node: Node, reading: Reading, key: &'static str, what: &'static str) -> Option<Node> {
+    let node = match node.kind {
+        Kind::Null => Node::new(Kind::Map(Vec::new()), reading.whole),
+        _ => node,
+    };
+    let mut fields = super::tree::Fields::of(cx, node, what, &format!("{key}: …"))?;
+    let value = fields.required(cx, key, &format!("{key}: …"));
+    fields.finish(cx);
+    value
+}
+
+/// Reports configurations of the same name, and keeps the first of each.
+fn unique(cx: &mut Cx, configurations: &mut Vec<Configuration>) {
+    let mut seen: FxHashMap<ConfigId, Origin> = FxHashMap::default();
+    configurations.retain(|c| match seen.get(&c.id) {
+        None => {
+            seen.insert(c.id, c.origin);
+            true
+        }
+        Some(first) => {
+            cx.report(
+                Finding::error(codes::CONF_DUPLICATE, format!("there are two configurations `{}`", c.id))
+                    .at(c.origin)
+                    .labelled("again here")
+                    .also(*first, "first here")
+                    .help("a request names one configuration: give one of them another name"),
+            );
+            false
+        }
+    });
+}
+
+fn coordinator(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Statechart> {
+    let (reading, language) = open(cx, from, path, named_at)?;
+    let node = match language {
+        Language::Lua => {
+            let made = lua::read(cx, reading, params, &stem(path))?;
+            if made.chart.is_none() {
+                nothing(cx, reading, "coordinator", "`return state { … }`");
+            }
+            made.chart?
+        }
+        Language::Yaml => {
+            let node = yaml::read(cx, reading)?;
+            only_key(cx, node, reading, "coordinator", "a coordinator's file")?
+        }
+    };
+    chart::statechart(cx, node)
+}
+
+fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptions) -> Option<Deployment> {
+    let (reading, language) = open(cx, from, path, Origin::NONE)?;
+    if language != Language::Yaml {
+        let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "a deployment is written in YAML").at(reading.whole);
+        cx.refuse(finding.help("give the deployment's file (`deployments/NAME.yaml`); this one can be named in it"));
+        return None;
+    }
+    let node = yaml::read(cx, reading)?;
+    let node = match node.kind {
+        Kind::Null => Node::new(Kind::Map(Vec::new()), reading.whole),
+        _ => node,
+    };
+    let origin = match &node.kind {
+        Kind::Map(entries) => entries.first().map_or(reading.whole, |e: &Entry| e.origin),
+        _ => reading.whole,
+    };
+    let draft = deployment::draft(cx, node, &stem(path))?;
+    let mut params = Params::new(cx, draft.with, &options.set);
+    let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+    let mut configurations = Vec::new();
+    for (file, named_at) in draft.configurations.iter().flatten() {
+        if let Some(node) = configuration_tree(cx, from, &folder.join(file), *named_at, &mut params) {
+            let of_file = configuration::configurations(cx, node);
+            if configurations.is_empty() {
+                configurations = of_file;
+            } else {
+                configurations.extend(of_file);
+            }
+        }
+    }
+    unique(cx, &mut configurations);
+    let chart = match &draft.coordinator {
+        Some((file, named_at)) => coordinator(cx, from, &folder.join(file), *named_at, &mut params),
+        None => None,
+    };
+    params.finish(cx);
+    Some(Deployment {
+        name: draft.name?,
+        platform: draft.platform?,
+        libraries: draft.libraries,
+        types: draft.types,
+        activities: draft.activities,
+        configurations,
+        coordinator: chart?,
+        emits: draft.emits,
+        deploy: draft.deploy?,
+        shutdown: draft.shutdown?,
+        limits: draft.limits,
+        durability: draft.durability,
+        origin,
+        key_origins: draft.key_origins,
+    })
+}

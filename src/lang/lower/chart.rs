@@ -1,0 +1,251 @@
+//! Coordinators: rFSM's constructors in Lua, and the same in YAML.
+//!
+//! ```yaml
+//! coordinator:
+//!   states:
+//!     idle: {}
+//!     choice: { connector: true }
+//!     copying:
+//!       config: enable_copying          # one or a list, like entry, exit, effect and events
+//!       entry: [e_begun]
+//!   transitions:
+//!     - { src: initial, tgt: idle }
+//!     - { src: idle, tgt: copying, events: [e_aligned], effect: e_seen, pn: 1 }
+//! ```
+
+use super::{name, number, one_or_more, text, truth};
+use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::limits;
+use crate::model::statechart::{self, Action, Connector, ROOT, State, Statechart, Transition, Trigger};
+use crate::model::{ConfigId, EventName, Finding, Ident, Origin, codes};
+
+/// Names that mean something else in a state's table, in the one language or the other.
+const RESERVED: &[&str] = &["entry", "exit", "doo", "config", "doc", "type", "new", "rfsm"];
+
+/// Fields of a root state that rFSM gives to its host: printers and hooks. They say nothing about coordination.
+const HOST: &[&str] = &["err", "warn", "info", "dbg", "getevents", "idle_hook"];
+
+/// The chart of a tree: what `state { … }` made, or YAML's map.
+pub fn statechart(cx: &mut Cx, node: Node) -> Option<Statechart> {
+    let root = Ident::new(ROOT).ok()?;
+    let root = state(cx, root, node, 0)?;
+    Some(Statechart::new(root))
+}
+
+/// A state's parts, wherever they came from.
+struct Parts {
+    fields: Fields,
+    children: Vec<Entry>,
+    transitions: Vec<Node>,
+}
+
+fn state(cx: &mut Cx, name: Ident, node: Node, depth: usize) -> Option<State> {
+    let origin = node.origin;
+    if depth > limits::TEXT_DEPTH {
+        let finding = Finding::error(codes::TEXT_TOO_DEEP, "states nested too deeply").at(origin);
+        cx.report(finding.help("a statechart has a handful of levels"));
+        return None;
+    }
+    let Parts { mut fields, children, transitions } = match node.kind {
+        Kind::Made("state", named, items) => of_lua(cx, origin, named, items, depth == 0),
+        _ => of_yaml(cx, node)?,
+    };
+    let mut out = State::new(name);
+    out.origin = origin;
+    for entry in children {
+        out.children.extend(child(cx, entry, depth));
+    }
+    out.transitions = transitions.into_iter().filter_map(|node| transition(cx, node)).collect();
+    out.entry = actions(cx, &mut fields, "entry");
+    out.exit = actions(cx, &mut fields, "exit");
+    if let Some(node) = fields.take("config") {
+        for node in one_or_more(node) {
+            let id = self::name::<ConfigId>(cx, &node, "`config`", "config = \"enable_copying\"");
+            let place = cx.place(&node);
+            out.config.extend(id.map(|id| (id, place)));
+        }
+    }
+    if let Some(node) = fields.take("doo") {
+        function(cx, &node, "`doo`");
+    }
+    out.doc = doc(cx, &mut fields);
+    fields.finish(cx);
+    Some(out)
+}
+
+fn doc(cx: &mut Cx, fields: &mut Fields) -> Option<String> {
+    fields.take("doc").and_then(|node| text(cx, &node, "`doc`", "doc = \"what it is for\""))
+}
+
+/// A Lua state: values made by `state` and `conn` are children whatever their key, by `trans` transitions whatever
+/// theirs. Keys that begin with `_` are rFSM's own.
+fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root: bool) -> Parts {
+    let (mut children, mut transitions, mut others) = (Vec::new(), Vec::with_capacity(items.len()), Vec::new());
+    for node in items {
+        match &node.kind {
+            Kind::Made("trans", ..) => transitions.push(node),
+            Kind::Made("state" | "conn", ..) => {
+                let finding = Finding::error(codes::CHART_UNNAMED, "a state without a name").at(node.origin);
+                cx.report(finding.help("write `name = state { … }`"));
+            }
+            _ => cx.wrong(
+                &node,
+                "an element of a state",
+                "a transition",
+                "trans { src = \"a\", tgt = \"b\", events = { \"e_go\" } }",
+            ),
+        }
+    }
+    for entry in named {
+        match &entry.value.kind {
+            Kind::Made("state" | "conn", ..) => children.push(entry),
+            Kind::Made("trans", ..) => transitions.push(entry.value),
+            _ if entry.key.starts_with('_') || (root && HOST.contains(&&*entry.key)) => {}
+            _ => others.push(entry),
+        }
+    }
+    Parts { fields: Fields::new("a state", origin, others), children, transitions }
+}
+
+fn of_yaml(cx: &mut Cx, node: Node) -> Option<Parts> {
+    const EXAMPLE: &str = "idle: { entry: e_idle }";
+    let node = match node.kind {
+        // `idle:` alone is a state with nothing in it.
+        Kind::Null => Node::new(Kind::Map(Vec::new()), node.origin),
+        _ => node,
+    };
+    let mut fields = Fields::of(cx, node, "a state", EXAMPLE)?;
+    let children = match fields.take("states").map(|node| (node.origin, node)) {
+        None => Vec::new(),
+        Some((_, Node { kind: Kind::Map(entries), .. })) => entries,
+        Some((_, Node { kind: Kind::List(list), .. })) if list.is_empty() => Vec::new(),
+        Some((_, node)) => {
+            cx.wrong(&node, "`states`", "a table of named values", "states: { idle: {}, busy: {} }");
+            Vec::new()
+        }
+    };
+    let transitions = match fields.take("transitions") {
+        None => Vec::new(),
+        Some(Node { kind: Kind::List(list), .. }) => list,
+        Some(node) => {
+            cx.wrong(&node, "`transitions`", "a list", "transitions: [{ src: initial, tgt: idle }]");
+            Vec::new()
+        }
+    };
+    Some(Parts { fields, children, transitions })
+}
+
+fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
+    let exact = cx.sources.is_exact(entry.origin);
+    let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
+    let reserved = RESERVED.contains(&&*entry.key);
+    if reserved {
+        let origin = cx.part(entry.origin, &entry.key);
+        let finding = Finding::error(codes::CHART_RESERVED_NAME, format!("a state cannot be called `{}`", entry.key));
+        cx.report(finding.at(origin).help("the word means something else in a state's table: take another name"));
+    }
+    let ident = name::<Ident>(cx, &key, "a state's name", "idle = state {}");
+    let is_connector = match &entry.value.kind {
+        Kind::Made(class, ..) => *class == "conn",
+        Kind::Map(entries) => entries.iter().any(|e| e.key == "connector"),
+        _ => false,
+    };
+    let mut value = entry.value;
+    if exact {
+        value.origin = entry.origin;
+    }
+    let origin = value.origin;
+    let node = if is_connector {
+        let mut fields = Fields::of(cx, value, "a connector", "choice: { connector: true }")?;
+        if let Some(node) = fields.take("connector")
+            && truth(cx, &node, "`connector`", "connector: true") == Some(false)
+        {
+            let finding = Finding::error(codes::TEXT_BAD_VALUE, "`connector` can only be true").at(node.origin);
+            cx.report(finding.help("a state is written without this key"));
+        }
+        let doc = doc(cx, &mut fields);
+        fields.finish(cx);
+        ident.map(|name| statechart::Node::Connector(Connector { name, doc, origin }))
+    } else {
+        // Without a name its inside is still looked at, so that all findings come at once.
+        let stand_in = ident.or_else(|| Ident::new("unnamed").ok())?;
+        let inside = state(cx, stand_in, value, depth + 1);
+        ident.and(inside).map(statechart::Node::State)
+    };
+    node.filter(|_| !reserved)
+}
+
+fn transition(cx: &mut Cx, node: Node) -> Option<Transition> {
+    const EXAMPLE: &str = "{ src: idle, tgt: busy, events: [e_go] }";
+    let origin = node.origin;
+    let mut fields = match node.kind {
+        Kind::Made("trans", named, items) => {
+            if let Some(item) = items.first() {
+                cx.wrong(item, "an element of a transition", "named", "src = \"a\", tgt = \"b\"");
+            }
+            let named = named.into_iter().filter(|e| !e.key.starts_with('_')).collect();
+            Fields::new("a transition", origin, named)
+        }
+        _ => Fields::of(cx, node, "a transition", EXAMPLE)?,
+    };
+    let mut out = Transition { origin, ..Transition::default() };
+    out.src = reference(cx, &mut fields, "src");
+    out.tgt = reference(cx, &mut fields, "tgt");
+    if let Some(node) = fields.take("events") {
+        for node in one_or_more(node) {
+            let place = cx.place(&node);
+            match &node.kind {
+                Kind::Str(text) => match Trigger::parse(text) {
+                    Ok(trigger) => out.events.push((trigger, place)),
+                    Err(error) => super::bad_name(cx, &node, &error, "events = { \"e_go\" }"),
+                },
+                Kind::Function => function(cx, &node, "a predicate in `events`"),
+                _ => cx.wrong(&node, "an event", "a name (a text)", "events = { \"e_go\" }"),
+            }
+        }
+    }
+    if let Some(node) = fields.take("guard") {
+        function(cx, &node, "`guard`");
+    }
+    out.effect = actions(cx, &mut fields, "effect");
+    if let Some(node) = fields.take("pn") {
+        out.pn = number(cx, &node, "`pn`", "pn = 1").unwrap_or_default();
+    }
+    out.doc = doc(cx, &mut fields);
+    fields.finish(cx);
+    Some(out)
+}
+
+fn reference(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<(String, Origin)> {
+    let node = fields.take(key)?;
+    let place = cx.place(&node);
+    text(cx, &node, &format!("`{key}`"), "src = \"idle\"").map(|text| (text, place))
+}
+
+/// Names to raise: one or a list.
+fn actions(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(Action, Origin)> {
+    let Some(node) = fields.take(key) else { return Vec::new() };
+    let mut out = Vec::new();
+    for node in one_or_more(node) {
+        if matches!(node.kind, Kind::Function) {
+            function(cx, &node, &format!("`{key}`"));
+            continue;
+        }
+        let place = cx.place(&node);
+        let event = name::<EventName>(cx, &node, &format!("`{key}`"), &format!("{key} = \"e_ready\""));
+        out.extend(event.map(|event| (Action::Raise(event), place)));
+    }
+    out
+}
+
+/// A function in a chart: its place is known, its meaning comes later.
+fn function(cx: &mut Cx, node: &Node, what: &str) {
+    if !matches!(node.kind, Kind::Function) {
+        cx.wrong(node, what, "a function", "the name of an event under `entry`, `exit` or `effect`");
+        return;
+    }
+    let message = format!("{what} is a function, and this version runs pure coordinators only");
+    cx.report(Finding::error(codes::CHART_FUNCTION, message).at(node.origin).labelled("in this one").help(
+        "raise the name of an event instead (`entry = \"e_ready\"`), and let a component or a monitor do the work",
+    ));
+}

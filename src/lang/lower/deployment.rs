@@ -1,0 +1,265 @@
+//! Deployment files: the keys of design §16. The files they name are read by the caller.
+
+use super::{Unit, choice, name, one_or_more, text, time, types, whole};
+use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::model::{
+    Activity, BringUp, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Origin, TakeDown, codes,
+};
+use std::collections::BTreeMap;
+
+/// A deployment file, before the files that it names are read.
+pub struct Draft {
+    /// `name`
+    pub name: Option<Ident>,
+    /// `platform`
+    pub platform: Option<Ident>,
+    /// `libraries`
+    pub libraries: Vec<Ident>,
+    /// `types`
+    pub types: Vec<ComponentType>,
+    /// `activities`
+    pub activities: BTreeMap<Ident, Activity>,
+    /// `configurations`: paths and where they are named; none when the key is missing.
+    pub configurations: Option<Vec<(String, Origin)>>,
+    /// `coordinator`
+    pub coordinator: Option<(String, Origin)>,
+    /// `with`: parameters of the Lua files.
+    pub with: Vec<Entry>,
+    /// `emits`
+    pub emits: Vec<(EventName, Origin)>,
+    /// `deploy`
+    pub deploy: Option<BringUp>,
+    /// `shutdown`
+    pub shutdown: Option<TakeDown>,
+    /// `limits`
+    pub limits: DeploymentLimits,
+    /// `durability`
+    pub durability: Durability,
+    /// Where keys stand, by path.
+    pub key_origins: BTreeMap<String, Origin>,
+}
+
+/// Notes where every key of the file stands, by its path. Types are left out: they carry their own places.
+fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>) {
+    for entry in entries {
+        if prefix.is_empty() && matches!(&*entry.key, "types" | "with") {
+            continue;
+        }
+        let path = if prefix.is_empty() { entry.key.to_string() } else { format!("{prefix}.{}", entry.key) };
+        match &entry.value.kind {
+            Kind::Map(inner) => note_keys(inner, &path, out),
+            Kind::List(list) => {
+                for (i, node) in list.iter().enumerate() {
+                    out.insert(format!("{path}[{i}]"), node.origin);
+                }
+            }
+            Kind::Str(_) | Kind::Int(_) | Kind::Float(_) => {
+                out.insert(path, entry.value.origin);
+                continue;
+            }
+            _ => {}
+        }
+        out.insert(path, entry.origin);
+    }
+}
+
+/// Lowers the tree of a deployment file.
+pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
+    let mut key_origins = BTreeMap::new();
+    if let Kind::Map(entries) = &node.kind {
+        note_keys(entries, "", &mut key_origins);
+    }
+    let mut fields = Fields::of(cx, node, "a deployment", "davit: 1")?;
+    if let Some(node) = fields.required(cx, "davit", "davit: 1") {
+        match node.kind {
+            Kind::Int(1) => {}
+            Kind::Int(_) | Kind::Float(_) => cx.report(
+                Finding::error(codes::TEXT_BAD_VALUE, "this version of Davit reads format 1 only")
+                    .at(node.origin)
+                    .labelled("another format")
+                    .help("write `davit: 1`, or use the version of Davit that the file was written for"),
+            ),
+            _ => cx.wrong(&node, "`davit`", "a whole number (the format's version)", "davit: 1"),
+        }
+    }
+    let deployment = fields
+        .required(cx, "name", &format!("name: {file_name}"))
+        .and_then(|node| name::<Ident>(cx, &node, "`name`", "name: youbot_arm"));
+    let platform = fields
+        .required(cx, "platform", "platform: embedded")
+        .and_then(|node| name::<Ident>(cx, &node, "`platform`", "platform: embedded"));
+    let libraries = fields.take("libraries").map(|node| libraries(cx, node));
+    let types = fields.take("types").map(|node| types::types(cx, node));
+    if libraries.is_none() && types.is_none() {
+        let _ = fields.required(cx, "libraries", "libraries: [standard]");
+    }
+    let activities = fields.take("activities").map(|node| activities(cx, node)).unwrap_or_default();
+    let configurations = fields
+        .required(cx, "configurations", "configurations: [configurations.lua]")
+        .map(|node| files(cx, node, "`configurations`", "configurations: [configurations.lua]"));
+    let coordinator = fields.required(cx, "coordinator", "coordinator: coordinator.lua").and_then(|node| {
+        let path = text(cx, &node, "`coordinator`", "coordinator: coordinator.lua")?;
+        Some((path, node.origin))
+    });
+    if let Some(node) = fields.take("monitors") {
+        let named = files(cx, node, "`monitors`", "monitors: [monitors.lua]");
+        if let Some((path, origin)) = named.first() {
+            let message = format!("monitors are not read by this version: `{path}` is left out");
+            let help = "a component can watch instead and raise events through an event port";
+            cx.report(Finding::warning(codes::DEPLOY_MONITORS_LATER, message).at(*origin).help(help));
+        }
+    }
+    let with = match fields.take("with") {
+        None => Vec::new(),
+        Some(Node { kind: Kind::Map(entries), .. }) => entries,
+        Some(node) => {
+            cx.wrong(&node, "`with`", "a table of named values", "with: { gain: 0.5 }");
+            Vec::new()
+        }
+    };
+    let emits = fields.take("emits").map(|node| emits(cx, node)).unwrap_or_default();
+    let deploy = fields.required(cx, "deploy", DEPLOY).and_then(|node| bring_up(cx, node));
+    let shutdown = fields.required(cx, "shutdown", SHUTDOWN).and_then(|node| take_down(cx, node));
+    let limits = fields.take("limits").map(|node| limits(cx, node)).unwrap_or_default();
+    let durability = fields.take("durability").and_then(|node| {
+        choice(cx, &node, "`durability`", &[("full", Durability::Full), ("relaxed", Durability::Relaxed)])
+    });
+    fields.finish(cx);
+    Some(Draft {
+        name: deployment,
+        platform,
+        libraries: libraries.unwrap_or_default(),
+        types: types.unwrap_or_default(),
+        activities,
+        configurations,
+        coordinator,
+        with,
+        emits,
+        deploy,
+        shutdown,
+        limits,
+        durability: durability.unwrap_or_default(),
+        key_origins,
+    })
+}
+
+const DEPLOY: &str = "deploy: { event: e_start, up: operational, within_s: 20 }";
+const SHUTDOWN: &str = "shutdown: { event: e_shutdown, down: idle, within_s: 20 }";
+
+fn libraries(cx: &mut Cx, node: Node) -> Vec<Ident> {
+    one_or_more(node).iter().filter_map(|node| name(cx, node, "a library", "libraries: [standard]")).collect()
+}
+
+fn files(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(String, Origin)> {
+    let mut out: Vec<(String, Origin)> = Vec::new();
+    for node in one_or_more(node) {
+        let Some(path) = text(cx, &node, what, example) else { continue };
+        if let Some((_, first)) = out.iter().find(|(p, _)| *p == path) {
+            let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{path}` is named twice"));
+            cx.report(finding.at(node.origin).also(*first, "first here").help("name each file once"));
+            continue;
+        }
+        out.push((path, node.origin));
+    }
+    out
+}
+
+fn emits(cx: &mut Cx, node: Node) -> Vec<(EventName, Origin)> {
+    one_or_more(node)
+        .iter()
+        .filter_map(|node| Some((name(cx, node, "an emitted event", "emits: [e_ready]")?, node.origin)))
+        .collect()
+}
+
+fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
+    const EXAMPLE: &str = "control: { period_ms: 1.0, priority: 80 }";
+    let entries = match node.kind {
+        Kind::Map(entries) => entries,
+        _ => {
+            cx.wrong(&node, "`activities`", "a table of named values", EXAMPLE);
+            return BTreeMap::new();
+        }
+    };
+    let mut out = BTreeMap::new();
+    for entry in entries {
+        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+        let ident = name::<Ident>(cx, &key, "an activity", EXAMPLE);
+        let value = match entry.value.kind {
+            Kind::Null => Node::new(Kind::Map(Vec::new()), entry.origin),
+            _ => entry.value,
+        };
+        let Some(mut fields) = Fields::of(cx, value, "an activity", EXAMPLE) else { continue };
+        let period = fields
+            .take("period_ms")
+            .and_then(|node| time(cx, &node, "`period_ms`", Unit::Milliseconds, "period_ms: 1.0"));
+        let priority = fields.take("priority").and_then(|node| whole(cx, &node, "`priority`", 0..=99, "priority: 80"));
+        let cpu = fields.take("cpu").and_then(|node| whole(cx, &node, "`cpu`", 0..=4095, "cpu: 1"));
+        fields.finish(cx);
+        if let Some(ident) = ident {
+            let priority = priority.and_then(|p| u8::try_from(p).ok()).unwrap_or_default();
+            let cpu = cpu.and_then(|c| u32::try_from(c).ok());
+            out.insert(ident, Activity { period, priority, cpu, origin: entry.origin });
+        }
+    }
+    out
+}
+
+/// The name or path of a coordinator's state.
+fn state(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<String> {
+    let path = text(cx, node, what, example)?;
+    let bad = path.split('.').find_map(|part| Ident::new(part).err());
+    if let Some(error) = bad {
+        let finding = Finding::error(codes::TEXT_BAD_NAME, format!("`{path}` is not the name of a state"));
+        cx.report(finding.at(node.origin).labelled(error.reason).help(format!("write it like `{example}`")));
+        return None;
+    }
+    Some(path)
+}
+
+fn bring_up(cx: &mut Cx, node: Node) -> Option<BringUp> {
+    let mut fields = Fields::of(cx, node, "`deploy`", DEPLOY)?;
+    let event = fields.required(cx, "event", "event: e_start");
+    let event = event.and_then(|node| name::<EventName>(cx, &node, "`deploy.event`", "event: e_start"));
+    let up = fields.required(cx, "up", "up: operational");
+    let up = up.and_then(|node| state(cx, &node, "`deploy.up`", "up: operational"));
+    let failed = fields.take("failed").map(one_or_more).unwrap_or_default();
+    let failed = failed.iter().filter_map(|node| state(cx, node, "`deploy.failed`", "failed: [fault]")).collect();
+    let within = fields.required(cx, "within_s", "within_s: 20");
+    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    fields.finish(cx);
+    Some(BringUp { event: event?, up: up?, failed, within: within? })
+}
+
+fn take_down(cx: &mut Cx, node: Node) -> Option<TakeDown> {
+    let mut fields = Fields::of(cx, node, "`shutdown`", SHUTDOWN)?;
+    let event = fields.required(cx, "event", "event: e_shutdown");
+    let event = event.and_then(|node| name::<EventName>(cx, &node, "`shutdown.event`", "event: e_shutdown"));
+    let down = fields.required(cx, "down", "down: idle");
+    let down = down.and_then(|node| state(cx, &node, "`shutdown.down`", "down: idle"));
+    let within = fields.required(cx, "within_s", "within_s: 20");
+    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    fields.finish(cx);
+    Some(TakeDown { event: event?, down: down?, within: within? })
+}
+
+/// Most frames a deployment may ask for: each holds its inverse in memory.
+const MOST_FRAMES: i64 = 100_000;
+
+fn limits(cx: &mut Cx, node: Node) -> DeploymentLimits {
+    let mut out = DeploymentLimits::default();
+    let Some(mut fields) = Fields::of(cx, node, "`limits`", "limits: { stack: 64, step_timeout_s: 1.0 }") else {
+        return out;
+    };
+    if let Some(node) = fields.take("stack")
+        && let Some(v) = whole(cx, &node, "`stack`", 1..=MOST_FRAMES, "stack: 64")
+    {
+        out.stack = usize::try_from(v).unwrap_or(out.stack);
+    }
+    if let Some(node) = fields.take("step_timeout_s")
+        && let Some(v) = time(cx, &node, "`step_timeout_s`", Unit::Seconds, "step_timeout_s: 1.0")
+    {
+        out.step_timeout = v;
+    }
+    fields.finish(cx);
+    out
+}

@@ -1,0 +1,217 @@
+//! The words of the Configurator language and of rFSM, as Lua functions that record what they are given.
+
+use super::recorder::{Classed, Shared};
+use super::{convert, sandbox};
+use crate::lang::tree::{Entry, Kind, Node};
+use crate::model::{Finding, Origin, codes};
+use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
+use std::borrow::Cow;
+
+/// The names of the arguments of each change, in order. What ends in `…` takes all that follow.
+const CHANGES: &[(&str, &[&str])] = &[
+    ("create", &["component", "type", "options"]),
+    ("destroy", &["component"]),
+    ("connect", &["from", "to", "policy"]),
+    ("disconnect", &["from", "to"]),
+    ("property_set", &["property", "value"]),
+    ("port_write", &["port", "value"]),
+    ("operation_call", &["operation", "args…"]),
+];
+
+/// rFSM's constructors with their other names.
+const CLASSES: &[(&str, &[&str])] = &[
+    ("state", &["state", "sista", "simple_state", "csta", "composite_state"]),
+    ("trans", &["trans", "transition"]),
+    ("conn", &["conn", "connector", "junc"]),
+];
+
+fn entry(key: &'static str, origin: Origin, value: Node) -> Entry {
+    Entry { key: Cow::Borrowed(key), origin, value }
+}
+
+/// Puts all constructors into the environment.
+pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
+    for (verb, names) in CHANGES {
+        env.raw_set(*verb, change(lua, shared, verb, names)?)?;
+    }
+    for verb in ["Configuration", "ConfiguratorConf"] {
+        let recorder = shared.clone();
+        let function = lua.create_function(move |lua, args: MultiValue| {
+            let origin = recorder.borrow_mut().call_at(sandbox::line(lua), verb);
+            let node = match args.front() {
+                Some(Value::Table(table)) => match convert::parts(&recorder, table, origin, 1) {
+                    Some(parts) => Node::new(Kind::Made(verb, parts.named, parts.list), origin),
+                    None => Node::new(Kind::Poison, origin),
+                },
+                Some(Value::LightUserData(handle)) if convert::index_of(*handle).is_none() => {
+                    Node::new(Kind::Poison, origin)
+                }
+                _ => {
+                    let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`{verb}` takes one table")).at(origin);
+                    recorder.borrow_mut().cx.report(finding.help(format!("write `{verb} {{ … }}`")));
+                    Node::new(Kind::Poison, origin)
+                }
+            };
+            // A list inside ConfiguratorConf has no names.
+            let mut recorder = recorder.borrow_mut();
+            if let ("ConfiguratorConf", Kind::Made(_, _, list)) = (verb, &node.kind)
+                && !list.is_empty()
+            {
+                let finding = Finding::error(codes::CONF_UNNAMED, "an element of `ConfiguratorConf` has no name");
+                recorder.cx.report(finding.at(origin).help("write `name = Configuration { … }`"));
+            }
+            Ok(convert::handle(recorder.record(verb, origin, node)))
+        })?;
+        env.raw_set(verb, function)?;
+    }
+    let rfsm = lua.create_table()?;
+    let keep = lua.create_table()?;
+    for (class, names) in CLASSES {
+        let made = class_table(lua, shared, class, &keep)?;
+        for name in *names {
+            env.raw_set(*name, &made)?;
+            rfsm.raw_set(*name, &made)?;
+        }
+    }
+    sandbox::undefined(lua, shared, &rfsm, "rfsm.")?;
+    env.raw_set("rfsm", &rfsm)?;
+    let recorder = shared.clone();
+    env.raw_set(
+        "require",
+        lua.create_function(move |lua, name: Value| {
+            let text = name.as_string().map(mlua::LuaString::to_string_lossy).unwrap_or_default();
+            if text == "rfsm" {
+                return Ok(Value::Table(rfsm.clone()));
+            }
+            let line = sandbox::line(lua);
+            let mut recorder = recorder.borrow_mut();
+            let origin = recorder.word_at(line, "require");
+            let finding =
+                Finding::error(codes::LUA_CLOSED, format!("`require \"{text}\"`: other files are closed to Lua here"));
+            recorder
+                .cx
+                .report(finding.at(origin).help("only `require \"rfsm\"` is known: it gives rFSM's constructors"));
+            Ok(convert::poison())
+        })?,
+    )
+}
+
+fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'static str]) -> mlua::Result<Function> {
+    let recorder = shared.clone();
+    lua.create_function(move |lua, args: MultiValue| {
+        let line = sandbox::line(lua);
+        let origin = {
+            let mut recorder = recorder.borrow_mut();
+            if recorder.count(2 + args.len(), line) {
+                return Err(mlua::Error::runtime("the budget is used up"));
+            }
+            recorder.call_at(line, verb)
+        };
+        let mut entries = Vec::with_capacity(args.len() + 1);
+        let mut rest = args.into_iter();
+        for name in names {
+            if *name == "args…" {
+                let list: Vec<Node> = rest.by_ref().map(|v| convert::node(&recorder, &v, origin)).collect();
+                entries.push(entry("args", origin, Node::new(Kind::List(list), origin)));
+                break;
+            }
+            let Some(value) = rest.next() else { break };
+            if value.is_nil() {
+                continue;
+            }
+            let node = convert::node(&recorder, &value, origin);
+            match (*name, node.kind) {
+                ("options", Kind::Map(options)) => entries.extend(options),
+                ("options", Kind::List(list)) if list.is_empty() => {}
+                ("options", Kind::Poison) => {}
+                ("options", kind) => {
+                    let node = Node::new(kind, origin);
+                    let example = "{ activity = \"control\", properties = { k = 1.0 } }";
+                    recorder.borrow_mut().cx.wrong(&node, "the third argument of `create`", "a table", example);
+                }
+                (name, kind) => entries.push(entry(name, origin, Node::new(kind, origin))),
+            }
+        }
+        let more = rest.count();
+        let mut recorder = recorder.borrow_mut();
+        if more > 0 {
+            let message = format!("`{verb}` takes {} arguments, this are {}", names.len(), names.len() + more);
+            let finding = Finding::error(codes::LUA_ARGUMENTS, message).at(origin);
+            recorder.cx.report(finding.help(format!("write `{verb}({})`", names.join(", "))));
+        }
+        let node = Node::new(Kind::Made(verb, entries, Vec::new()), origin);
+        Ok(convert::handle(recorder.record(verb, origin, node)))
+    })
+}
+
+/// `operation_call(…):undo(operation, …)`
+pub fn undo(lua: &Lua, shared: &Shared) -> mlua::Result<Function> {
+    let recorder = shared.clone();
+    lua.create_function(move |lua, (handle, args): (LightUserData, MultiValue)| {
+        let line = sandbox::line(lua);
+        let Some(index) = convert::index_of(handle) else { return Ok(Value::LightUserData(handle)) };
+        let origin = recorder.borrow_mut().call_at(line, "undo");
+        let mut nodes: Vec<Node> = args.iter().map(|v| convert::node(&recorder, v, origin)).collect();
+        let mut entries = Vec::with_capacity(2);
+        if !nodes.is_empty() {
+            entries.push(entry("operation", origin, nodes.remove(0)));
+        }
+        entries.push(entry("args", origin, Node::new(Kind::List(nodes), origin)));
+        let undo = entry("undo", origin, Node::new(Kind::Map(entries), origin));
+        let mut recorder = recorder.borrow_mut();
+        let made = &mut recorder.made[index];
+        let (verb, first) = (made.verb, made.origin);
+        match made.node.as_mut().map(|node| &mut node.kind) {
+            Some(Kind::Made("operation_call", entries, _)) => {
+                if entries.iter().any(|e| e.key == "undo") {
+                    let finding = Finding::error(codes::LUA_ARGUMENTS, "a second `:undo`").at(origin);
+                    recorder
+                        .cx
+                        .report(finding.also(first, "of this call").help("a call is undone by one call: keep one"));
+                } else {
+                    entries.push(undo);
+                }
+            }
+            _ => {
+                let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`:undo` of a `{verb}`")).at(origin);
+                recorder.cx.report(
+                    finding.help("only an `operation_call` names its undo; that of all other changes is computed"),
+                );
+            }
+        }
+        Ok(Value::LightUserData(handle))
+    })
+}
+
+/// `state`, `trans`, `conn`: called with a table, or as `state:new { … }`. They answer the table itself, as rFSM does.
+fn class_table(lua: &Lua, shared: &Shared, class: &'static str, keep: &Table) -> mlua::Result<Table> {
+    let (recorder, keep) = (shared.clone(), keep.clone());
+    let mark = lua.create_function(move |lua, (_, value): (Value, Value)| {
+        let line = sandbox::line(lua);
+        let mut recorder = recorder.borrow_mut();
+        let origin = recorder.call_at(line, class);
+        let Value::Table(table) = value else {
+            let poison = matches!(&value, Value::LightUserData(h) if convert::index_of(*h).is_none());
+            if !poison {
+                let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`{class}` takes one table")).at(origin);
+                recorder.cx.report(finding.help(format!("write `{class} {{ … }}`")));
+            }
+            return Ok(convert::poison());
+        };
+        if recorder.count(1, line) {
+            return Err(mlua::Error::runtime("the budget is used up"));
+        }
+        let sequence = u32::try_from(recorder.classed.len()).unwrap_or(u32::MAX - 1) + 1;
+        recorder.classed.insert(table.to_pointer() as usize, Classed { class, origin, sequence });
+        // Held until the end: the address of a table that is gone could be another's.
+        keep.raw_push(&table)?;
+        Ok(Value::Table(table))
+    })?;
+    let made = lua.create_table()?;
+    made.raw_set("new", &mark)?;
+    let meta = lua.create_table()?;
+    meta.raw_set("__call", mark)?;
+    meta.raw_set("__metatable", false)?;
+    made.set_metatable(Some(meta))?;
+    Ok(made)
+}

@@ -1,0 +1,172 @@
+//! Lua → loose tree: a file runs once in a fresh, closed state, its constructors record what they are given.
+//!
+//! Nothing of Lua remains afterwards: the model is plain data.
+
+mod constructors;
+mod convert;
+mod recorder;
+mod sandbox;
+
+use super::params::Params;
+use super::tree::{Cx, Entry, Kind, Node, Reading};
+use crate::limits;
+use crate::model::{Finding, codes};
+use mlua::chunk::ChunkMode;
+use mlua::{LuaOptions, StdLib};
+use recorder::{Recorder, Shared};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// What a Lua file made.
+pub struct Made {
+    /// Its named configurations in written order, as a map.
+    pub configurations: Option<Node>,
+    /// The statechart it returned.
+    pub chart: Option<Node>,
+}
+
+/// Runs the text of `reading`'s file. `stem` names a configuration that stands alone without a name. None, with
+/// findings, when the file does not parse, fails, or exceeds a budget.
+pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str) -> Option<Made> {
+    let text = cx.sources.file(reading.file).text.clone();
+    if text.starts_with('\u{1b}') {
+        let finding = Finding::error(codes::LUA_BYTECODE, "this is compiled Lua").at(reading.whole);
+        cx.refuse(finding.help("only texts are read: give the source file"));
+        return None;
+    }
+    let recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
+    let shared: Shared = Rc::new(RefCell::new(recorder));
+    let outcome = run(&shared, &text);
+    let mut recorder = std::mem::replace(&mut *shared.borrow_mut(), Recorder::empty(reading));
+    let ran = match outcome {
+        Ok(returned) => {
+            if let Some(exhausted) = recorder.exhausted.take() {
+                recorder.report_exhausted(&exhausted);
+                None
+            } else {
+                returned
+            }
+        }
+        Err(error) => {
+            recorder.report_error(&error);
+            None
+        }
+    };
+    let made = ran.map(|returned| recorder.assemble(returned, stem));
+    *cx = recorder.cx;
+    *params = recorder.params;
+    made
+}
+
+/// Runs the text and answers what it returned, as a tree.
+fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
+    let options = LuaOptions::new().catch_rust_panics(true);
+    let lua = mlua::Lua::new_with(StdLib::MATH | StdLib::STRING | StdLib::TABLE | StdLib::COROUTINE, options)?;
+    lua.set_memory_limit(limits::LUA_BYTES)?;
+    let env = sandbox::environment(&lua, shared)?;
+    constructors::install(&lua, &env, shared)?;
+    sandbox::start_budget(&lua, shared)?;
+    // A first line `#!…` is blanked and not cut: lines keep their numbers.
+    let text = if text.starts_with('#') {
+        text.split_once('\n').map_or("", |_| &text[text.find('\n').unwrap_or(0)..])
+    } else {
+        text
+    };
+    let chunk = lua.load(text).set_name("=davit").set_mode(ChunkMode::Text).set_environment(env);
+    // Not `eval`, which tries the text as an expression first: a file never is one.
+    let returned: mlua::Value = chunk.into_function()?.call(())?;
+    lua.remove_global_hook();
+    lua.remove_hook();
+    if matches!(returned, mlua::Value::Nil) {
+        return Ok(Some(Node::new(Kind::Null, shared.borrow().reading.whole)));
+    }
+    let origin = shared.borrow().reading.whole;
+    Ok(Some(convert::node(shared, &returned, origin)))
+}
+
+impl Recorder {
+    /// Puts what was made together: configurations by name in the order they were made, the chart that was returned.
+    fn assemble(&mut self, returned: Node, stem: &str) -> Made {
+        let chart = match &returned.kind {
+            Kind::Made("state", ..) => Some(returned),
+            Kind::Null | Kind::Handle(_) | Kind::Poison => None,
+            _ => {
+                let finding =
+                    Finding::error(codes::LUA_BAD_RETURN, format!("the file returns {}", returned.describe()));
+                self.cx.report(finding.at(returned.origin).help(
+                    "a coordinator's file returns `state { … }`; a configuration's file calls `ConfiguratorConf { … }`",
+                ));
+                None
+            }
+        };
+        let mut named: Vec<(u32, Entry)> = Vec::new();
+        let mut confs = 0;
+        for index in 0..self.made.len() {
+            if self.made[index].verb != "ConfiguratorConf" {
+                continue;
+            }
+            confs += 1;
+            self.made[index].uses += 1;
+            let Kind::Made(_, entries, _) = self.take(index).kind else { continue };
+            for entry in entries {
+                match entry.value.kind {
+                    Kind::Handle(handle) if self.made[handle as usize].verb == "Configuration" => {
+                        named.push((handle, entry));
+                    }
+                    Kind::Poison => {}
+                    _ => {
+                        let what = format!("`{}`", entry.key);
+                        let mut value = entry.value;
+                        value.origin = entry.origin;
+                        self.cx.wrong(&value, &what, "a configuration", "name = Configuration { … }");
+                    }
+                }
+            }
+        }
+        // Lua forgets the order of named entries; the order in which the values were made is the written one.
+        named.sort_by_key(|(handle, entry)| (*handle, entry.key.clone()));
+        let mut entries = Vec::with_capacity(named.len());
+        for (handle, mut entry) in named {
+            entry.value = self.take(handle as usize);
+            entry.origin = self.cx.part(entry.value.origin, &entry.key);
+            entries.push(entry);
+        }
+        self.unnamed(stem, confs, &mut entries);
+        self.unused();
+        let some = confs > 0 || !entries.is_empty();
+        let whole = self.reading.whole;
+        Made { configurations: some.then(|| Node::new(Kind::Map(entries), whole)), chart }
+    }
+
+    /// The paper's first listing is a `Configuration` alone in its file: it takes the file's name.
+    fn unnamed(&mut self, stem: &str, confs: usize, entries: &mut Vec<Entry>) {
+        let alone: Vec<usize> =
+            (0..self.made.len()).filter(|i| self.made[*i].verb == "Configuration" && self.made[*i].uses == 0).collect();
+        for (nth, index) in alone.into_iter().enumerate() {
+            self.made[index].uses += 1;
+            let value = self.take(index);
+            if confs == 0 && nth == 0 {
+                entries.push(Entry { key: stem.to_owned().into(), origin: value.origin, value });
+                continue;
+            }
+            let finding =
+                Finding::error(codes::CONF_UNNAMED, "this configuration has no name, so nothing can ask for it");
+            self.cx.report(finding.at(value.origin).labelled("made, and held by nothing").help(
+                "write it as `name = Configuration { … }` inside `ConfiguratorConf { … }`; where a name stands twice \
+                 in one table, Lua keeps the last only",
+            ));
+        }
+    }
+
+    /// Changes that no configuration holds.
+    fn unused(&mut self) {
+        for index in 0..self.made.len() {
+            let made = &self.made[index];
+            if made.uses == 0 && made.verb != "Configuration" && made.verb != "ConfiguratorConf" {
+                let message = format!("this `{}` stands in no configuration, so it is never made", made.verb);
+                let finding = Finding::error(codes::LUA_UNUSED, message).at(made.origin);
+                self.cx.report(finding.help("put it inside a `Configuration { … }`"));
+            }
+        }
+    }
+}

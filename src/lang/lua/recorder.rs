@@ -1,0 +1,211 @@
+//! What constructors record while a Lua file runs.
+
+use crate::lang::params::Params;
+use crate::lang::tree::{Cx, Kind, Node, Reading};
+use crate::limits;
+use crate::model::{Code, Finding, Origin, codes};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// The recorder as the constructors hold it.
+pub type Shared = Rc<RefCell<Recorder>>;
+
+/// One thing a constructor made.
+pub struct Recorded {
+    /// The constructor.
+    pub verb: &'static str,
+    /// Where it was called.
+    pub origin: Origin,
+    /// What it was given.
+    pub node: Option<Node>,
+    /// In how many places it stands.
+    pub uses: u32,
+}
+
+/// A table that a statechart constructor was given.
+#[derive(Clone, Copy)]
+pub struct Classed {
+    /// `state`, `trans` or `conn`.
+    pub class: &'static str,
+    /// Where.
+    pub origin: Origin,
+    /// The how-manieth: what was made earlier was written earlier.
+    pub sequence: u32,
+}
+
+/// Which budget is used up, and on which line.
+#[derive(Debug, Clone)]
+pub struct Exhausted {
+    pub code: Code,
+    pub message: String,
+    pub line: u32,
+}
+
+/// The state of one run.
+pub struct Recorder {
+    pub cx: Cx,
+    pub reading: Reading,
+    pub params: Params,
+    pub made: Vec<Recorded>,
+    pub classed: FxHashMap<usize, Classed>,
+    /// Nodes recorded so far, against [`limits::TEXT_NODES`].
+    pub nodes: usize,
+    /// Set once; from then on every instruction of the file fails.
+    pub exhausted: Option<Exhausted>,
+    /// Names of which it was said already that they are undefined.
+    pub undefined: FxHashSet<String>,
+    /// Calls so far on the current line, by constructor.
+    line: u32,
+    on_line: Vec<(&'static str, u32)>,
+}
+
+impl Recorder {
+    /// One for a file.
+    pub fn new(cx: Cx, reading: Reading, params: Params) -> Self {
+        Self {
+            cx,
+            reading,
+            params,
+            made: Vec::new(),
+            classed: FxHashMap::default(),
+            nodes: 0,
+            exhausted: None,
+            undefined: FxHashSet::default(),
+            line: 0,
+            on_line: Vec::new(),
+        }
+    }
+
+    /// What is left where one was taken away.
+    pub fn empty(reading: Reading) -> Self {
+        Self::new(Cx::default(), reading, Params::default())
+    }
+
+    /// The place of a call of `word` on a line.
+    pub fn call_at(&mut self, line: u32, word: &'static str) -> Origin {
+        if line != self.line {
+            self.line = line;
+            self.on_line.clear();
+        }
+        let nth = match self.on_line.iter_mut().find(|(w, _)| *w == word) {
+            Some((_, count)) => {
+                *count += 1;
+                *count
+            }
+            None => {
+                self.on_line.push((word, 0));
+                0
+            }
+        };
+        self.cx.sources.call(self.reading.file, line, nth, word)
+    }
+
+    /// The place of a word on a line.
+    pub fn word_at(&mut self, line: u32, word: &str) -> Origin {
+        let line = self.cx.sources.exact_line(self.reading.file, line);
+        self.cx.sources.within(line, word)
+    }
+
+    /// Records what a constructor made; answers its number.
+    pub fn record(&mut self, verb: &'static str, origin: Origin, node: Node) -> usize {
+        self.made.push(Recorded { verb, origin, node: Some(node), uses: 0 });
+        self.made.len() - 1
+    }
+
+    /// What was recorded under a number, for one of its places.
+    pub fn take(&mut self, index: usize) -> Node {
+        self.take_or_copy(index, false)
+    }
+
+    fn take_or_copy(&mut self, index: usize, copy: bool) -> Node {
+        let made = &mut self.made[index];
+        let copy = copy || made.uses > 1;
+        let mut node = if copy { made.node.clone() } else { made.node.take() }
+            .unwrap_or_else(|| Node::new(Kind::Poison, made.origin));
+        if let Kind::Made("Configuration", _, items) = &mut node.kind {
+            for item in items {
+                if let Kind::Handle(handle) = item.kind {
+                    *item = self.take_or_copy(handle as usize, copy);
+                }
+            }
+        }
+        node
+    }
+
+    /// Counts nodes; answers whether there are too many.
+    pub fn count(&mut self, nodes: usize, line: u32) -> bool {
+        self.nodes += nodes;
+        if self.nodes > limits::TEXT_NODES && self.exhausted.is_none() {
+            self.exhausted = Some(Exhausted {
+                code: codes::TEXT_TOO_MANY_NODES,
+                message: format!("the file makes more than {} values", limits::TEXT_NODES),
+                line,
+            });
+        }
+        self.exhausted.is_some()
+    }
+
+    /// The finding of a budget.
+    pub fn report_exhausted(&mut self, exhausted: &Exhausted) {
+        let at = self.cx.sources.exact_line(self.reading.file, exhausted.line);
+        let help = "a configuration file only lists what is to be changed: look for a loop that does not end or makes too much";
+        self.cx.report(
+            Finding::error(exhausted.code, exhausted.message.clone())
+                .at(at)
+                .labelled("here when it was used up")
+                .help(help),
+        );
+    }
+
+    /// The finding of an error that ended the run.
+    pub fn report_error(&mut self, error: &mlua::Error) {
+        if let Some(exhausted) = self.exhausted.take() {
+            self.report_exhausted(&exhausted);
+            return;
+        }
+        let full = super::sandbox::message_of(error);
+        let (line, message) = super::sandbox::split_line(&full);
+        let at = match line {
+            Some(line) => self.cx.sources.exact_line(self.reading.file, line),
+            None => self.reading.whole,
+        };
+        let memory = full.contains("not enough memory");
+        if memory {
+            let mb = limits::LUA_BYTES / 1024 / 1024;
+            let finding = Finding::error(codes::LUA_MEMORY, format!("the file needs more than {mb} MB in Lua"));
+            self.cx.report(
+                finding.at(at).help("a configuration file only lists what is to be changed: look for what grows"),
+            );
+        } else if is_syntax(error) {
+            if message.contains("C stack overflow") || message.contains("syntax levels") || message.contains("overflow")
+            {
+                let finding = Finding::error(codes::TEXT_TOO_DEEP, format!("nested too deeply: {message}")).at(at);
+                self.cx.refuse(
+                    finding.help("nothing that Davit reads needs so many levels: a bracket is probably not closed"),
+                );
+            } else {
+                let finding = Finding::error(codes::TEXT_SYNTAX, format!("this is not Lua: {message}")).at(at);
+                self.cx.refuse(
+                    finding
+                        .help("see what stands just before this place: a comma, a bracket or an `end` may be missing"),
+                );
+            }
+        } else {
+            // A name that is not defined makes other errors in its wake; the finding about it says enough.
+            if !self.undefined.is_empty() && message.contains("light userdata") {
+                return;
+            }
+            let finding = Finding::error(codes::LUA_ERROR, format!("the file fails: {message}")).at(at);
+            self.cx.report(finding.help("the message is Lua's own; the file must run to its end once, without errors"));
+        }
+    }
+}
+
+fn is_syntax(error: &mlua::Error) -> bool {
+    match error {
+        mlua::Error::SyntaxError { .. } => true,
+        mlua::Error::CallbackError { cause, .. } => is_syntax(cause),
+        _ => false,
+    }
+}

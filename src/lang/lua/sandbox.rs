@@ -1,0 +1,443 @@
+//! The closed world of a Lua file: which names exist, and the budgets it runs under.
+//!
+//! Absent on purpose: files, processes, network, `require` of anything but rFSM's constructors, loading of text or
+//! bytecode, the debug library, random numbers (a file must give the same model every time), finalisers (`__gc` runs
+//! where no budget can stop it), and the pattern functions of `string` (one call can run for years and is not
+//! interrupted by a hook). `table.sort` and `table.concat` are ours, since the library's run long in one instruction.
+
+use super::convert;
+use super::recorder::{Exhausted, Shared};
+use crate::limits;
+use crate::model::finding::{did_you_mean, nearest};
+use crate::model::{Finding, codes};
+use mlua::debug::HookTriggers;
+use mlua::{Function, LightUserData, Lua, MultiValue, Table, Thread, Value, VmState};
+use std::time::Instant;
+
+/// What of Lua's base library a file may use.
+const BASE: &[&str] = &[
+    "assert",
+    "error",
+    "getmetatable",
+    "ipairs",
+    "next",
+    "pairs",
+    "rawequal",
+    "rawget",
+    "rawlen",
+    "rawset",
+    "select",
+    "tonumber",
+    "tostring",
+    "type",
+    "_VERSION",
+];
+
+/// What of `string`.
+const STRING: &[&str] = &["byte", "char", "format", "len", "lower", "reverse", "sub", "upper"];
+
+/// What of `table`.
+const TABLE: &[&str] = &["insert", "pack", "remove", "unpack"];
+
+/// What of `coroutine`.
+const COROUTINE: &[&str] = &["create", "isyieldable", "running", "status", "wrap", "yield"];
+
+/// What of `math`.
+const NOT_OF_MATH: &[&str] = &["random", "randomseed"];
+
+/// Names of Lua that are closed, with what to say about them.
+const CLOSED: &[(&str, &str)] = &[
+    ("io", "files are closed to Lua here"),
+    ("os", "processes, files and the time are closed to Lua here"),
+    ("debug", "the debug library is closed to Lua here"),
+    ("package", "other files are closed to Lua here"),
+    ("load", "loading of text is closed to Lua here"),
+    ("loadstring", "loading of text is closed to Lua here"),
+    ("loadfile", "other files are closed to Lua here"),
+    ("dofile", "other files are closed to Lua here"),
+    ("collectgarbage", "memory is looked after"),
+    ("string.find", "pattern functions are left out: one call can run without end"),
+    ("string.match", "pattern functions are left out: one call can run without end"),
+    ("string.gmatch", "pattern functions are left out: one call can run without end"),
+    ("string.gsub", "pattern functions are left out: one call can run without end"),
+    ("string.dump", "bytecode is closed to Lua here"),
+    ("string.pack", "binary data has no use here"),
+    ("string.unpack", "binary data has no use here"),
+    ("table.move", "write a loop instead"),
+    ("math.random", "a file must give the same model every time"),
+    ("math.randomseed", "a file must give the same model every time"),
+    ("coroutine.close", "coroutines end by themselves"),
+];
+
+/// Instructions between two looks at the budgets. Library calls count as one instruction each, so it is small: between
+/// two looks a file can make only so many of them.
+const TICK: u32 = 100;
+
+const SORT: &str = "
+return function(list, less)
+  less = less or function(a, b) return a < b end
+  local n, width, other = #list, 1, {}
+  while width < n do
+    for from = 1, n, 2 * width do
+      local i, j = from, from + width
+      local i_end, j_end = j, j + width
+      if i_end > n + 1 then i_end = n + 1 end
+      if j_end > n + 1 then j_end = n + 1 end
+      for k = from, j_end - 1 do
+        if i < i_end and (j >= j_end or not less(list[j], list[i])) then other[k] = list[i]; i = i + 1
+        else other[k] = list[j]; j = j + 1 end
+      end
+    end
+    for k = 1, n do list[k] = other[k] end
+    width = 2 * width
+  end
+end";
+
+/// The line of the Lua code that called the function that is running.
+pub fn line(lua: &Lua) -> u32 {
+    for level in 1..4 {
+        if let Some(Some(line)) = lua.inspect_stack(level, |debug| debug.current_line()) {
+            return u32::try_from(line).unwrap_or(u32::MAX);
+        }
+    }
+    1
+}
+
+/// The table of globals of a file.
+pub fn environment(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
+    let globals = lua.globals();
+    let env = lua.create_table()?;
+    for name in BASE {
+        env.raw_set(*name, globals.raw_get::<Value>(*name)?)?;
+    }
+    let string = library(lua, shared, &env, "string", STRING)?;
+    string.raw_set("rep", lua.create_function(repeat)?)?;
+    lua.create_string("")?;
+    if let Some(strings) = lua.type_metatable::<mlua::LuaString>() {
+        strings.raw_set("__index", string)?;
+        strings.raw_set("__metatable", false)?;
+    }
+    let table = library(lua, shared, &env, "table", TABLE)?;
+    table.raw_set("concat", lua.create_function(concat)?)?;
+    table.raw_set("sort", lua.load(SORT).set_name("=sort").eval::<Function>()?)?;
+    let math: Table = globals.raw_get("math")?;
+    for name in NOT_OF_MATH {
+        math.raw_remove(*name)?;
+    }
+    closed(lua, shared, &math, "math")?;
+    env.raw_set("math", math)?;
+    let coroutine = library(lua, shared, &env, "coroutine", COROUTINE)?;
+    let recorder = shared.clone();
+    coroutine.raw_set(
+        "resume",
+        lua.create_function(move |lua, (thread, args): (Thread, MultiValue)| {
+            let outcome = thread.resume::<MultiValue>(args);
+            caught(lua, &recorder, outcome)
+        })?,
+    )?;
+    let recorder = shared.clone();
+    env.raw_set(
+        "pcall",
+        lua.create_function(move |lua, (function, args): (Function, MultiValue)| {
+            let outcome = function.call::<MultiValue>(args);
+            caught(lua, &recorder, outcome)
+        })?,
+    )?;
+    let recorder = shared.clone();
+    env.raw_set(
+        "xpcall",
+        lua.create_function(move |lua, (function, handler, args): (Function, Function, MultiValue)| {
+            let mut outcome = caught(lua, &recorder, function.call::<MultiValue>(args))?;
+            if outcome.front() == Some(&Value::Boolean(false)) {
+                let handled = handler.call::<MultiValue>(outcome.get(1).cloned().unwrap_or(Value::Nil))?;
+                outcome = std::iter::once(Value::Boolean(false)).chain(handled).collect();
+            }
+            Ok(outcome)
+        })?,
+    )?;
+    env.raw_set("setmetatable", lua.create_function(set_metatable)?)?;
+    let recorder = shared.clone();
+    env.raw_set(
+        "print",
+        lua.create_function(move |lua, values: MultiValue| {
+            let line = line(lua);
+            let mut recorder = recorder.borrow_mut();
+            if recorder.undefined.insert(format!("\0print {line}")) {
+                let origin = recorder.word_at(line, "print");
+                let texts: Vec<String> = values.iter().map(|v| v.to_string().unwrap_or_default()).collect();
+                let shown: String = texts.join(" ").chars().take(200).collect();
+                recorder.cx.report(Finding::info(codes::LUA_PRINT, format!("the file prints: {shown}")).at(origin));
+            }
+            Ok(())
+        })?,
+    )?;
+    env.raw_set("_G", &env)?;
+    undefined(lua, shared, &env, "")?;
+    lua.set_type_metatable::<LightUserData>(Some(handles(lua, shared)?));
+    Ok(env)
+}
+
+/// What a protected call answers. Budgets and memory are not caught: a file must not outlive them.
+fn caught(lua: &Lua, shared: &Shared, outcome: mlua::Result<MultiValue>) -> mlua::Result<MultiValue> {
+    match outcome {
+        Ok(values) => Ok(std::iter::once(Value::Boolean(true)).chain(values).collect()),
+        Err(error) => {
+            let message = message_of(&error);
+            if shared.borrow().exhausted.is_some() || message.contains("not enough memory") {
+                return Err(error);
+            }
+            let message = Value::String(lua.create_string(message)?);
+            Ok([Value::Boolean(false), message].into_iter().collect())
+        }
+    }
+}
+
+/// A library with some of its functions; the others are told to be closed.
+fn library(lua: &Lua, shared: &Shared, env: &Table, name: &'static str, kept: &[&str]) -> mlua::Result<Table> {
+    let full: Table = lua.globals().raw_get(name)?;
+    let table = lua.create_table()?;
+    for function in kept {
+        table.raw_set(*function, full.raw_get::<Value>(*function)?)?;
+    }
+    closed(lua, shared, &table, name)?;
+    env.raw_set(name, &table)?;
+    Ok(table)
+}
+
+fn closed(lua: &Lua, shared: &Shared, table: &Table, name: &str) -> mlua::Result<()> {
+    undefined(lua, shared, table, &format!("{name}."))
+}
+
+/// Makes reading an absent name of a table a finding, and its value one that everything can be done with: so one
+/// mistake gives one finding, and the rest of the file is still looked at.
+pub fn undefined(lua: &Lua, shared: &Shared, table: &Table, prefix: &str) -> mlua::Result<()> {
+    let (recorder, prefix) = (shared.clone(), prefix.to_owned());
+    let meta = lua.create_table()?;
+    let absent = lua.create_function(move |lua, (table, key): (Table, Value)| {
+        let name = match &key {
+            Value::String(text) => text.to_string_lossy(),
+            // `t[1]` of a library or of the globals: nothing is there, and nobody means a name.
+            _ => return Ok(Value::Nil),
+        };
+        if prefix.is_empty() {
+            let mut recorder = recorder.borrow_mut();
+            if let Some(param) = recorder.params.0.iter_mut().find(|p| p.name == name) {
+                param.used = true;
+                let value = convert::to_lua(lua, &param.value)?;
+                table.raw_set(key, value.clone())?;
+                return Ok(value);
+            }
+        }
+        let full = format!("{prefix}{name}");
+        let line = line(lua);
+        if !recorder.borrow_mut().undefined.insert(full.clone()) {
+            return Ok(convert::poison());
+        }
+        let mut known: Vec<String> = Vec::new();
+        table.for_each(|k: Value, _: Value| {
+            known.extend(k.as_string().map(mlua::LuaString::to_string_lossy));
+            Ok(())
+        })?;
+        known.sort();
+        let mut recorder = recorder.borrow_mut();
+        known.extend(recorder.params.0.iter().map(|p| p.name.clone()).filter(|_| prefix.is_empty()));
+        let origin = recorder.word_at(line, &name);
+        let finding = match CLOSED.iter().find(|(closed, _)| *closed == full) {
+            Some((_, why)) => Finding::error(codes::LUA_CLOSED, format!("`{full}` is not there: {why}"))
+                .at(origin)
+                .help("a configuration file is plain data with a little arithmetic: give what it needs as a parameter (`with:`)"),
+            None => {
+                let near = nearest(&name, known.iter().map(String::as_str));
+                let help = match near {
+                    Some(near) => format!("did you mean `{prefix}{near}`?"),
+                    None if prefix.is_empty() => format!(
+                        "define it in the file (`local {name} = …`), or give it as a parameter: `with: {{ {name}: … }}` \
+                         in the deployment, or `--set {name}=…`"
+                    ),
+                    None => did_you_mean(&name, "functions", known.iter().map(String::as_str)),
+                };
+                Finding::error(codes::LUA_UNDEFINED, format!("`{full}` is not defined")).at(origin).help(help)
+            }
+        };
+        recorder.cx.report(finding.labelled("here"));
+        Ok(convert::poison())
+    })?;
+    meta.raw_set("__index", absent)?;
+    meta.raw_set("__metatable", false)?;
+    table.set_metatable(Some(meta))?;
+    Ok(())
+}
+
+/// What can be done with handles and with the undefined value: `:undo` of a handle, anything with the latter.
+fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
+    let meta = lua.create_table()?;
+    let quiet = lua.create_function(|_, (_, _): (Value, MultiValue)| Ok(convert::poison()))?;
+    for event in [
+        "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__idiv", "__band", "__bor", "__bxor", "__shl",
+        "__shr", "__bnot", "__concat",
+    ] {
+        meta.raw_set(event, &quiet)?;
+    }
+    let no = lua.create_function(|_, (_, _): (Value, MultiValue)| Ok(false))?;
+    meta.raw_set("__lt", &no)?;
+    meta.raw_set("__le", &no)?;
+    meta.raw_set("__len", lua.create_function(|_, _: MultiValue| Ok(0))?)?;
+    meta.raw_set(
+        "__newindex",
+        lua.create_function(|_, (handle, _): (LightUserData, MultiValue)| match convert::index_of(handle) {
+            None => Ok(()),
+            Some(_) => Err(mlua::Error::runtime(
+                "what a constructor made cannot be changed: write all of it inside its braces",
+            )),
+        })?,
+    )?;
+    meta.raw_set(
+        "__call",
+        lua.create_function(|_, (handle, _): (LightUserData, MultiValue)| match convert::index_of(handle) {
+            None => Ok(convert::poison()),
+            Some(_) => {
+                Err(mlua::Error::runtime("what a constructor made is no function: is a comma missing before this?"))
+            }
+        })?,
+    )?;
+    let undo = super::constructors::undo(lua, shared)?;
+    let recorder = shared.clone();
+    meta.raw_set(
+        "__index",
+        lua.create_function(move |lua, (handle, key): (LightUserData, Value)| {
+            let name = key.as_string().map(mlua::LuaString::to_string_lossy).unwrap_or_default();
+            if convert::index_of(handle).is_none() {
+                return Ok(convert::poison());
+            }
+            if name == "undo" {
+                return Ok(Value::Function(undo.clone()));
+            }
+            let line = line(lua);
+            let mut recorder = recorder.borrow_mut();
+            let origin = recorder.word_at(line, &name);
+            let finding =
+                Finding::error(codes::LUA_UNDEFINED, format!("`{name}` is not defined for what a constructor made"));
+            recorder.cx.report(finding.at(origin).help("the only one is `operation_call(…):undo(…)`"));
+            Ok(convert::poison())
+        })?,
+    )?;
+    meta.raw_set("__metatable", false)?;
+    Ok(meta)
+}
+
+/// Starts counting. The hook is global (coroutines have it too); once a budget is used up it fires at every
+/// instruction and fails each time, so that no code of the file goes on.
+pub fn start_budget(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
+    let recorder = shared.clone();
+    // The one clock read in this room: library calls cannot be counted, only timed. A backstop, far beyond what any
+    // file needs, so that what is accepted does not depend on it.
+    #[allow(clippy::disallowed_methods)]
+    let started = Instant::now();
+    let used = std::cell::Cell::new(0_u64);
+    lua.set_global_hook(HookTriggers::new().every_nth_instruction(TICK), move |lua, debug| {
+        let mut recorder = recorder.borrow_mut();
+        used.set(used.get() + u64::from(TICK));
+        if recorder.exhausted.is_none() {
+            let over = if used.get() > limits::LUA_INSTRUCTIONS {
+                let millions = limits::LUA_INSTRUCTIONS / 1_000_000;
+                Some((codes::LUA_INSTRUCTIONS, format!("the file runs longer than {millions} million instructions")))
+            } else if started.elapsed() > limits::LUA_TIME {
+                let limit = limits::LUA_TIME.as_secs_f64();
+                Some((codes::LUA_INSTRUCTIONS, format!("the file runs longer than {limit} s")))
+            } else {
+                None
+            };
+            if let Some((code, message)) = over {
+                let line = debug.current_line().and_then(|l| u32::try_from(l).ok()).unwrap_or(1);
+                recorder.exhausted = Some(Exhausted { code, message, line });
+            }
+        }
+        if recorder.exhausted.is_none() {
+            return Ok(VmState::Continue);
+        }
+        drop(recorder);
+        lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), |_, _| {
+            Err(mlua::Error::runtime("the budget is used up"))
+        })?;
+        Err(mlua::Error::runtime("the budget is used up"))
+    })
+}
+
+/// `string.rep`, bounded.
+fn repeat(lua: &Lua, (text, n, separator): (mlua::LuaString, i64, Option<mlua::LuaString>)) -> mlua::Result<Value> {
+    let n = usize::try_from(n).unwrap_or(0);
+    let separator = separator.as_ref().map(|s| s.as_bytes().to_vec()).unwrap_or_default();
+    let text = text.as_bytes();
+    if n.saturating_mul(text.len() + separator.len()) > limits::LUA_STRING {
+        return Err(mlua::Error::runtime("string.rep would make a text of more than 1 MB"));
+    }
+    let parts = vec![text.to_vec(); n];
+    Ok(Value::String(lua.create_string(parts.join(&separator[..]))?))
+}
+
+/// `table.concat`, bounded.
+fn concat(
+    lua: &Lua,
+    (list, separator, from, to): (Table, Option<mlua::LuaString>, Option<i64>, Option<i64>),
+) -> mlua::Result<Value> {
+    let separator = separator.as_ref().map(|s| s.as_bytes().to_vec()).unwrap_or_default();
+    let to = to.unwrap_or_else(|| i64::try_from(list.raw_len()).unwrap_or(0));
+    let mut out: Vec<u8> = Vec::new();
+    for i in from.unwrap_or(1)..=to {
+        match list.raw_get::<Value>(i)? {
+            Value::String(text) => out.extend_from_slice(&text.as_bytes()),
+            Value::Integer(v) => out.extend_from_slice(v.to_string().as_bytes()),
+            Value::Number(v) => out.extend_from_slice(
+                lua.coerce_string(Value::Number(v))?.map(|s| s.as_bytes().to_vec()).unwrap_or_default().as_slice(),
+            ),
+            other => {
+                let kind = other.type_name();
+                return Err(mlua::Error::runtime(format!("table.concat: element {i} is a {kind}, no text or number")));
+            }
+        }
+        if i < to {
+            out.extend_from_slice(&separator);
+        }
+        if out.len() > limits::LUA_STRING {
+            return Err(mlua::Error::runtime("table.concat would make a text of more than 1 MB"));
+        }
+    }
+    Ok(Value::String(lua.create_string(out)?))
+}
+
+/// `setmetatable` without finalisers: they would run with hooks off, where no budget reaches.
+fn set_metatable(_: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Result<Table> {
+    if let Some(old) = table.metatable()
+        && old.raw_get::<Value>("__metatable")? != Value::Nil
+    {
+        return Err(mlua::Error::runtime("cannot change a protected metatable"));
+    }
+    if let Some(meta) = &meta
+        && meta.raw_get::<Value>("__gc")? != Value::Nil
+    {
+        return Err(mlua::Error::runtime("finalisers (`__gc`) are closed to Lua here"));
+    }
+    table.set_metatable(meta)?;
+    Ok(table)
+}
+
+/// The text of an error, without stack traces.
+pub fn message_of(error: &mlua::Error) -> String {
+    let text = match error {
+        mlua::Error::CallbackError { cause, .. } => return message_of(cause),
+        mlua::Error::SyntaxError { message, .. } => message.clone(),
+        mlua::Error::RuntimeError(message) | mlua::Error::MemoryError(message) => message.clone(),
+        other => other.to_string(),
+    };
+    let text = text.split("\nstack traceback:").next().unwrap_or_default();
+    text.strip_prefix("runtime error: ").unwrap_or(text).to_owned()
+}
+
+/// `davit:12: message` → its line and the message.
+pub fn split_line(text: &str) -> (Option<u32>, String) {
+    let parts = text.strip_prefix("davit:").and_then(|rest| rest.split_once(": "));
+    match parts.and_then(|(line, message)| Some((line.parse().ok()?, message))) {
+        Some((line, message)) => (Some(line), message.to_owned()),
+        None => (None, text.to_owned()),
+    }
+}

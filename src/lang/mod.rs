@@ -1,0 +1,20 @@
+//! Text → model. Lua and YAML are read into one loose tree with places, which is lowered once into the model; what is
+//! wrong is collected, all of it, with the place.
+//!
+//! This room runs no component and judges no meaning beyond the text itself: names are names, times are times, choices
+//! exist. Whether a component has that port is the business of later rooms, which find the place through the
+//! [`SourceMap`].
+
+mod files;
+mod load;
+mod lower;
+mod lua;
+mod params;
+mod tree;
+mod yaml;
+
+pub use files::Sources;
+pub use load::{
+    LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, load, load_configurations, load_coordinator,
+    load_from,
+};

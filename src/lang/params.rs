@@ -1,0 +1,98 @@
+//! Parameters of Lua files: `with:` in the deployment, overridden by `--set a.b=1` on the command line.
+
+use super::tree::{Cx, Entry, Kind, Node};
+use super::yaml;
+use crate::diagnostics::Language;
+use crate::lang::tree::Reading;
+use crate::model::finding::did_you_mean;
+use crate::model::{Finding, Ident, Origin, codes};
+
+/// A parameter.
+#[derive(Debug)]
+pub struct Param {
+    /// The name Lua files read it by.
+    pub name: String,
+    /// Its value.
+    pub value: Node,
+    /// Whether some file has read it.
+    pub used: bool,
+    /// Whether the command line named it.
+    set: bool,
+    origin: Origin,
+}
+
+/// All parameters of one load.
+#[derive(Debug, Default)]
+pub struct Params(pub Vec<Param>);
+
+impl Params {
+    /// Takes the values of `with:`, then those of `--set`.
+    pub fn new(cx: &mut Cx, with: Vec<Entry>, set: &[(String, String)]) -> Self {
+        let mut out = Self::default();
+        for entry in with {
+            if let Err(error) = Ident::new(&entry.key) {
+                let finding =
+                    Finding::error(codes::TEXT_BAD_NAME, format!("`{}` is not a parameter's name", entry.key));
+                cx.report(finding.at(entry.origin).labelled(error.reason).help("write it like `gain: 0.5`"));
+                continue;
+            }
+            let (name, value, origin) = (entry.key.into_owned(), entry.value, entry.origin);
+            out.0.push(Param { name, value, used: false, set: false, origin });
+        }
+        for (path, text) in set {
+            out.set(cx, path, text);
+        }
+        out
+    }
+
+    fn set(&mut self, cx: &mut Cx, path: &str, text: &str) {
+        let bad = |why: &str| {
+            Finding::error(codes::TEXT_BAD_PARAMETER, format!("`--set {path}={text}`: {why}"))
+                .help("write `--set name=value` or `--set table.key=value`; the value is read as YAML")
+        };
+        let parts: Vec<&str> = path.split('.').collect();
+        if let Some(error) = parts.iter().find_map(|part| Ident::new(part).err()) {
+            cx.refuse(bad(&error.to_string()));
+            return;
+        }
+        let file = cx.sources.add_file(format!("--set {path}"), text, Language::Yaml);
+        let whole = cx.sources.whole_file(file);
+        let Some(value) = yaml::read(cx, Reading { file, whole }) else { return };
+        let at = self.0.iter().position(|p| p.name == parts[0]);
+        let index = at.unwrap_or_else(|| {
+            let value = Node::new(Kind::Map(Vec::new()), whole);
+            self.0.push(Param { name: parts[0].to_owned(), value, used: false, set: true, origin: whole });
+            self.0.len() - 1
+        });
+        let mut node = &mut self.0[index].value;
+        for part in &parts[1..] {
+            let Kind::Map(entries) = &mut node.kind else {
+                cx.report(bad(&format!("`{path}` names a key inside a value that is no table")).at(whole));
+                return;
+            };
+            let i = entries.iter().position(|e| e.key == *part).unwrap_or_else(|| {
+                let value = Node::new(Kind::Map(Vec::new()), whole);
+                entries.push(Entry { key: (*part).to_owned().into(), origin: whole, value });
+                entries.len() - 1
+            });
+            node = &mut entries[i].value;
+        }
+        *node = value;
+    }
+
+    /// Reports parameters that no file has read: they are most likely misspelt.
+    pub fn finish(self, cx: &mut Cx) {
+        let others: Vec<String> = self.0.iter().filter(|p| !p.set || p.used).map(|p| p.name.clone()).collect();
+        for param in self.0.iter().filter(|p| !p.used) {
+            let message = format!("no Lua file reads the parameter `{}`", param.name);
+            let known = others.iter().filter(|n| **n != param.name).map(String::as_str);
+            let help = did_you_mean(&param.name, "parameters", known);
+            let finding = if param.set {
+                Finding::error(codes::TEXT_UNKNOWN_PARAMETER, message)
+            } else {
+                Finding::warning(codes::TEXT_UNKNOWN_PARAMETER, message)
+            };
+            cx.report(finding.at(param.origin).help(help));
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! The languages: the paper's listings, both spellings, typos, hostile files, round trips.
+
+mod helpers;
+mod listings;
