@@ -3,8 +3,8 @@
 
 pub mod cli;
 pub mod coordinator;
-pub mod draw;
 pub mod diagnostics;
+pub mod draw;
 pub mod lang;
 pub mod libraries;
 pub mod limits;
