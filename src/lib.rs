@@ -9,8 +9,12 @@ pub mod lang;
 pub mod libraries;
 pub mod limits;
 pub mod model;
+
 pub mod platform;
 pub mod runtime;
 pub mod session;
 pub mod statechart;
+
+pub mod plan;
+pub mod system;
 pub mod time;

@@ -184,7 +184,91 @@ codes! {
     CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
         "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
          them, and the requests for it.";
+    UNKNOWN_COMPONENT = "conf::unknown_component", "there is no such component",
+        "The configuration names a component that does not exist where it is applied: it was never created, was destroyed, or its name is misspelt. Nothing can be done to it. Create it earlier (or in the same configuration), or correct the name.";
+    UNKNOWN_TYPE = "conf::unknown_type", "there is no such component type",
+        "A component is to be created of a type that neither the deployment declares nor one of its libraries brings. Add the library under `libraries:`, declare the type under `types:`, or correct the name; `davit types` lists what there is.";
+    UNKNOWN_PORT = "conf::unknown_port", "the component has no such port",
+        "A connection or a port_write names a port that the component's type does not have. Ports are declared by the type; `davit types TYPE` lists them. Correct the name or the type.";
+    UNKNOWN_PROPERTY = "conf::unknown_property", "the component has no such property",
+        "A property_set, or a value in a create, names a property that the component's type does not have. `davit types TYPE` lists the properties of a type with their units and limits. Correct the name or the type.";
+    UNKNOWN_OPERATION = "conf::unknown_operation", "the component has no such operation",
+        "An operation_call, or the call that undoes it, names an operation that the component's type does not have. `davit types TYPE` lists the operations of a type. Correct the name or the type.";
+    UNKNOWN_ACTIVITY = "conf::unknown_activity", "there is no such activity",
+        "A component is to be created in an activity that the deployment does not have. An activity is a thread that updates components; it is declared under `activities:` in the deployment. Declare it there or correct the name.";
+    COMPONENT_EXISTS = "conf::component_exists", "there is a component of that name already",
+        "A create is an act: it is refused when a component of that name exists already, because taking the present one for the wanted one would hide a mistake. Destroy the old one in the same configuration (the derived order destroys first), or choose another name.";
+    STILL_CONNECTED = "conf::still_connected", "a component that has connections cannot be destroyed",
+        "Destroying a component would silently cut its connections, and an undo would have to guess them. Add a disconnect for each connection that the finding names to the same configuration; the derived order makes them first.";
+    NOT_UNCONFIGURED = "conf::not_unconfigured", "only an unconfigured or faulted component can be destroyed",
+        "A component is destroyed from the run state unconfigured (or faulted). A configuration's destroy takes the legal path down by itself, so this is met only where single steps are executed: stop and clean up the component first.";
+    ILLEGAL_TRANSITION = "conf::illegal_transition", "the run state does not allow this move",
+        "Run states change along unconfigured, stopped, running, one step at a time, and from faulted only by cleanup. The component is in a state from which the move does not exist; most likely it changed by itself (a fault) since the plan was made. Look at its state and plan anew.";
+    FAULTED_DEMANDED = "conf::faulted_demanded", "the state `faulted` cannot be demanded",
+        "Faulted is a state that a component falls into by itself; nobody can bring it there, so no list may demand it. Demand unconfigured, stopped or running.";
+    NOT_AN_OUT_PORT = "conf::not_an_out_port", "a connection begins at an out-port",
+        "Data flows from the first port of a connection to the second, and the first one is declared as an in-port. Most likely the two ends are exchanged: write connect(from_out_port, to_in_port).";
+    NOT_AN_IN_PORT = "conf::not_an_in_port", "only an in-port can be connected to or written",
+        "A connection ends at an in-port, and port_write writes in-ports; this port is declared as an out-port, whose samples come from its component alone. Exchange the two ends of the connection, or write the in-port at the other end.";
+    PORT_TYPES = "conf::port_types", "the two ports carry different types",
+        "Ports are connected only when their types are equal; an int port does not feed a float port, because a connection converts nothing. Connect a port of the same type, or put a converting component in between.";
+    PORT_UNITS = "conf::port_units", "the two ports carry different units",
+        "Both ports state a unit and the units differ, so the numbers would be taken for something else. Connect a port of the same unit, put a converting component in between, or leave the unit of one side out where it truly does not matter.";
+    ALREADY_CONNECTED = "conf::already_connected", "the two ports are connected already",
+        "A connect is an act: a pair of ports that is connected already is refused, also with another policy. To change the policy, write the disconnect and the connect into the same configuration; the derived order disconnects first.";
+    NOT_CONNECTED = "conf::not_connected", "the two ports are not connected",
+        "A disconnect is an act: it is refused when the two ports are not connected where it is applied. Remove the disconnect, correct the ports, or apply the configuration that connects them first.";
+    DATA_ALONE = "conf::data_alone", "a data connection must be the only one of its in-port",
+        "A `data` connection carries the latest value, so an in-port that had a second source would jump between the two. Disconnect the present source in the same configuration, or use buffered connections, of which an in-port may have many.";
+    NEEDS_BUFFER = "conf::needs_buffer", "this in-port takes only buffered connections",
+        "The in-port's type declares `buffered: true`: its component reads it as a queue, and a `data` connection would drop samples. Give the connection a policy, { buffer = 64 }.";
+    BUFFER_SIZE = "conf::buffer_size", "a buffer holds at least one sample",
+        "The policy asks for a FIFO without room for any sample, which would lose them all. Give the number of samples it must hold, at least 1.";
+    NOT_TUNABLE = "conf::not_tunable", "the property cannot be set in this run state",
+        "The property's type says in which run states it may be set (`tunable:`), and during the changes of this configuration the component is in another one. Bring it into a permitted state with pre_conf_state, and back with post_conf_state.";
+    BAD_VALUE = "conf::bad_value", "the value is not one of this slot",
+        "The value is not of the declared type, lies outside the declared limits, or is not a finite number. An int is accepted where a float is wanted, never the reverse; min and max are allowed values and hold for every number in the value. Correct the value or the type.";
+    PORT_DRIVEN = "conf::port_driven", "a connected in-port cannot be written",
+        "port_write goes to in-ports that nothing drives; this one is connected, and the next sample would replace the written value at once. Disconnect it in the same configuration (the derived order disconnects first), or set the source instead.";
+    PORT_NOT_WRITABLE = "conf::port_not_writable", "buffered ports and event ports cannot be written",
+        "A written value is the latest value of its port. A buffered port and an event port are queues and have none, so an undo could not take the sample back. Connect a component that sends it, or use an operation or a property.";
+    BAD_ARGUMENTS = "conf::bad_arguments", "the operation takes other arguments",
+        "The call's arguments differ from the operation's declaration in number or in type. `davit types TYPE` shows the operation with the types of its arguments. Correct the call; the same rule holds for the call that undoes it.";
+    MISSING_PROPERTY = "conf::missing_property", "a property without a default is not given",
+        "The type declares this property without a default, so a component cannot be created without a value for it. Give the value in the create itself; a property_set beside it comes too late, for the component would exist without one in between.";
+    CLASH = "conf::clash", "two changes of one configuration do not commute",
+        "The changes of a configuration are a set: no order is promised among them. These two touch the same thing and would leave different systems in different orders. Keep one of them, or write two configurations and apply them one after the other.";
+    DEFAULT_TWICE = "conf::default_twice", "`_default` stands twice in one list",
+        "`_default` stands for every component that the same list does not name; twice in one list it would demand two states of all of them. Keep one, and name the components that are to be in another state.";
+    PRE_ON_CREATED = "conf::pre_on_created", "a component that is created here cannot be in the pre-state list",
+        "The pre-state list is applied before the changes, when this component does not exist yet. Put the entry into post_conf_state, or create the component in an earlier configuration.";
+    POST_ON_DESTROYED = "conf::post_on_destroyed", "a component that is destroyed here cannot be in the post-state list",
+        "The post-state list is applied after the changes, when this component does not exist any more. Remove the entry; destroy stops and cleans up the component by itself.";
+    TOUCHES_DESTROYED = "conf::touches_destroyed", "a change to a component that this configuration destroys",
+        "In one order the change would be lost, in the other it would meet no component. Remove the change or the destroy, or write two configurations. Only disconnects and the pre-state list concern a component that is being destroyed.";
+    IRREVERSIBLE = "conf::irreversible", "a step of this configuration cannot be undone",
+        "Once this step is done, neither a failure of a later step nor an undo can take it back: its frame becomes a floor of the stack. If that is meant, say so with `irreversible = true`; else name the call that undoes it, operation_call(...):undo(...), or declare the operation's `effect:`.";
+    ACTUATOR_BY_DEFAULT = "conf::actuator_by_default", "an actuator is started or stopped only through `_default`",
+        "The component's type is declared `actuator: true`: starting or stopping it moves something. Here that happens only because `_default` covers it, which is easily overlooked. Name the component in the list if it is meant.";
+    STALE_PLAN = "conf::stale_plan", "the system has changed since the plan was made",
+        "A plan holds every decision and is valid for the system it was made from, no other. The system has changed since: make the plan anew.";
     // ---- stack -----------------------------------------------------------------------------------------------------
+    STACK_EMPTY = "stack::empty", "there is nothing to undo",
+        "The stack holds no frame that could be popped: nothing was applied, or all of it was undone already, or it was committed. `davit stack` shows the frames.";
+    STACK_FLOOR = "stack::floor", "undo does not pass this frame",
+        "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped. Apply a configuration that leads to the wanted state instead.";
+    STACK_SHARED = "stack::shared", "a frame above shares something with this one",
+        "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
+    STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",
+        "Configurations of one group are alternatives: applying one pops the frame of the other first. That frame cannot be popped, for the reason given, so the new configuration is refused and nothing has changed. Undo what stands in the way first.";
+    STACK_FULL = "stack::full", "the stack is full and nothing of it can be squashed",
+        "Past its bound the stack squashes its oldest frames into one, but frames of states that are active are never squashed, and here no two others lie side by side. Undo or commit something, or raise `limits: { stack: … }` in the deployment.";
+    STACK_SQUASHED = "stack::squashed", "the frame was squashed together with others",
+        "The stack is bounded: its oldest frames were squashed into one, which can be undone as one only. Undo down to it, or raise `limits: { stack: … }` in the deployment so that more frames stay single.";
+    STACK_NO_FRAME = "stack::no_frame", "there is no such frame",
+        "The frame that is to be undone is not on the stack (any more): it was undone, replaced by another of its group, or never pushed. `davit stack` shows the frames.";
+    STACK_DRIFTED = "stack::drifted", "the system is not as the frame left it",
+        "An inverse of this frame meets a false precondition: the system changed by itself since the frame was pushed (a component failed, or somebody else changed it). `davit drift` shows the difference; repair it or use `davit recover`.";
     // ---- coordinators (statecharts) --------------------------------------------------------------------------------
     CHART_NO_INITIAL = "chart::no_initial",
         "The chart does not say where it begins",

@@ -1,0 +1,163 @@
+//! The pre- and post-state lists: entries in order, `_default` expanded at its place.
+
+use super::builder::Builder;
+use super::conflicts::Sorted;
+use super::footprint::{Access, Slot};
+use super::order::{self, Move};
+use super::{Stage, StepId};
+use crate::model::codes;
+use crate::model::{ComponentName, Finding, Origin, RunState, StateEntry, Step, Target, Transition};
+use crate::system::{View, Violation};
+use rustc_hash::FxHashSet;
+
+pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], stage: Stage, sorted: &Sorted) {
+    b.stage = stage;
+    let mut default: Option<Origin> = None;
+    let mut frontier: Vec<StepId> = Vec::new();
+    for entry in list {
+        if entry.state == RunState::Faulted {
+            let message = format!("`{}` is to become faulted", entry.target);
+            b.findings.push(
+                Finding::error(codes::FAULTED_DEMANDED, message)
+                    .at(entry.origin)
+                    .help("demand unconfigured, stopped or running"),
+            );
+            continue;
+        }
+        match entry.target {
+            Target::Component(component) => named(b, component, entry, sorted, &mut frontier),
+            Target::Default => {
+                if let Some(first) = default {
+                    b.findings.push(
+                        Finding::error(codes::DEFAULT_TWICE, "`_default` stands twice in one list")
+                            .at(entry.origin)
+                            .also(first, "the first one")
+                            .help("keep one, and name the components that are to be in another state"),
+                    );
+                    continue;
+                }
+                default = Some(entry.origin);
+                expand(b, list, entry, &mut frontier);
+            }
+        }
+    }
+}
+
+fn named(
+    b: &mut Builder<'_, '_, '_>,
+    component: ComponentName,
+    entry: &StateEntry,
+    sorted: &Sorted,
+    frontier: &mut Vec<StepId>,
+) {
+    let Some(state) = b.view.component(component).map(|n| n.state) else {
+        unknown(b, component, entry, sorted);
+        return;
+    };
+    let path = state.path_to(entry.state);
+    if path.is_empty() {
+        b.footprint.touch(Slot::State(component), Access::Need);
+    }
+    for transition in path {
+        if let Some(id) = b.step(Step::State { component, transition: *transition }, None, entry.origin, frontier) {
+            frontier.clear();
+            frontier.push(id);
+        }
+    }
+}
+
+fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: &StateEntry, sorted: &Sorted) {
+    let changes = &b.configuration.changes;
+    let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
+        (Stage::Pre, Some(create), _) => {
+            let message =
+                format!("`{component}` is created by this configuration and does not exist before the changes");
+            Finding::error(codes::PRE_ON_CREATED, message)
+                .also(changes[*create].origin, "created here")
+                .help("put the entry into post_conf_state")
+        }
+        (Stage::Post, None, Some(destroy)) if !b.blamed.contains(&component) => {
+            let message =
+                format!("`{component}` is destroyed by this configuration and does not exist after the changes");
+            Finding::error(codes::POST_ON_DESTROYED, message)
+                .also(changes[*destroy].origin, "destroyed here")
+                .help("remove the entry: destroy stops and cleans up by itself")
+        }
+        _ if b.blamed.contains(&component) => return,
+        _ => {
+            let violation = Violation::UnknownComponent(component);
+            let mut finding = Finding::error(violation.code(), violation.to_string());
+            finding.help = violation.help(b.view);
+            finding
+        }
+    };
+    b.findings.push(finding.at(entry.origin));
+}
+
+/// Whether a component belongs to the (sub)system of that path.
+fn in_scope(component: ComponentName, scope: &str) -> bool {
+    let prefix = component.prefix();
+    scope.is_empty() || prefix == scope || prefix.strip_prefix(scope).is_some_and(|rest| rest.starts_with('/'))
+}
+
+fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, frontier: &mut Vec<StepId>) {
+    let named: FxHashSet<ComponentName> =
+        list.iter().filter_map(|e| if let Target::Component(c) = e.target { Some(c) } else { None }).collect();
+    let scope = b.configuration.id.prefix();
+    let mut moving: Vec<ComponentName> = Vec::new();
+    b.view.for_each_component(&mut |node| {
+        if node.state != entry.state && in_scope(node.name, scope) && !named.contains(&node.name) {
+            moving.push(node.name);
+        }
+    });
+    if moving.is_empty() {
+        return;
+    }
+    let key = match entry.state {
+        RunState::Running => Transition::Start,
+        _ => Transition::Stop,
+    };
+    let moves = order::data_flow(b.view, moving, key);
+    let from = b.steps.len();
+    // The number of the start or stop of each move; a move without one (never running) is waited for by nobody.
+    let mut keys: Vec<Option<StepId>> = Vec::with_capacity(moves.len());
+    for Move { component, after } in &moves {
+        let node = b.view.component(*component).expect("it was just seen");
+        let (state, actuator) = (node.state, node.ty.actuator);
+        let mut own = None;
+        let mut previous: Option<StepId> = None;
+        for transition in state.path_to(entry.state) {
+            let mut waits: Vec<StepId> = previous.map_or_else(|| frontier.clone(), |p| vec![p]);
+            if *transition == key {
+                waits.extend(after.iter().filter_map(|at| keys[*at as usize]));
+            }
+            previous =
+                b.step(Step::State { component: *component, transition: *transition }, None, entry.origin, &waits);
+            if *transition == key {
+                own = previous;
+            }
+        }
+        if actuator && own.is_some() {
+            let verb = if key == Transition::Start { "started" } else { "stopped" };
+            let message =
+                format!("in `{}` the actuator `{component}` is {verb} only through `_default`", b.configuration.id);
+            b.warnings.push(
+                Finding::warning(codes::ACTUATOR_BY_DEFAULT, message)
+                    .at(entry.origin)
+                    .help(format!("name it: \"{component}:{}\"", entry.state)),
+            );
+        }
+        keys.push(own);
+    }
+    order::irreversible_last(&mut b.steps, from, &mut b.saved);
+    // What comes next waits for the last steps of this expansion.
+    let mut waited = vec![false; b.steps.len() - from];
+    for step in &b.steps[from..] {
+        for id in &step.after {
+            if let Some(at) = (*id as usize).checked_sub(from) {
+                waited[at] = true;
+            }
+        }
+    }
+    *frontier = waited.iter().enumerate().filter(|(_, w)| !**w).map(|(i, _)| b.steps[from + i].id).collect();
+}

@@ -1,0 +1,299 @@
+//! Taking back what steps did, simulated before anything happens.
+//!
+//! An inverse restores what was, as far as it can be: a component that has failed meanwhile is not brought back into the
+//! fault, and is not started to be stopped; it goes from the fault to where the inverse wants it, at once.
+
+use super::footprint::{Saved, Slot};
+use super::{PlannedStep, SavedValue, Stage, StepId};
+use crate::model::{Call, ComponentName, Origin, RunState, Step};
+use crate::system::{Overlay, System, Undo, View, Violation, step};
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+
+/// A step to be simulated, with what the planner must know of it beyond the step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Item {
+    /// The step.
+    pub step: Step,
+    /// The call that undoes it, where it is an operation's and one is known.
+    pub call: Option<Call>,
+    /// The stage of the configuration's step it is or undoes.
+    pub stage: Stage,
+    /// Where that was written.
+    pub origin: Origin,
+}
+
+impl Item {
+    /// A planned step as an item.
+    pub fn of(planned: &PlannedStep) -> Self {
+        Self { step: planned.step.clone(), call: declared(&planned.undo), stage: planned.stage, origin: planned.origin }
+    }
+}
+
+fn declared(undo: &Undo) -> Option<Call> {
+    match undo {
+        Undo::One(Step::Operation(call)) => Some(call.clone()),
+        _ => None,
+    }
+}
+
+/// A list of steps in the making, each simulated when it is added.
+#[derive(Debug)]
+pub struct Script<'o, 's> {
+    view: &'o mut Overlay<'s>,
+    /// The steps so far.
+    pub steps: Vec<PlannedStep>,
+    /// Where failed components are to go, once something needs them there.
+    goals: BTreeMap<ComponentName, (RunState, Stage, Origin)>,
+    /// A failed component was met: the order is then that of the list.
+    failed: bool,
+}
+
+impl<'o, 's> Script<'o, 's> {
+    /// An empty list over `view`.
+    pub fn new(view: &'o mut Overlay<'s>) -> Self {
+        Self { view, steps: Vec::new(), goals: BTreeMap::new(), failed: false }
+    }
+
+    /// The system after the steps so far.
+    pub fn view(&self) -> &Overlay<'s> {
+        self.view
+    }
+
+    /// Adds a step and answers its number; none when nothing needs to be done for it (an absolute write of the value
+    /// that is there, a move of a failed component that may wait).
+    ///
+    /// # Errors
+    /// The false preconditions.
+    pub fn add(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
+        let component = item.step.component();
+        match &item.step {
+            Step::PropertySet { property, value } => {
+                if self.view.component(component).and_then(|n| n.value(property.member)) == Some(value) {
+                    return Ok(None);
+                }
+            }
+            Step::PortWrite { port, value } => {
+                if step::written(*port, self.view).as_ref() == Some(value) {
+                    return Ok(None);
+                }
+            }
+            Step::State { transition, .. } => {
+                let state = self.view.component(component).map(|n| n.state);
+                if state == Some(RunState::Faulted) {
+                    self.failed = true;
+                    self.goals.insert(component, (transition.target(), item.stage, item.origin));
+                    return Ok(None);
+                }
+            }
+            // Connections do not depend on run states, and a failed component may be destroyed as it is.
+            Step::Connect { .. } | Step::Disconnect { .. } | Step::Create { .. } => {}
+            Step::Destroy { .. } => _ = self.goals.remove(&component),
+            Step::Operation(_) => {}
+        }
+        if matches!(item.step, Step::PropertySet { .. } | Step::Operation(_)) {
+            self.settle(component, wave)?;
+        }
+        self.push(item, wave, after).map(Some)
+    }
+
+    /// Brings a failed component to where it is to be.
+    fn settle(&mut self, component: ComponentName, wave: u32) -> Result<(), Vec<Violation>> {
+        let Some((goal, stage, origin)) = self.goals.remove(&component) else { return Ok(()) };
+        let state = self.view.component(component).map_or(goal, |n| n.state);
+        for transition in state.path_to(goal) {
+            let step = Step::State { component, transition: *transition };
+            self.push(Item { step, call: None, stage, origin }, wave, &[])?;
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<StepId, Vec<Violation>> {
+        let found = step::precondition(&item.step, self.view);
+        if !found.is_empty() {
+            return Err(found);
+        }
+        let undo = step::inverse(&item.step, item.call.as_ref(), self.view);
+        step::effect(&item.step, self.view);
+        let id = StepId::try_from(self.steps.len()).expect("fewer steps than that");
+        self.steps.push(PlannedStep {
+            id,
+            stage: item.stage,
+            wave,
+            after: SmallVec::from_slice(after),
+            reversibility: step::reversibility(&item.step, &undo),
+            undo,
+            step: item.step,
+            origin: item.origin,
+        });
+        Ok(id)
+    }
+
+    /// Adds an unplanned step after all others (each already simulated elsewhere), numbers and waves moved behind.
+    pub(crate) fn append(&mut self, planned: impl IntoIterator<Item = PlannedStep>) {
+        let base = self.next_id();
+        let wave = self.next_wave();
+        for mut step in planned {
+            step.id += base;
+            step.wave += wave;
+            step.after.iter_mut().for_each(|id| *id += base);
+            self.steps.push(step);
+        }
+    }
+
+    pub(crate) fn view_mut(&mut self) -> &mut Overlay<'s> {
+        self.view
+    }
+
+    fn next_id(&self) -> StepId {
+        StepId::try_from(self.steps.len()).expect("fewer steps than that")
+    }
+
+    pub(crate) fn next_wave(&self) -> u32 {
+        self.steps.last().map_or(0, |s| s.wave + 1)
+    }
+
+    /// Ends the list: failed components go to where they are to be.
+    ///
+    /// # Errors
+    /// The false preconditions.
+    pub fn finish(mut self) -> Result<Vec<PlannedStep>, Vec<Violation>> {
+        self.settle_all()?;
+        if self.failed {
+            for i in 0..self.steps.len() {
+                self.steps[i].after = i.checked_sub(1).map(|p| self.steps[p].id).into_iter().collect();
+            }
+        }
+        Ok(self.steps)
+    }
+
+    /// Brings every failed component to where it is to be.
+    ///
+    /// # Errors
+    /// The false preconditions.
+    pub(crate) fn settle_all(&mut self) -> Result<(), Vec<Violation>> {
+        let wave = self.steps.last().map_or(0, |s| s.wave);
+        while let Some(component) = self.goals.keys().next().copied() {
+            self.settle(component, wave)?;
+        }
+        Ok(())
+    }
+}
+
+/// The steps that undo `steps` on the system they led to, last first, with as much room for parallel work as the steps
+/// themselves had. `saved` has the values of absolute writes; those in slots for which `skip` is true stay as they are.
+///
+/// # Errors
+/// The false preconditions, where the system is not as the steps left it.
+pub fn undo(
+    script: &mut Script<'_, '_>,
+    steps: &[PlannedStep],
+    saved: &[SavedValue],
+    skip: &dyn Fn(Slot) -> bool,
+) -> Result<(), Vec<Violation>> {
+    let first_wave = script.next_wave();
+    let last_wave = steps.last().map_or(0, |s| s.wave);
+    let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
+    let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();
+    unwritten.sort_by_key(|s| s.at);
+    // What the undo of each step waits for: the undos of the steps that waited for it.
+    let mut waits: Vec<SmallVec<[StepId; 4]>> = vec![SmallVec::new(); steps.len()];
+    for (i, done) in steps.iter().enumerate().rev() {
+        let wave = first_wave + (last_wave - done.wave);
+        while unwritten.last().is_some_and(|s| s.at as usize > i) {
+            restore(script, unwritten.pop().expect("it was just seen"), skip, wave)?;
+        }
+        let mut last = std::mem::take(&mut waits[i]);
+        last.sort_unstable();
+        last.dedup();
+        let slot = match &done.step {
+            Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
+            Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
+            _ => None,
+        };
+        let redo = match &done.step {
+            Step::Operation(call) => Some(call.clone()),
+            _ => None,
+        };
+        if slot.is_none_or(|slot| !skip(slot)) {
+            let kept = slot.and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
+            let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
+            for step in steps {
+                let item = Item { step: step.clone(), call: redo.clone(), stage: done.stage, origin: done.origin };
+                if let Some(id) = script.add(item, wave, &last)? {
+                    last = SmallVec::from_slice(&[id]);
+                }
+            }
+        }
+        for earlier in &done.after {
+            waits[*earlier as usize].extend_from_slice(&last);
+        }
+    }
+    let wave = first_wave + last_wave;
+    while let Some(entry) = unwritten.pop() {
+        restore(script, entry, skip, wave)?;
+    }
+    script.settle_all()
+}
+
+fn restore(
+    script: &mut Script<'_, '_>,
+    saved: &SavedValue,
+    skip: &dyn Fn(Slot) -> bool,
+    wave: u32,
+) -> Result<(), Vec<Violation>> {
+    if let (false, Some(step)) = (skip(saved.slot), restoring(saved)) {
+        script.add(Item { step, call: None, stage: Stage::Changes, origin: Origin::NONE }, wave, &[])?;
+    }
+    Ok(())
+}
+
+/// The step that restores a saved value.
+pub fn restoring(saved: &SavedValue) -> Option<Step> {
+    match (saved.slot, &saved.value) {
+        (Slot::Property(property), Saved::Property(value)) => {
+            Some(Step::PropertySet { property, value: value.clone() })
+        }
+        (Slot::Port(port), Saved::Port(value)) => Some(Step::PortWrite { port, value: value.clone() }),
+        _ => None,
+    }
+}
+
+/// The steps that take back `done` steps of an interrupted transaction on the live system, last done first, each at most
+/// as irreversible as it is: what cannot be undone is left out.
+///
+/// # Errors
+/// The false preconditions, where the system is not as the steps left it.
+pub fn rollback(system: &System, done: &[PlannedStep]) -> Result<Vec<PlannedStep>, Vec<Violation>> {
+    let mut view = Overlay::new(system);
+    let mut script = Script::new(&mut view);
+    for step in done.iter().rev() {
+        let redo = match &step.step {
+            Step::Operation(call) => Some(call.clone()),
+            _ => None,
+        };
+        for undo in step.undo.steps() {
+            let item = Item { step: undo.clone(), call: redo.clone(), stage: step.stage, origin: step.origin };
+            let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
+            script.add(item, 0, &after)?;
+        }
+    }
+    script.finish()
+}
+
+/// A list of steps in that order, simulated: what executes a `system::diff`.
+///
+/// # Errors
+/// The false preconditions of the first step that has any.
+pub fn in_order(system: &System, steps: Vec<Step>) -> Result<Vec<PlannedStep>, Vec<Violation>> {
+    let mut view = Overlay::new(system);
+    let mut script = Script::new(&mut view);
+    for step in steps {
+        let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
+        let item = Item { step, call: None, stage: Stage::Changes, origin: Origin::NONE };
+        // Not through `add`: a difference knows what it does with failed components.
+        script.push(item, 0, &after)?;
+    }
+    Ok(script.steps)
+}

@@ -1,0 +1,384 @@
+//! What a step means: when it may happen, what it does to the picture of a system, and which steps undo it.
+//!
+//! The three stand together, one kind of step after the other, because each is the other two's specification (design §4).
+
+use super::{Driven, Node, View, ViewMut, Violation};
+use crate::model::{
+    Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, RunState, Step, Transition, TypeName,
+    Value,
+};
+
+/// What undoes a step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Undo {
+    /// This step.
+    One(Step),
+    /// These steps, in this order.
+    Many(Vec<Step>),
+    /// Nothing needs to be undone (an operation without effect), or nothing may be (a faulted state is never restored).
+    Nothing,
+    /// Nothing can undo it; in words, why.
+    Irreversible(String),
+}
+
+impl Undo {
+    /// The steps that undo it, in order.
+    pub fn steps(&self) -> &[Step] {
+        match self {
+            Self::One(step) => std::slice::from_ref(step),
+            Self::Many(steps) => steps,
+            Self::Nothing | Self::Irreversible(_) => &[],
+        }
+    }
+}
+
+/// How far a step can be undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reversibility {
+    /// Its inverse restores the observable state.
+    Exact,
+    /// Another call makes good for it.
+    Compensated,
+    /// Nothing undoes it.
+    Irreversible,
+}
+
+/// Every false precondition of `step` in `view`; empty: it may happen.
+pub fn precondition(step: &Step, view: &impl View) -> Vec<Violation> {
+    let mut found = Vec::new();
+    match step {
+        Step::State { component, transition } => match view.component(*component) {
+            None => found.push(Violation::UnknownComponent(*component)),
+            Some(node) if !transition.allowed_in(node.state) => {
+                found.push(Violation::Transition { component: *component, transition: *transition, state: node.state })
+            }
+            Some(_) => {}
+        },
+        Step::Create { component, ty, properties, .. } => create_allowed(*component, *ty, properties, view, &mut found),
+        Step::Destroy { component } => destroy_allowed(*component, view, &mut found),
+        Step::Connect { from, to, policy } => connect_allowed(*from, *to, *policy, view, &mut found),
+        Step::Disconnect { from, to } => {
+            if view.link(*from, *to).is_none() {
+                // An unknown end is told as such; two known ends are not connected.
+                let ends = port_of(*from, view, &mut found).is_some() & port_of(*to, view, &mut found).is_some();
+                if ends {
+                    found.push(Violation::NotConnected { from: *from, to: *to });
+                }
+            }
+        }
+        Step::PropertySet { property, value } => set_allowed(*property, value, view, &mut found),
+        Step::PortWrite { port, value } => write_allowed(*port, value.as_ref(), view, &mut found),
+        Step::Operation(call) => call_allowed(call, view, &mut found),
+    }
+    found
+}
+
+/// What `step` does to the picture. Its precondition holds.
+///
+/// # Panics
+/// When the precondition does not hold and the picture would become wrong: a broken invariant of the caller.
+pub fn effect(step: &Step, view: &mut impl ViewMut) {
+    match step {
+        Step::State { component, transition } => view.put_state(*component, transition.target()),
+        Step::Create { component, ty, activity, properties } => {
+            let ty = view.types().get(*ty).cloned().expect("the type of a create is known");
+            view.insert_component(Node::new(*component, ty, *activity, properties.clone()));
+        }
+        Step::Destroy { component } => view.remove_component(*component),
+        Step::Connect { from, to, policy } => view.insert_link(*from, *to, *policy),
+        Step::Disconnect { from, to } => view.remove_link(*from, *to),
+        Step::PropertySet { property, value } => {
+            let at = view.component(property.component).and_then(|n| n.property(property.member)).map(|(i, _)| i);
+            view.put_property(property.component, at.expect("the property exists"), value);
+        }
+        Step::PortWrite { port, value } => {
+            let at = view.component(port.component).and_then(|n| n.port(port.member)).map(|(i, _)| i);
+            view.put_port(port.component, at.expect("the port exists"), value.as_ref());
+        }
+        Step::Operation(_) => {}
+    }
+}
+
+/// What undoes `step`, with the values it will overwrite, seen in the system `before` it. `undo` is the call that a
+/// configuration names for an operation's call.
+pub fn inverse(step: &Step, undo: Option<&Call>, before: &impl View) -> Undo {
+    match step {
+        Step::State { component, transition } => {
+            let node = before.component(*component);
+            let never = node.map(|n| n.ty.irreversible).unwrap_or_default();
+            match transition {
+                Transition::Configure if never.configure => {
+                    Undo::Irreversible(format!("configuring `{component}` cannot be undone"))
+                }
+                Transition::Stop if never.stop => {
+                    Undo::Irreversible(format!("stopping `{component}` cannot be undone"))
+                }
+                Transition::Cleanup if node.is_some_and(|n| n.state == RunState::Faulted) => Undo::Nothing,
+                _ => Undo::One(Step::State { component: *component, transition: transition.inverse() }),
+            }
+        }
+        Step::Create { component, .. } => Undo::One(Step::Destroy { component: *component }),
+        Step::Destroy { component } => match before.component(*component) {
+            None => Undo::Nothing,
+            Some(node) if node.ty.irreversible.destroy => {
+                Undo::Irreversible(format!("destroying `{component}` cannot be undone"))
+            }
+            Some(node) => {
+                let create = Step::Create {
+                    component: *component,
+                    ty: node.ty.name,
+                    activity: node.activity,
+                    properties: node.properties.clone(),
+                };
+                let writes = node
+                    .written_ports()
+                    .map(|(port, value)| Step::PortWrite { port: component.member(port), value: Some(value.clone()) });
+                let steps: Vec<Step> = std::iter::once(create).chain(writes).collect();
+                Undo::Many(steps)
+            }
+        },
+        Step::Connect { from, to, .. } => Undo::One(Step::Disconnect { from: *from, to: *to }),
+        Step::Disconnect { from, to } => match before.link(*from, *to) {
+            Some(policy) => Undo::One(Step::Connect { from: *from, to: *to, policy }),
+            None => Undo::Nothing,
+        },
+        Step::PropertySet { property, .. } => {
+            match before.component(property.component).and_then(|n| n.value(property.member)) {
+                Some(value) => Undo::One(Step::PropertySet { property: *property, value: value.clone() }),
+                None => Undo::Nothing,
+            }
+        }
+        Step::PortWrite { port, .. } => match written(*port, before) {
+            Some(value) => Undo::One(Step::PortWrite { port: *port, value }),
+            None => Undo::Nothing,
+        },
+        Step::Operation(call) => {
+            if let Some(undo) = undo {
+                return Undo::One(Step::Operation(undo.clone()));
+            }
+            let ty = before.component(call.operation.component).map(|n| &n.ty);
+            match ty.and_then(|ty| ty.operations.get(&call.operation.member).map(|o| (ty, &o.effect))) {
+                Some((_, Effect::None)) | None => Undo::Nothing,
+                Some((ty, Effect::Undo(name))) => {
+                    let takes = ty.operations.get(name).is_some_and(|o| !o.args.is_empty());
+                    let args = if takes { call.args.clone() } else { Vec::new() };
+                    Undo::One(Step::Operation(Call { operation: call.operation.component.member(*name), args }))
+                }
+                Some((_, Effect::Irreversible)) => {
+                    Undo::Irreversible(format!("the call of `{}` cannot be undone", call.operation))
+                }
+            }
+        }
+    }
+}
+
+/// How far `step` can be undone, given what undoes it.
+pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
+    match (undo, step) {
+        (Undo::Irreversible(_), _) => Reversibility::Irreversible,
+        (_, Step::Operation(_)) => Reversibility::Compensated,
+        _ => Reversibility::Exact,
+    }
+}
+
+/// Makes `step` happen in the picture, when its precondition holds.
+///
+/// # Errors
+/// Every false precondition; nothing has changed then.
+pub fn apply(step: &Step, view: &mut impl ViewMut) -> Result<(), Vec<Violation>> {
+    let found = precondition(step, view);
+    if found.is_empty() {
+        effect(step, view);
+        Ok(())
+    } else {
+        Err(found)
+    }
+}
+
+/// What was written to a port: none when there is no such port, `Some(None)` when it was never written.
+pub fn written(port: MemberRef, view: &impl View) -> Option<Option<Value>> {
+    let node = view.component(port.component)?;
+    let (at, _) = node.port(port.member)?;
+    Some(node.written(at).cloned())
+}
+
+fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &impl View, found: &mut Vec<Violation>) {
+    if view.component(name).is_some() {
+        found.push(Violation::Exists(name));
+    }
+    let Some(ty) = view.types().get(ty) else {
+        found.push(Violation::UnknownType(ty));
+        return;
+    };
+    if ty.properties.len() != values.len() {
+        let (expected, found_n) = (ty.properties.len(), values.len());
+        found.push(Violation::PropertyCount { component: name, expected, found: found_n });
+        return;
+    }
+    for ((property, declared), value) in ty.properties.iter().zip(values) {
+        check_value(name.member(*property), declared, value, found);
+    }
+}
+
+fn destroy_allowed(name: ComponentName, view: &impl View, found: &mut Vec<Violation>) {
+    let Some(node) = view.component(name) else {
+        found.push(Violation::UnknownComponent(name));
+        return;
+    };
+    if !matches!(node.state, RunState::Unconfigured | RunState::Faulted) {
+        found.push(Violation::NotUnconfigured { component: name, state: node.state });
+    }
+    if node.degree > 0 {
+        let mut links = Vec::new();
+        view.for_each_link(&mut |from, to, _| {
+            if from.component == name || to.component == name {
+                links.push((from, to));
+            }
+        });
+        links.sort_unstable();
+        found.push(Violation::StillConnected { component: name, links });
+    }
+}
+
+fn port_of<'v>(port: MemberRef, view: &'v impl View, found: &mut Vec<Violation>) -> Option<&'v PortType> {
+    let Some(node) = view.component(port.component) else {
+        found.push(Violation::UnknownComponent(port.component));
+        return None;
+    };
+    let declared = node.ty.ports.get(&port.member);
+    if declared.is_none() {
+        found.push(Violation::UnknownPort { port, ty: node.ty.name });
+    }
+    declared
+}
+
+/// Out-ports that drive an in-port. A search: only for messages.
+fn sources(to: MemberRef, view: &impl View) -> Vec<MemberRef> {
+    let mut by = Vec::new();
+    view.for_each_link(&mut |from, t, _| {
+        if t == to {
+            by.push(from);
+        }
+    });
+    by.sort_unstable();
+    by
+}
+
+fn connect_allowed(from: MemberRef, to: MemberRef, policy: Policy, view: &impl View, found: &mut Vec<Violation>) {
+    let source = port_of(from, view, found);
+    let sink = port_of(to, view, found);
+    if source.is_some_and(|p| p.direction != Direction::Out) {
+        found.push(Violation::NotOut(from));
+    }
+    if sink.is_some_and(|p| p.direction != Direction::In) {
+        found.push(Violation::NotIn(to));
+    }
+    if policy == Policy::Buffer(0) {
+        found.push(Violation::BufferSize(to));
+    }
+    let (Some(source), Some(sink)) = (source, sink) else { return };
+    if source.ty != sink.ty {
+        let (from_ty, to_ty) = (source.ty.clone(), sink.ty.clone());
+        found.push(Violation::PortTypes { from, to, from_ty, to_ty });
+    }
+    if let (Some(from_unit), Some(to_unit)) = (&source.unit, &sink.unit)
+        && from_unit != to_unit
+    {
+        let (from_unit, to_unit) = (from_unit.clone(), to_unit.clone());
+        found.push(Violation::PortUnits { from, to, from_unit, to_unit });
+    }
+    if view.link(from, to).is_some() {
+        found.push(Violation::AlreadyConnected { from, to });
+    } else if !sink.is_event() {
+        if sink.buffered && policy == Policy::Data {
+            found.push(Violation::NeedsBuffer(to));
+        }
+        let Driven { links, data } = view.driven(to);
+        if data > 0 || (policy == Policy::Data && links > 0) {
+            found.push(Violation::DataAlone { to, by: sources(to, view) });
+        }
+    }
+}
+
+fn check_value(slot: MemberRef, declared: &crate::model::PropertyType, value: &Value, found: &mut Vec<Violation>) {
+    let bounded = declared.min.is_some() || declared.max.is_some();
+    let mut within = true;
+    if bounded {
+        value.for_each_number(&mut |n| {
+            within &= declared.min.is_none_or(|m| n >= m) && declared.max.is_none_or(|m| n <= m);
+        });
+    }
+    if !(within && value.is_of(&declared.ty)) {
+        let reason = match declared.fit(value.clone()) {
+            Err(error) => error.to_string(),
+            Ok(fitted) => format!("expected {}, found {} (not converted)", declared.ty, fitted.describe()),
+        };
+        found.push(Violation::BadValue { slot, reason });
+    }
+}
+
+fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut Vec<Violation>) {
+    let Some(node) = view.component(property.component) else {
+        found.push(Violation::UnknownComponent(property.component));
+        return;
+    };
+    let Some((_, declared)) = node.property(property.member) else {
+        found.push(Violation::UnknownProperty { property, ty: node.ty.name });
+        return;
+    };
+    if !declared.tunable.allows(node.state) {
+        found.push(Violation::NotTunable { property, tunable: declared.tunable, state: node.state });
+    }
+    check_value(property, declared, value, found);
+}
+
+fn write_allowed(port: MemberRef, value: Option<&Value>, view: &impl View, found: &mut Vec<Violation>) {
+    let Some(declared) = port_of(port, view, found) else { return };
+    if declared.direction != Direction::In {
+        found.push(Violation::NotIn(port));
+        return;
+    }
+    if declared.is_event() || declared.buffered {
+        found.push(Violation::NotWritable { port, event: declared.is_event() });
+        return;
+    }
+    if let Some(value) = value
+        && !value.is_of(&declared.ty)
+    {
+        let reason = match value.clone().fit(&declared.ty) {
+            Err(error) => error.to_string(),
+            Ok(_) => format!("expected {}, found {} (not converted)", declared.ty, value.describe()),
+        };
+        found.push(Violation::BadValue { slot: port, reason });
+    }
+    if view.driven(port).links > 0 {
+        found.push(Violation::Driven { port, by: sources(port, view) });
+    }
+}
+
+fn call_allowed(call: &Call, view: &impl View, found: &mut Vec<Violation>) {
+    let operation = call.operation;
+    let Some(node) = view.component(operation.component) else {
+        found.push(Violation::UnknownComponent(operation.component));
+        return;
+    };
+    let Some(declared) = node.ty.operations.get::<Ident>(&operation.member) else {
+        found.push(Violation::UnknownOperation { operation, ty: node.ty.name });
+        return;
+    };
+    if declared.args.len() != call.args.len() {
+        let (expected, given) = (declared.args.len(), call.args.len());
+        found.push(Violation::ArgumentCount { operation, expected, found: given });
+        return;
+    }
+    for (i, (ty, value)) in declared.args.iter().zip(&call.args).enumerate() {
+        if !value.is_of(ty) {
+            let reason = match value.clone().fit(ty) {
+                Err(error) => error.to_string(),
+                Ok(_) => format!("expected {ty}, found {} (not converted)", value.describe()),
+            };
+            found.push(Violation::Argument { operation, position: i + 1, reason });
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The picture of a system: components as nodes and connections as edges of a directed graph, with indices that answer
+//! every question of a step's precondition without a search.
+
+use super::node::{Driven, Link, Node};
+use super::{View, ViewMut};
+use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Snapshot, TypeName, Value};
+use petgraph::stable_graph::{EdgeIndex, NodeIndex, StableDiGraph};
+use petgraph::visit::{EdgeRef, IntoEdgeReferences};
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// A system, as far as it is known.
+#[derive(Debug, Clone)]
+pub struct System {
+    types: Arc<Catalogue>,
+    graph: StableDiGraph<Node, Link>,
+    names: FxHashMap<ComponentName, NodeIndex>,
+    links: FxHashMap<(MemberRef, MemberRef), EdgeIndex>,
+    driven: FxHashMap<MemberRef, Driven>,
+    revision: u64,
+}
+
+/// A snapshot names a component type that the catalogue does not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("component `{component}` is of type `{ty}`, which is not in the catalogue")]
+pub struct UnknownType {
+    /// The component.
+    pub component: ComponentName,
+    /// Its type.
+    pub ty: TypeName,
+}
+
+impl System {
+    /// A system without components.
+    pub fn new(types: Arc<Catalogue>) -> Self {
+        Self {
+            types,
+            graph: StableDiGraph::default(),
+            names: FxHashMap::default(),
+            links: FxHashMap::default(),
+            driven: FxHashMap::default(),
+            revision: 0,
+        }
+    }
+
+    /// The system that a platform reports. Members the type does not have are left out; properties it does have and the
+    /// snapshot lacks take their default.
+    ///
+    /// # Errors
+    /// [`UnknownType`] for the first component whose type is not in the catalogue.
+    pub fn from_snapshot(snapshot: &Snapshot, types: Arc<Catalogue>) -> Result<Self, UnknownType> {
+        let mut system = Self::new(types);
+        for (name, component) in &snapshot.components {
+            let ty =
+                system.types.get(component.ty).cloned().ok_or(UnknownType { component: *name, ty: component.ty })?;
+            let properties = ty
+                .properties
+                .iter()
+                .map(|(property, declared)| {
+                    component
+                        .properties
+                        .get(property)
+                        .or(declared.default.as_ref())
+                        .cloned()
+                        .unwrap_or(Value::Bool(false))
+                })
+                .collect();
+            let mut node = Node::new(*name, ty, component.activity, properties);
+            node.state = component.state;
+            system.insert_component(node);
+        }
+        for ((from, to), policy) in &snapshot.connections {
+            if system.names.contains_key(&from.component) && system.names.contains_key(&to.component) {
+                system.insert_link(*from, *to, *policy);
+            }
+        }
+        for (port, value) in &snapshot.ports {
+            if let Some(index) = system.component(port.component).and_then(|n| n.port(port.member)).map(|(i, _)| i) {
+                system.put_port(port.component, index, Some(value));
+            }
+        }
+        Ok(system)
+    }
+
+    /// The system as it is observed.
+    pub fn snapshot(&self) -> Snapshot {
+        snapshot_of(self)
+    }
+
+    /// The catalogue it was made with.
+    pub fn catalogue(&self) -> &Arc<Catalogue> {
+        &self.types
+    }
+
+    /// A number that every change raises. A plan is valid for the revision it was made from.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// How many components there are.
+    pub fn len(&self) -> usize {
+        self.graph.node_count()
+    }
+
+    /// Whether there is no component.
+    pub fn is_empty(&self) -> bool {
+        self.graph.node_count() == 0
+    }
+
+    /// The graph: components, and connections from the out-port's component to the in-port's.
+    pub fn graph(&self) -> &StableDiGraph<Node, Link> {
+        &self.graph
+    }
+
+    /// The handle of a component, valid as long as it exists.
+    pub fn index_of(&self, name: ComponentName) -> Option<NodeIndex> {
+        self.names.get(&name).copied()
+    }
+
+    /// Records a run state that a component took by itself, as when it became faulted. False: there is no such component.
+    pub fn set_state(&mut self, component: ComponentName, state: RunState) -> bool {
+        let known = self.names.contains_key(&component);
+        if known {
+            self.put_state(component, state);
+        }
+        known
+    }
+
+    /// The component behind a handle, to be changed: counts as a touch.
+    pub(crate) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
+        self.revision += 1;
+        let revision = self.revision;
+        let node = self.graph.node_weight_mut(index)?;
+        node.generation = revision;
+        Some(node)
+    }
+
+    fn touch(&mut self, name: ComponentName) -> &mut Node {
+        let index = self.names[&name];
+        self.touch_at(index).expect("names and nodes agree")
+    }
+}
+
+impl View for System {
+    fn types(&self) -> &Catalogue {
+        &self.types
+    }
+
+    fn component(&self, name: ComponentName) -> Option<&Node> {
+        self.names.get(&name).map(|i| &self.graph[*i])
+    }
+
+    fn link(&self, from: MemberRef, to: MemberRef) -> Option<Policy> {
+        self.links.get(&(from, to)).map(|e| self.graph[*e].policy)
+    }
+
+    fn driven(&self, port: MemberRef) -> Driven {
+        self.driven.get(&port).copied().unwrap_or_default()
+    }
+
+    fn for_each_component(&self, f: &mut dyn FnMut(&Node)) {
+        self.graph.node_weights().for_each(f);
+    }
+
+    fn for_each_link(&self, f: &mut dyn FnMut(MemberRef, MemberRef, Policy)) {
+        for edge in self.graph.edge_references() {
+            let link = edge.weight();
+            let from = self.graph[edge.source()].name.member(link.from);
+            f(from, self.graph[edge.target()].name.member(link.to), link.policy);
+        }
+    }
+}
+
+impl ViewMut for System {
+    fn insert_component(&mut self, mut node: Node) {
+        self.revision += 1;
+        node.born = self.revision;
+        node.generation = self.revision;
+        let name = node.name;
+        let index = self.graph.add_node(node);
+        self.names.insert(name, index);
+    }
+
+    fn remove_component(&mut self, name: ComponentName) {
+        self.revision += 1;
+        if let Some(index) = self.names.remove(&name) {
+            self.graph.remove_node(index);
+        }
+    }
+
+    fn insert_link(&mut self, from: MemberRef, to: MemberRef, policy: Policy) {
+        self.touch(from.component).degree += 1;
+        if from.component != to.component {
+            self.touch(to.component).degree += 1;
+        }
+        let (a, b) = (self.names[&from.component], self.names[&to.component]);
+        let edge = self.graph.add_edge(a, b, Link { from: from.member, to: to.member, policy });
+        self.links.insert((from, to), edge);
+        let driven = self.driven.entry(to).or_default();
+        driven.links += 1;
+        driven.data += u32::from(policy == Policy::Data);
+    }
+
+    fn remove_link(&mut self, from: MemberRef, to: MemberRef) {
+        let Some(edge) = self.links.remove(&(from, to)) else { return };
+        self.touch(from.component).degree -= 1;
+        if from.component != to.component {
+            self.touch(to.component).degree -= 1;
+        }
+        let data = self.graph.remove_edge(edge).is_some_and(|link| link.policy == Policy::Data);
+        if let Some(driven) = self.driven.get_mut(&to) {
+            driven.links -= 1;
+            driven.data -= u32::from(data);
+            if driven.links == 0 {
+                self.driven.remove(&to);
+            }
+        }
+    }
+
+    fn put_state(&mut self, name: ComponentName, state: RunState) {
+        self.touch(name).state = state;
+    }
+
+    fn put_property(&mut self, name: ComponentName, index: usize, value: &Value) {
+        self.touch(name).properties[index].clone_from(value);
+    }
+
+    fn put_port(&mut self, name: ComponentName, index: usize, value: Option<&Value>) {
+        self.touch(name).put_port(index, value);
+    }
+}
+
+/// Any view as it is observed.
+pub(super) fn snapshot_of(view: &impl View) -> Snapshot {
+    let mut snapshot = Snapshot::default();
+    view.for_each_component(&mut |node| {
+        snapshot.components.insert(node.name, node.snapshot());
+        for (port, value) in node.written_ports() {
+            snapshot.ports.insert(node.name.member(port), value.clone());
+        }
+    });
+    view.for_each_link(&mut |from, to, policy| {
+        snapshot.connections.insert((from, to), policy);
+    });
+    snapshot
+}
