@@ -74,3 +74,7 @@ pub const LUA_TIME: Duration = Duration::from_millis(1500);
 
 /// Longest string the Lua library functions make at once, in bytes.
 pub const LUA_STRING: usize = 1024 * 1024;
+
+/// Events and answers remembered for those who wait for one: a wait begins before what it waits for is asked, so only what
+/// happens between two looks of the waiter must fit.
+pub const HEARD: usize = 1024;

@@ -105,6 +105,10 @@ impl Inbox {
         self.control.pop_front().or_else(|| self.report.pop_front())
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.control.is_empty() && self.report.is_empty()
+    }
+
     pub fn dropped(&self) -> Dropped {
         self.dropped
     }

@@ -7,7 +7,7 @@ use crate::model::names::EventName;
 use crate::statechart::{Chart, NodeId, Raised};
 use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// A running coordinator. Cloning makes another handle of the same one; it ends when it is told to, not when the handles
 /// are gone.
@@ -169,6 +169,15 @@ impl Coordinator {
         self.shared.detached.load(Ordering::SeqCst)
     }
 
+    /// Whether it has reacted to everything delivered so far: no event waits, and no step is under way.
+    pub fn is_settled(&self) -> bool {
+        match self.shared.commanding.try_lock() {
+            Ok(_commanding) => lock(&self.shared.inbox).is_empty(),
+            Err(TryLockError::Poisoned(_)) => true,
+            Err(TryLockError::WouldBlock) => false,
+        }
+    }
+
     /// Takes the command from it: when this returns, its listener hears nothing from it any more (a call from the listener
     /// itself lets the present step end). Its last state stays readable; its thread ends by itself.
     pub fn detach(&self) {
@@ -208,32 +217,40 @@ impl Shared {
         let _ended = Ended(self);
         let mut core = Core::new(self.chart.clone());
         let mut listener = Told { shared: self, listener };
-        self.react(|| core.start(self.clock.now(), &mut listener));
+        self.react(|| {
+            core.start(self.clock.now(), &mut listener);
+            true
+        });
         while !self.detached.load(Ordering::SeqCst) {
-            let next = lock(&self.inbox).pop();
             let now = self.clock.now();
-            if let Some(incoming) = next {
-                self.react(|| {
+            // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
+            let worked = self.react(|| match self.next() {
+                Some(incoming) => {
                     if core.deliver(incoming.event, incoming.tag, now, &mut listener) != Delivered::Stale {
                         self.delivered.fetch_add(1, Ordering::Relaxed);
                     }
-                });
-                continue;
-            }
-            match core.next_deadline() {
-                Some(due) if due <= now => self.react(|| core.tick(now, &mut listener)),
-                due => {
-                    self.bell.wait(due.unwrap_or(Time::NEVER));
+                    true
                 }
+                None if core.next_deadline().is_some_and(|due| due <= now) => {
+                    core.tick(now, &mut listener);
+                    true
+                }
+                None => false,
+            });
+            if !worked {
+                self.bell.wait(core.next_deadline().unwrap_or(Time::NEVER));
             }
         }
     }
 
-    fn react(&self, reaction: impl FnOnce()) {
+    fn next(&self) -> Option<Incoming> {
+        lock(&self.inbox).pop()
+    }
+
+    /// Whether there was something to react to.
+    fn react(&self, reaction: impl FnOnce() -> bool) -> bool {
         let _commanding = lock(&self.commanding);
-        if !self.detached.load(Ordering::SeqCst) {
-            reaction();
-        }
+        !self.detached.load(Ordering::SeqCst) && reaction()
     }
 }
 
