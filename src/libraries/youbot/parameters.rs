@@ -117,5 +117,5 @@ pub const BASE_LAG: f64 = 0.1;
 /// The pose the coupling works in, in degrees: elbow up, tool in front and low (D: well conditioned).
 pub const WORKING_POSE_DEG: [f64; JOINTS] = [0.0, -30.0, 100.0, 60.0, 0.0];
 
-/// The folded pose the arm is parked in, in degrees: close to every stop of joints 2 to 4, outside their soft limits.
-pub const PARK_POSE_DEG: [f64; JOINTS] = [0.0, -60.0, 135.0, -95.0, 0.0];
+/// The folded pose the arm is parked in, in degrees: half a degree before the stops, on which it then rests.
+pub const PARK_POSE_DEG: [f64; JOINTS] = [0.0, -64.5, 145.5, -102.0, 0.0];

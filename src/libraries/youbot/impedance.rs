@@ -1,0 +1,156 @@
+//! The coupling's law: a spring and a damper between this tool and the other one.
+
+use nalgebra::Vector3;
+
+/// What the law is told, all in this robot's world frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Reference {
+    /// Where the other tool was, in m.
+    pub position: Vector3<f64>,
+    /// How it moved, in m/s.
+    pub velocity: Vector3<f64>,
+    /// How long ago that was, in s.
+    pub age: f64,
+}
+
+/// Parameters of the law (defaults: youBot coupling, one-way delay of a few milliseconds).
+#[derive(Debug, Clone, Copy)]
+pub struct ImpedanceParameters {
+    /// In N/m.
+    pub stiffness: f64,
+    /// On the difference of velocities, in N s/m.
+    pub damping_rel: f64,
+    /// On the tool's own velocity, in N s/m; at least 1.2 times stiffness times delay keeps a delayed coupling stable.
+    pub damping_abs: f64,
+    /// Largest force put out, in N.
+    pub f_max: f64,
+    /// Fastest change of the force put out, in N/s.
+    pub f_rate: f64,
+    /// Age from which the reference is not believed, in s.
+    pub ref_max_age: f64,
+    /// This robot's frame minus the other's, in m.
+    pub offset: Vector3<f64>,
+}
+
+impl Default for ImpedanceParameters {
+    fn default() -> Self {
+        Self {
+            stiffness: 150.0,
+            damping_rel: 12.0,
+            damping_abs: 5.0,
+            f_max: 10.0,
+            f_rate: 40.0,
+            ref_max_age: 0.06,
+            offset: Vector3::zeros(),
+        }
+    }
+}
+
+/// Time in which the force fades when the reference is stale, in s.
+pub const FADE: f64 = 0.1;
+
+/// The law with its memory.
+#[derive(Debug, Clone, Default)]
+pub struct Impedance {
+    /// Its parameters.
+    pub parameters: ImpedanceParameters,
+    ramp: Vector3<f64>,
+    trust: f64,
+}
+
+/// What the law answers.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ImpedanceOutput {
+    /// The force to put on the tool, in N; zero unless coupled.
+    pub force: Vector3<f64>,
+    /// Norm of the force it would want, coupled or not, in N.
+    pub raw_norm: f64,
+}
+
+impl Impedance {
+    /// One step of `dt` seconds. `coupled` is the port `ext_ref_mode`: false computes the wanted force and puts out none.
+    ///
+    /// Independent of any coordination the force fades within [`FADE`] when the reference is older than `ref_max_age`.
+    pub fn update(
+        &mut self,
+        position: &Vector3<f64>,
+        velocity: &Vector3<f64>,
+        reference: Option<&Reference>,
+        coupled: bool,
+        dt: f64,
+    ) -> ImpedanceOutput {
+        let p = &self.parameters;
+        let raw = reference.map_or_else(Vector3::zeros, |r| {
+            (r.position + p.offset - position) * p.stiffness + (r.velocity - velocity) * p.damping_rel
+        });
+        let raw_norm = raw.norm();
+        let fresh = reference.is_some_and(|r| r.age <= p.ref_max_age);
+        self.trust = (self.trust + if fresh { dt / FADE } else { -dt / FADE }).clamp(0.0, 1.0);
+        if !coupled {
+            self.ramp = Vector3::zeros();
+            return ImpedanceOutput { force: Vector3::zeros(), raw_norm };
+        }
+        let wanted = if raw_norm > p.f_max { raw * (p.f_max / raw_norm) } else { raw };
+        let step = wanted - self.ramp;
+        let most = p.f_rate * dt;
+        let length = step.norm();
+        self.ramp += if length > most { step * (most / length) } else { step };
+        ImpedanceOutput { force: (self.ramp - velocity * p.damping_abs) * self.trust, raw_norm }
+    }
+
+    /// Forgets the past: the force starts from zero.
+    pub fn reset(&mut self) {
+        self.ramp = Vector3::zeros();
+        self.trust = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.001;
+
+    fn away(age: f64) -> Reference {
+        Reference { position: Vector3::new(0.15, 0.0, 0.0), velocity: Vector3::zeros(), age }
+    }
+
+    #[test]
+    fn uncoupled_it_wants_but_does_not_push() {
+        let mut law = Impedance::default();
+        let out = law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&away(0.005)), false, DT);
+        assert_eq!(out.force, Vector3::zeros());
+        assert!((out.raw_norm - 22.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn coupled_it_ramps_and_is_bounded() {
+        let mut law = Impedance::default();
+        let mut last: f64 = 0.0;
+        for _ in 0..1000 {
+            let f = law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&away(0.005)), true, DT).force.norm();
+            assert!((f - last).abs() < 0.15 && f <= 10.0 + 1e-9);
+            last = f;
+        }
+        assert!((last - 10.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_stale_reference_fades_by_itself() {
+        let mut law = Impedance::default();
+        for _ in 0..1000 {
+            law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&away(0.005)), true, DT);
+        }
+        let mut age = 0.0;
+        let mut gone = None;
+        for i in 0..400 {
+            age += DT;
+            let f = law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&away(age)), true, DT).force.norm();
+            if f < 0.1 && gone.is_none() {
+                gone = Some(f64::from(i) * DT);
+            }
+        }
+        let gone = gone.expect("fades");
+        assert!(gone > 0.1 && gone < 0.165, "{gone}");
+    }
+}
