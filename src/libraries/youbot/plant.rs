@@ -67,11 +67,7 @@ impl ArmPlant {
             if braked {
                 damping += BRAKE_DAMPING;
             }
-            let beyond = if self.q[i] > self.upper[i] {
-                self.q[i] - self.upper[i]
-            } else {
-                (self.q[i] - self.lower[i]).min(0.0)
-            };
+            let beyond = self.beyond(i);
             if beyond != 0.0 {
                 push[i] -= STOP_STIFFNESS * beyond;
                 damping += STOP_DAMPING;
@@ -83,10 +79,16 @@ impl ArmPlant {
         self.q += self.qd * dt;
     }
 
-    /// Kinetic plus potential energy, in J.
+    /// How far joint `i` is pressed into a stop, in rad, with its sign.
+    fn beyond(&self, i: usize) -> f64 {
+        self.q[i] - self.q[i].clamp(self.lower[i], self.upper[i])
+    }
+
+    /// Kinetic plus potential energy (that of the stops included), in J.
     pub fn energy(&self) -> f64 {
         let at = self.model.posture(&self.q);
-        0.5 * self.qd.dot(&(self.model.mass_matrix_with_drives(&at) * self.qd)) + self.model.potential(&at)
+        let stops: f64 = (0..JOINTS).map(|i| 0.5 * STOP_STIFFNESS * self.beyond(i).powi(2)).sum();
+        0.5 * self.qd.dot(&(self.model.mass_matrix_with_drives(&at) * self.qd)) + self.model.potential(&at) + stops
     }
 
     /// Where it is.
