@@ -84,7 +84,7 @@ ConfiguratorConf {
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
-    property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0.15"),
+    property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15"),
     property_set("Peer.delay",                   0.005),
     post_conf_state = { "_default:configured" },
   },

@@ -1,3 +1,4 @@
 //! The youBot reference application, measured in simulated time.
 
+mod coupling;
 mod golden;

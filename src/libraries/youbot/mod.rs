@@ -2,8 +2,11 @@
 
 pub mod base;
 pub mod dynamics;
+pub mod hand;
 pub mod impedance;
 pub mod kinematics;
+pub mod network;
 pub mod parameters;
 pub mod plant;
 pub mod rigid_body;
+pub mod robot;

@@ -96,8 +96,12 @@ pub const COULOMB: [f64; JOINTS] = [1.0, 0.8, 0.6, 0.2, 0.15];
 /// Viscous friction, in N m s/rad (H's third term, of which the source states no unit; D).
 pub const VISCOUS: [f64; JOINTS] = [1.5, 1.0, 1.0, 0.3, 0.1];
 
-/// Speed at which Coulomb friction is fully developed, in rad/s: friction is `COULOMB * tanh(qd / FRICTION_SLOPE)`.
+/// Speed at which compensated Coulomb friction is fully developed, in rad/s: `COULOMB * tanh(qd / FRICTION_SLOPE)`.
+/// Compensation must be softer than friction is, or it pushes a joint that stands.
 pub const FRICTION_SLOPE: f64 = 0.05;
+
+/// The same for the plant's own friction, in rad/s (assumed: close to a true Coulomb characteristic).
+pub const PLANT_FRICTION_SLOPE: f64 = 0.0001;
 
 /// Highest joint speed, in rad/s (U).
 pub const SPEED_LIMIT: f64 = 1.571;

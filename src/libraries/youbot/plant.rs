@@ -2,7 +2,7 @@
 
 use super::base::{Pose2, Twist2};
 use super::parameters::{
-    BASE_LAG, BASE_MOUNT, COULOMB, FRICTION_SLOPE, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG, VISCOUS,
+    BASE_LAG, BASE_MOUNT, COULOMB, JOINTS, PLANT_FRICTION_SLOPE, RANGE_LOWER_DEG, RANGE_UPPER_DEG, VISCOUS,
 };
 use super::rigid_body::{ArmModel, BaseMotion, J5, Posture, radians};
 use nalgebra::{Rotation3, Vector3};
@@ -59,9 +59,9 @@ impl ArmPlant {
             let speed = self.qd[i].abs();
             // Coulomb friction as a damper with the secant of its characteristic.
             let coulomb = if speed < 1e-9 {
-                COULOMB[i] / FRICTION_SLOPE
+                COULOMB[i] / PLANT_FRICTION_SLOPE
             } else {
-                COULOMB[i] * (speed / FRICTION_SLOPE).tanh() / speed
+                COULOMB[i] * (speed / PLANT_FRICTION_SLOPE).tanh() / speed
             };
             let mut damping = self.friction_scale * (VISCOUS[i] + coulomb);
             if braked {
