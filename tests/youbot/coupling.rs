@@ -121,23 +121,144 @@ impl Scenario {
     }
 }
 
+fn mm(metres: f64) -> f64 {
+    metres * 1e3
+}
+
+/// Within 30 % of a figure of the design check (one scenario each, other integrator, friction and arm: not more).
+fn about(what: &str, measured: f64, figure: f64) {
+    assert!((measured - figure).abs() <= 0.3 * figure, "{what}: {measured:.1}, the figure is {figure}");
+}
+
+fn at_delay(delay: f64) -> Quality {
+    Quality { delay, ..Quality::default() }
+}
+
 #[test]
-fn explore() {
-    let show = |name: String, f: Figures| println!("= {name}: {:.1} {:.1} mm raw {:.1} hand {:.1} {:.1} sat {:.3}", f.rms * 1e3, f.worst * 1e3, f.raw_max, f.hand_rms, f.hand_max, f.saturated);
-    for delay in [0.002, 0.005, 0.02, 0.05, 0.1, 0.2] {
-        let quality = Quality { delay, ..Quality::default() };
-        show(format!("K150 delay {delay}"), Scenario { quality, ..Scenario::default() }.run());
-        show(format!("K300 delay {delay}"), Scenario { quality, stiffness: 300.0, damping_rel: 20.0, ..Scenario::default() }.run());
-        show(format!("8dof delay {delay}"), Scenario { quality, force_gain: 0.1, ..Scenario::default() }.run());
+fn a_stiffer_coupling_follows_closer() {
+    for (stiffness, rms, rms_less_compensation) in
+        [(70.0, 41.0, 45.0), (150.0, 20.0, 23.0), (300.0, 9.5, 11.3), (500.0, 5.7, 6.8)]
+    {
+        let scenario = Scenario { stiffness, quality: at_delay(0.002), ..Scenario::default() };
+        let figures = scenario.run();
+        about(&format!("RMS at {stiffness} N/m, mm"), mm(figures.rms), rms);
+        assert_eq!(figures.saturated, 0.0);
+        let figures = Scenario { friction_comp: 0.8, ..scenario }.run();
+        about(
+            &format!("RMS at {stiffness} N/m, less friction compensated, mm"),
+            mm(figures.rms),
+            rms_less_compensation,
+        );
     }
-    for (loss, jitter, send_every) in [(0.05, 0.002, 4), (0.3, 0.01, 4), (0.0, 0.0, 1), (0.0, 0.0, 50)] {
-        let quality = Quality { delay: 0.005, loss, jitter, ..Quality::default() };
-        show(format!("K300 loss {loss} jitter {jitter} every {send_every}"), Scenario { quality, send_every, stiffness: 300.0, damping_rel: 20.0, ..Scenario::default() }.run());
+}
+
+#[test]
+fn the_hand_feels_a_few_newtons() {
+    let figures = Scenario::default().run();
+    about("hand, N rms", figures.hand_rms, 6.0);
+    about("hand, N peak", figures.hand_max, 9.5);
+}
+
+#[test]
+fn delay_costs_little_up_to_a_fifth_of_a_second() {
+    for (delay, rms, raw) in [
+        (0.002, 19.6, 5.7),
+        (0.005, 19.7, 5.7),
+        (0.02, 20.3, 6.0),
+        (0.05, 21.5, 6.5),
+        (0.1, 23.4, 7.1),
+        (0.2, 26.6, 8.3),
+    ] {
+        let figures = Scenario { quality: at_delay(delay), ..Scenario::default() }.run();
+        about(&format!("RMS at {delay} s, mm"), mm(figures.rms), rms);
+        about(&format!("largest wanted force at {delay} s, N"), figures.raw_max, raw);
     }
-    show("norecenter".into(), Scenario { force_gain: 0.1, recenter: 0.0, ..Scenario::default() }.run());
-    for script in ["go 8 0.4 0 0; hold 4; go 8 -0.4 0 0; hold 4", "go 8 0 0.4 0; hold 4; go 8 0 -0.4 0; hold 4", "sway 40 0.2 0 0 0.025", "go 8 0.28 0.28 0; hold 4; go 8 -0.28 -0.28 0"] {
-      for fg in [0.0, 0.1] {
-        show(format!("{script} {fg}"), Scenario { force_gain: fg, script, seconds: 24.0, ..Scenario::default() }.run());
-      }
+    for (delay, rms) in [(0.001, 9.9), (0.02, 10.8), (0.05, 12.2), (0.1, 14.2), (0.2, 17.3), (0.3, 19.5)] {
+        let scenario = Scenario { stiffness: 300.0, damping_rel: 20.0, ..Scenario::default() };
+        let figures = Scenario { quality: at_delay(delay), ..scenario }.run();
+        about(&format!("RMS at 300 N/m and {delay} s, mm"), mm(figures.rms), rms);
+    }
+}
+
+#[test]
+fn rate_and_loss_hardly_matter() {
+    let with = |loss, jitter, send_every| {
+        let quality = Quality { delay: 0.005, loss, jitter, cut: false };
+        let scenario = Scenario { stiffness: 300.0, damping_rel: 20.0, send_every, quality, ..Scenario::default() };
+        mm(scenario.run().rms)
+    };
+    let clean = with(0.0, 0.0, 1);
+    for (loss, jitter, send_every) in [(0.05, 0.002, 4), (0.3, 0.01, 4), (0.0, 0.0, 50)] {
+        let rms = with(loss, jitter, send_every);
+        assert!(rms < 1.15 * clean, "{rms} against {clean} (loss {loss}, jitter {jitter}, every {send_every} ms)");
+    }
+}
+
+#[test]
+fn eight_degrees_of_freedom_follow_closer_while_the_link_is_quick() {
+    let five = Scenario::default().run();
+    for (delay, rms) in [(0.005, 8.2), (0.02, 8.9)] {
+        let eight = Scenario { force_gain: 0.1, quality: at_delay(delay), ..Scenario::default() }.run();
+        about(&format!("RMS at {delay} s, mm"), mm(eight.rms), rms);
+        assert!(eight.rms < 0.5 * five.rms && eight.hand_rms <= 8.0, "{eight:?}");
+        assert_eq!(eight.saturated, 0.0);
+    }
+    let quick = Scenario { force_gain: 0.1, ..Scenario::default() }.run();
+    let slow = Scenario { force_gain: 0.1, quality: at_delay(0.1), ..Scenario::default() }.run();
+    assert!(slow.hand_max > 1.5 * quick.hand_max, "{slow:?}");
+}
+
+/// Forty centimetres are more than an arm reaches without its base: the demonstration of why the mode exists.
+#[test]
+fn forty_centimetres_need_the_base() {
+    let script = "go 8 0.283 0.283 0; hold 4; go 8 -0.283 -0.283 0; hold 4";
+    let five = Scenario { script, seconds: 24.0, ..Scenario::default() }.run();
+    let eight = Scenario { script, seconds: 24.0, force_gain: 0.1, ..Scenario::default() }.run();
+    assert!(mm(eight.rms) <= 14.7 && eight.hand_max < 10.0 && eight.saturated == 0.0, "{eight:?}");
+    assert!(five.worst > 4.0 * eight.worst && five.hand_max > 20.0, "{five:?}");
+}
+
+/// Stiffness times delay is what damping has to beat (1.2 times is the design rule).
+#[test]
+fn damping_by_the_rule_keeps_a_delayed_coupling_stable() {
+    for (stiffness, delay) in [(150.0, 0.2), (300.0, 0.1), (600.0, 0.05), (600.0, 0.2)] {
+        let settled = |damping_abs: f64| {
+            let mut pair = [Side::new(at_delay(delay), 1), Side::new(at_delay(delay), 2)];
+            for side in &mut pair {
+                let p = &mut side.robot.impedance.parameters;
+                (p.stiffness, p.damping_rel, p.damping_abs) = (stiffness, 0.0, damping_abs);
+                (p.f_max, p.f_rate, p.ref_max_age) = (1e3, 1e6, 10.0);
+                // Nothing but the coupling damps: the hardest case.
+                side.robot.arm.friction_scale = 0.0;
+                side.robot.dynamics.parameters.friction_comp = 0.0;
+            }
+            let start = pair[1].robot.tool.position;
+            pair[1].heard = None;
+            let mut hand = Hand::new("push 0.5 0 3 0; free 60".parse::<Script>().unwrap());
+            let mut late: f64 = 0.0;
+            for tick in 0..10_000u32 {
+                let now = f64::from(tick) * CONTROL_PERIOD;
+                for me in 0..2 {
+                    while let Some(sample) = pair[1 - me].outgoing.receive(now) {
+                        pair[me].heard = Some(sample);
+                    }
+                }
+                let push = hand.update(&start, &Vector3::zeros(), None, CONTROL_PERIOD);
+                for (side, push) in pair.iter_mut().zip([push, Vector3::zeros()]) {
+                    let reference =
+                        side.heard.map(|(position, velocity, at)| Reference { position, velocity, age: now - at });
+                    side.robot.step(reference.as_ref(), true, &push);
+                    side.outgoing.send(now, (side.robot.tool.position, side.robot.tool.velocity, now));
+                }
+                if now > 8.0 {
+                    late = late.max((pair[0].robot.tool.position - pair[1].robot.tool.position).norm());
+                }
+            }
+            late
+        };
+        let by_rule = settled(1.2 * stiffness * delay);
+        assert!(by_rule < 0.002, "{stiffness} N/m, {delay} s: {by_rule} m");
+        let too_little = settled(2.0);
+        assert!(too_little > 0.05, "{stiffness} N/m, {delay} s: {too_little} m with hardly any damping");
     }
 }

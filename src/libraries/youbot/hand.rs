@@ -66,7 +66,9 @@ impl std::str::FromStr for Script {
                 ("free", [_]) => Act::Free,
                 ("hold", [_]) => Act::Hold,
                 ("align", [_]) => Act::Align,
-                ("sway", [_, x, y, z, frequency]) => Act::Sway { amplitude: Vector3::new(*x, *y, *z), frequency: *frequency },
+                ("sway", [_, x, y, z, frequency]) => {
+                    Act::Sway { amplitude: Vector3::new(*x, *y, *z), frequency: *frequency }
+                }
                 ("go", [_, x, y, z]) => Act::Go(Vector3::new(*x, *y, *z)),
                 ("push", [_, x, y, z]) => Act::Push(Vector3::new(*x, *y, *z)),
                 _ => return Err(error()),

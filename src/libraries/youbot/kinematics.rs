@@ -2,7 +2,7 @@
 
 use super::base::{Pose2, Twist2};
 use super::dynamics::Jacobian8;
-use super::parameters::{BASE_MOUNT, JOINTS};
+use super::parameters::JOINTS;
 use super::plant::base_rotation;
 use super::rigid_body::{ArmModel, J5, manipulability};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -30,7 +30,7 @@ impl Tool {
         let at = model.posture(q);
         let arm = at.jacobian();
         let turn = base_rotation(base);
-        let lever = Vector3::from(BASE_MOUNT) + at.tool;
+        let lever = model.mount + at.tool;
         let mut jacobian = Jacobian8::zeros();
         jacobian.set_column(0, &Vector3::x());
         jacobian.set_column(1, &Vector3::y());

@@ -1,6 +1,7 @@
 //! One robot of the coupling: its numbers, its mechanics, and the components that control it.
 
 pub mod base;
+pub mod drives;
 pub mod dynamics;
 pub mod hand;
 pub mod impedance;

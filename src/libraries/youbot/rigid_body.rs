@@ -6,7 +6,7 @@
 //! Pinocchio to 1e-9 (`tests/golden/`). Nothing here allocates.
 
 use super::parameters::{
-    GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, Link, REFLECTED_INERTIA, TOOL_OFFSET,
+    BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, Link, REFLECTED_INERTIA, TOOL_OFFSET,
 };
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
 
@@ -27,6 +27,8 @@ pub struct ArmModel {
     axes: [Unit<Vector3<f64>>; JOINTS],
     /// The tool point in the frame of joint 5, in m.
     pub tool: Vector3<f64>,
+    /// The arm's base frame in the mobile base's, in m.
+    pub mount: Vector3<f64>,
     /// Inertia of the drives, added to the mass matrix's diagonal, in kg m².
     pub reflected: J5,
 }
@@ -101,6 +103,7 @@ impl ArmModel {
             offsets: JOINT_ORIGIN.map(Vector3::from),
             axes: JOINT_AXIS.map(|a| Unit::new_normalize(Vector3::from(a))),
             tool: Vector3::from(TOOL_OFFSET),
+            mount: Vector3::from(BASE_MOUNT),
             reflected: J5::from(REFLECTED_INERTIA),
         }
     }

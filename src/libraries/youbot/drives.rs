@@ -1,0 +1,459 @@
+//! The youBot's drives as its driver sees them: control modes, limits, watchdogs, calibration, folding.
+
+use super::base::Twist2;
+use super::parameters::{JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG};
+use super::plant::{ArmPlant, BasePlant, joint_ranges};
+use super::rigid_body::{J5, radians};
+use super::robot::advance;
+use nalgebra::Vector3;
+
+/// What the drives do; numbers as in the KU Leuven driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// 0: windings shorted. The arm sinks unless it rests on its stops.
+    MotorStop,
+    /// 1: hold, or move to, a position.
+    Positioning,
+    /// 6: torques as commanded.
+    Torque,
+}
+
+impl Mode {
+    /// From the driver's number.
+    pub fn from_number(n: u8) -> Option<Self> {
+        match n {
+            0 => Some(Self::MotorStop),
+            1 => Some(Self::Positioning),
+            6 => Some(Self::Torque),
+            _ => None,
+        }
+    }
+
+    /// The driver's number.
+    pub fn number(self) -> u8 {
+        match self {
+            Self::MotorStop => 0,
+            Self::Positioning => 1,
+            Self::Torque => 6,
+        }
+    }
+}
+
+/// Something the drives report, once each time it begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Happening {
+    /// A joint passed the soft limit.
+    SoftLimit,
+    /// All joints are inside again.
+    SoftLimitExit,
+    /// No torque command for too long: the drives hold the arm by themselves.
+    CommandWatchdog,
+    /// No twist command for too long: the base stands.
+    BaseWatchdog,
+    /// A calibration ended.
+    Calibrated,
+    /// A calibration did not find the stops.
+    CalibrationFailed,
+    /// A motion ended.
+    Arrived,
+}
+
+/// Limits and times of the driver.
+#[derive(Debug, Clone, Copy)]
+pub struct DriveParameters {
+    /// In N m.
+    pub tau_max: J5,
+    /// In s.
+    pub cmd_timeout: f64,
+    /// In s.
+    pub base_timeout: f64,
+    /// Share of a joint's range from which an event is raised and outward torque is reduced.
+    pub soft_limit: f64,
+    /// Share at which outward torque is zero.
+    pub scale_end: f64,
+}
+
+impl Default for DriveParameters {
+    fn default() -> Self {
+        Self {
+            tau_max: J5::from(TORQUE_LIMIT),
+            cmd_timeout: 0.02,
+            base_timeout: 1.0,
+            soft_limit: 0.80,
+            scale_end: 0.85,
+        }
+    }
+}
+
+/// Gains of the position controllers, in N m/rad and N m s/rad.
+const POSITION_GAIN: [f64; JOINTS] = [400.0, 400.0, 200.0, 80.0, 30.0];
+const SPEED_GAIN: [f64; JOINTS] = [24.0, 24.0, 12.0, 4.0, 1.5];
+/// Peak joint speed of folding and unfolding, in rad/s.
+const MOTION_SPEED: f64 = 1.2;
+/// Speed at which calibration looks for the stops, in rad/s.
+const CALIBRATION_SPEED: f64 = 0.3;
+/// A calibration that has not found the stops by then has failed, in s.
+const CALIBRATION_TIME: f64 = 9.0;
+/// Error of position that means a stop was met, in rad (with the gains above, 1 to 4 N m).
+const CONTACT_ERROR: f64 = 0.01;
+/// Joints that calibration moves against their stops, and which way. Joints 1 and 5 have index marks.
+const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
+/// A step back inside the soft limit before its exit is reported, as a share of the range.
+const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
+
+#[derive(Debug, Clone, Copy)]
+enum Task {
+    Idle,
+    Moving { from: J5, to: J5, elapsed: f64, duration: f64 },
+    Calibrating { elapsed: f64, met: [bool; JOINTS] },
+}
+
+/// Arm and base with their drives.
+#[derive(Debug, Clone)]
+pub struct Drives {
+    /// The arm.
+    pub arm: ArmPlant,
+    /// The base.
+    pub base: BasePlant,
+    /// Limits and times.
+    pub parameters: DriveParameters,
+    /// Torques applied in the last update, in N m.
+    pub torque: J5,
+    /// Whether outward torque is reduced near the limits.
+    pub limit_safety: bool,
+    mode: Mode,
+    calibrated: bool,
+    task: Task,
+    target: J5,
+    target_speed: J5,
+    outside: bool,
+    base_watched: bool,
+}
+
+impl Drives {
+    /// Drives off, not calibrated.
+    pub fn new(arm: ArmPlant) -> Self {
+        let target = arm.q;
+        Self {
+            arm,
+            base: BasePlant::default(),
+            parameters: DriveParameters::default(),
+            torque: J5::zeros(),
+            limit_safety: true,
+            mode: Mode::MotorStop,
+            calibrated: false,
+            task: Task::Idle,
+            target,
+            target_speed: J5::zeros(),
+            outside: false,
+            base_watched: false,
+        }
+    }
+
+    /// What they do.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Whether positions are known.
+    pub fn calibrated(&self) -> bool {
+        self.calibrated
+    }
+
+    /// Whether a motion or a calibration is under way.
+    pub fn busy(&self) -> bool {
+        !matches!(self.task, Task::Idle)
+    }
+
+    /// Changes what they do.
+    ///
+    /// # Errors
+    /// In words: while a motion is under way, or torque control before calibration.
+    pub fn set_mode(&mut self, mode: Mode) -> Result<(), &'static str> {
+        if self.busy() {
+            return Err("a motion is under way");
+        }
+        if mode == Mode::Torque && !self.calibrated {
+            return Err("not calibrated");
+        }
+        if mode == Mode::Positioning && self.mode != Mode::Positioning {
+            self.hold();
+        }
+        self.mode = mode;
+        Ok(())
+    }
+
+    /// Whatever is under way ends; the drives hold the arm where it is.
+    pub fn hold(&mut self) {
+        self.task = Task::Idle;
+        self.target = self.arm.q;
+        self.target_speed = J5::zeros();
+        self.mode = Mode::Positioning;
+    }
+
+    /// Looks for the stops of joints 2 to 4; ends resting on them, drives off.
+    ///
+    /// # Errors
+    /// In words, in torque control or while something else is under way.
+    pub fn calibrate(&mut self) -> Result<(), &'static str> {
+        if self.busy() {
+            return Err("a motion is under way");
+        }
+        if self.mode == Mode::Torque {
+            return Err("the drives take torques: set mode 0 or 1 first");
+        }
+        self.hold();
+        self.calibrated = false;
+        self.task = Task::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
+        Ok(())
+    }
+
+    /// Moves to the working pose, and holds it.
+    ///
+    /// # Errors
+    /// In words, in torque control, uncalibrated, or while something else is under way.
+    pub fn unfold(&mut self) -> Result<(), &'static str> {
+        self.go(radians(WORKING_POSE_DEG))
+    }
+
+    /// Moves onto the stops, and holds there.
+    ///
+    /// # Errors
+    /// As [`Drives::unfold`].
+    pub fn fold(&mut self) -> Result<(), &'static str> {
+        self.go(radians(PARK_POSE_DEG))
+    }
+
+    fn go(&mut self, to: J5) -> Result<(), &'static str> {
+        if self.busy() {
+            return Err("a motion is under way");
+        }
+        if self.mode == Mode::Torque {
+            return Err("the drives take torques: set mode 1 first");
+        }
+        if !self.calibrated {
+            return Err("not calibrated");
+        }
+        self.hold();
+        let from = self.arm.q;
+        // A quintic's peak speed is 15/8 of its mean.
+        let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
+        self.task = Task::Moving { from, to, elapsed: 0.0, duration };
+        Ok(())
+    }
+
+    /// One update of `dt` seconds. Commands come with their age in s; `push` is a force on the tool, in the world.
+    pub fn update(
+        &mut self,
+        effort: Option<(J5, f64)>,
+        twist: Option<(Twist2, f64)>,
+        push: &Vector3<f64>,
+        dt: f64,
+        report: &mut impl FnMut(Happening),
+    ) {
+        self.advance_task(dt, report);
+        let command = match twist {
+            Some((twist, age)) if age <= self.parameters.base_timeout => {
+                self.base_watched = true;
+                twist
+            }
+            _ => {
+                if std::mem::take(&mut self.base_watched) {
+                    report(Happening::BaseWatchdog);
+                }
+                Twist2::default()
+            }
+        };
+        if self.mode == Mode::Torque && effort.is_none_or(|(_, age)| age > self.parameters.cmd_timeout) {
+            self.hold();
+            report(Happening::CommandWatchdog);
+        }
+        let mut torque = match (self.mode, effort) {
+            (Mode::Torque, Some((effort, _))) => self.reduced(&effort),
+            (Mode::Positioning, _) => self.position_control(),
+            (Mode::MotorStop | Mode::Torque, _) => J5::zeros(),
+        };
+        for i in 0..JOINTS {
+            torque[i] = torque[i].clamp(-self.parameters.tau_max[i], self.parameters.tau_max[i]);
+        }
+        self.torque = torque;
+        let braked = self.mode == Mode::MotorStop;
+        advance(&mut self.arm, &mut self.base, &torque, command, push, braked, dt);
+        self.watch_limits(report);
+    }
+
+    fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(Happening)) {
+        match &mut self.task {
+            Task::Idle => {}
+            Task::Moving { from, to, elapsed, duration } => {
+                *elapsed += dt;
+                let s = (*elapsed / *duration).min(1.0);
+                let way = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+                let speed = 30.0 * s * s * (1.0 - 2.0 * s + s * s) / *duration;
+                self.target = *from + (*to - *from) * way;
+                self.target_speed = (*to - *from) * speed;
+                if s >= 1.0 {
+                    self.task = Task::Idle;
+                    self.target_speed = J5::zeros();
+                    report(Happening::Arrived);
+                }
+            }
+            Task::Calibrating { elapsed, met } => {
+                *elapsed += dt;
+                for i in 0..JOINTS {
+                    if met[i] {
+                        continue;
+                    }
+                    self.target[i] += CALIBRATION_WAY[i] * CALIBRATION_SPEED * dt;
+                    // Behind its target and standing: something is in the way.
+                    let behind = (self.target[i] - self.arm.q[i]) * CALIBRATION_WAY[i];
+                    met[i] = behind > CONTACT_ERROR && self.arm.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
+                }
+                if met.iter().all(|m| *m) {
+                    self.task = Task::Idle;
+                    let found = (1..4).all(|i| self.is_at_stop(i));
+                    self.mode = if found { Mode::MotorStop } else { Mode::Positioning };
+                    self.calibrated = found;
+                    report(if found { Happening::Calibrated } else { Happening::CalibrationFailed });
+                } else if *elapsed > CALIBRATION_TIME {
+                    self.hold();
+                    report(Happening::CalibrationFailed);
+                }
+            }
+        }
+    }
+
+    fn is_at_stop(&self, i: usize) -> bool {
+        let stop = if CALIBRATION_WAY[i] < 0.0 { RANGE_LOWER_DEG[i] } else { RANGE_UPPER_DEG[i] };
+        (self.arm.q[i] - stop.to_radians()).abs() < 0.02
+    }
+
+    fn position_control(&self) -> J5 {
+        let mut out = self.arm.model.gravity(&self.arm.posture());
+        for i in 0..JOINTS {
+            out[i] += POSITION_GAIN[i] * (self.target[i] - self.arm.q[i])
+                + SPEED_GAIN[i] * (self.target_speed[i] - self.arm.qd[i]);
+        }
+        out
+    }
+
+    /// Share of its half-range that joint `i` is off its middle; its sign.
+    fn excursion(&self, i: usize) -> f64 {
+        let (lower, upper) = joint_ranges();
+        (self.arm.q[i] - 0.5 * (lower[i] + upper[i])) / (0.5 * (upper[i] - lower[i]))
+    }
+
+    /// `effort` with what pushes outward reduced near the limits.
+    fn reduced(&self, effort: &J5) -> J5 {
+        let p = &self.parameters;
+        let mut out = *effort;
+        if self.limit_safety {
+            for i in 0..JOINTS {
+                let off = self.excursion(i);
+                if off.abs() > p.soft_limit && off * effort[i] > 0.0 {
+                    let span = (p.scale_end - p.soft_limit).max(1e-6);
+                    out[i] *= (1.0 - (off.abs() - p.soft_limit) / span).clamp(0.0, 1.0);
+                }
+            }
+        }
+        out
+    }
+
+    fn watch_limits(&mut self, report: &mut impl FnMut(Happening)) {
+        let furthest = (0..JOINTS).map(|i| self.excursion(i).abs()).fold(0.0, f64::max);
+        let limit = self.parameters.soft_limit;
+        if !self.outside && furthest > limit {
+            self.outside = true;
+            report(Happening::SoftLimit);
+        } else if self.outside && furthest < limit - SOFT_LIMIT_HYSTERESIS {
+            self.outside = false;
+            report(Happening::SoftLimitExit);
+        }
+    }
+
+    /// Switches the drives off and lets the arm settle for a second; answers how far the tool came down, in m.
+    pub fn switch_off(&mut self) -> f64 {
+        self.task = Task::Idle;
+        self.mode = Mode::MotorStop;
+        self.torque = J5::zeros();
+        let before = self.arm.posture().tool.z;
+        for _ in 0..1000 {
+            advance(
+                &mut self.arm,
+                &mut self.base,
+                &J5::zeros(),
+                Twist2::default(),
+                &Vector3::zeros(),
+                true,
+                super::robot::CONTROL_PERIOD,
+            );
+        }
+        self.arm.qd = J5::zeros();
+        before - self.arm.posture().tool.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rigid_body::ArmModel;
+    use super::*;
+
+    fn run(drives: &mut Drives, seconds: f64) -> Vec<Happening> {
+        let mut seen = Vec::new();
+        for _ in 0..(seconds * 1000.0) as usize {
+            drives.update(None, None, &Vector3::zeros(), 0.001, &mut |h| seen.push(h));
+        }
+        seen
+    }
+
+    fn parked() -> Drives {
+        Drives::new(ArmPlant::new(ArmModel::youbot(0.219, 1.0), radians([0.0, -60.0, 140.0, -98.0, 0.0])))
+    }
+
+    #[test]
+    fn calibrate_unfold_fold_and_rest() {
+        let mut drives = parked();
+        assert!(drives.unfold().is_err() && drives.set_mode(Mode::Torque).is_err());
+        drives.calibrate().unwrap();
+        assert!(drives.calibrate().is_err() && drives.set_mode(Mode::MotorStop).is_err());
+        let seen = run(&mut drives, 3.0);
+        assert!(seen.contains(&Happening::Calibrated), "{seen:?} {}", drives.arm.q);
+        let rested = drives.arm.posture().tool;
+        run(&mut drives, 1.0);
+        assert!((drives.arm.posture().tool - rested).norm() < 0.005);
+
+        drives.unfold().unwrap();
+        let seen = run(&mut drives, 6.0);
+        assert!(seen.contains(&Happening::Arrived) && seen.contains(&Happening::SoftLimitExit), "{seen:?}");
+        assert!((drives.arm.q - radians(WORKING_POSE_DEG)).norm() < 0.01, "{}", drives.arm.q);
+        drives.fold().unwrap();
+        run(&mut drives, 6.0);
+        assert!(drives.switch_off() < 0.02);
+    }
+
+    #[test]
+    fn unparked_it_falls_and_without_commands_it_holds() {
+        let mut drives = parked();
+        drives.calibrate().unwrap();
+        run(&mut drives, 3.0);
+        drives.unfold().unwrap();
+        run(&mut drives, 6.0);
+        let at = drives.arm.q;
+        drives.set_mode(Mode::Torque).unwrap();
+        let seen = run(&mut drives, 1.0);
+        assert_eq!(seen, [Happening::CommandWatchdog]);
+        assert!((drives.arm.q - at).norm() < 0.01 && drives.mode() == Mode::Positioning);
+        assert!(drives.switch_off() > 0.03);
+    }
+
+    #[test]
+    fn something_in_the_way_is_no_stop() {
+        let mut drives = parked();
+        drives.arm.q = radians([0.0, 0.0, 60.0, 0.0, 0.0]);
+        // So heavy a friction that the joints do not move is taken for a stop, and refused as one.
+        drives.arm.friction_scale = 1e6;
+        drives.calibrate().unwrap();
+        assert_eq!(run(&mut drives, 10.0), [Happening::CalibrationFailed]);
+        assert!(!drives.calibrated());
+    }
+}
