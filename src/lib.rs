@@ -16,5 +16,6 @@ pub mod session;
 pub mod statechart;
 
 pub mod plan;
+pub mod stack;
 pub mod system;
 pub mod time;

@@ -157,6 +157,7 @@ impl Index {
         {
             return true;
         }
-        self.slots.get(&touch.slot).is_some_and(|access| access.shares(touch.access))
+        // Absolute writes never block each other: the saved value is handed over.
+        !touch.slot.is_absolute() && self.slots.get(&touch.slot).is_some_and(|access| access.shares(touch.access))
     }
 }

@@ -5,7 +5,7 @@
 
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
-use crate::model::{Call, ComponentName, Origin, RunState, Step};
+use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step};
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -18,6 +18,8 @@ pub struct Item {
     pub step: Step,
     /// The call that undoes it, where it is an operation's and one is known.
     pub call: Option<Call>,
+    /// The policy of the connection it removes, where it is a disconnect and the policy is known.
+    pub was: Option<Policy>,
     /// The stage of the configuration's step it is or undoes.
     pub stage: Stage,
     /// Where that was written.
@@ -27,13 +29,35 @@ pub struct Item {
 impl Item {
     /// A planned step as an item.
     pub fn of(planned: &PlannedStep) -> Self {
-        Self { step: planned.step.clone(), call: declared(&planned.undo), stage: planned.stage, origin: planned.origin }
+        let (call, was) = match &planned.undo {
+            Undo::One(Step::Operation(call)) => (Some(call.clone()), None),
+            Undo::One(Step::Connect { policy, .. }) => (None, Some(*policy)),
+            _ => (None, None),
+        };
+        Self { step: planned.step.clone(), call, was, stage: planned.stage, origin: planned.origin }
+    }
+
+    /// A step of the inverse of `done`.
+    fn undoing(step: &Step, done: &PlannedStep) -> Self {
+        let (call, was) = match &done.step {
+            Step::Operation(call) => (Some(call.clone()), None),
+            Step::Connect { policy, .. } => (None, Some(*policy)),
+            _ => (None, None),
+        };
+        Self { step: step.clone(), call, was, stage: done.stage, origin: done.origin }
+    }
+
+    /// A step by itself.
+    fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
+        Self { step, call: None, was: None, stage, origin }
     }
 }
 
-fn declared(undo: &Undo) -> Option<Call> {
-    match undo {
-        Undo::One(Step::Operation(call)) => Some(call.clone()),
+/// The slot of an absolute write.
+pub fn absolute(step: &Step) -> Option<Slot> {
+    match step {
+        Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
+        Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
         _ => None,
     }
 }
@@ -104,7 +128,7 @@ impl<'o, 's> Script<'o, 's> {
         let state = self.view.component(component).map_or(goal, |n| n.state);
         for transition in state.path_to(goal) {
             let step = Step::State { component, transition: *transition };
-            self.push(Item { step, call: None, stage, origin }, wave, &[])?;
+            self.push(Item::bare(step, stage, origin), wave, &[])?;
         }
         Ok(())
     }
@@ -207,21 +231,12 @@ pub fn undo(
         let mut last = std::mem::take(&mut waits[i]);
         last.sort_unstable();
         last.dedup();
-        let slot = match &done.step {
-            Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
-            Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
-            _ => None,
-        };
-        let redo = match &done.step {
-            Step::Operation(call) => Some(call.clone()),
-            _ => None,
-        };
+        let slot = absolute(&done.step);
         if slot.is_none_or(|slot| !skip(slot)) {
             let kept = slot.and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
             let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
             for step in steps {
-                let item = Item { step: step.clone(), call: redo.clone(), stage: done.stage, origin: done.origin };
-                if let Some(id) = script.add(item, wave, &last)? {
+                if let Some(id) = script.add(Item::undoing(step, done), wave, &last)? {
                     last = SmallVec::from_slice(&[id]);
                 }
             }
@@ -244,9 +259,29 @@ fn restore(
     wave: u32,
 ) -> Result<(), Vec<Violation>> {
     if let (false, Some(step)) = (skip(saved.slot), restoring(saved)) {
-        script.add(Item { step, call: None, stage: Stage::Changes, origin: Origin::NONE }, wave, &[])?;
+        script.add(Item::bare(step, Stage::Changes, Origin::NONE), wave, &[])?;
     }
     Ok(())
+}
+
+/// The same steps as a plain list, last first, every absolute write of `saved` among them (also those that restore what
+/// is there anyway).
+pub fn items(steps: &[PlannedStep], saved: &[SavedValue]) -> Vec<Item> {
+    let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
+    let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();
+    unwritten.sort_by_key(|s| s.at);
+    let mut list = Vec::with_capacity(steps.len() + unwritten.len());
+    let plain = |saved: &SavedValue| restoring(saved).map(|step| Item::bare(step, Stage::Changes, Origin::NONE));
+    for (i, done) in steps.iter().enumerate().rev() {
+        while unwritten.last().is_some_and(|s| s.at as usize > i) {
+            list.extend(unwritten.pop().and_then(plain));
+        }
+        let kept = absolute(&done.step).and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
+        let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
+        list.extend(steps.iter().map(|step| Item::undoing(step, done)));
+    }
+    list.extend(unwritten.into_iter().rev().filter_map(plain));
+    list
 }
 
 /// The step that restores a saved value.
@@ -269,12 +304,8 @@ pub fn rollback(system: &System, done: &[PlannedStep]) -> Result<Vec<PlannedStep
     let mut view = Overlay::new(system);
     let mut script = Script::new(&mut view);
     for step in done.iter().rev() {
-        let redo = match &step.step {
-            Step::Operation(call) => Some(call.clone()),
-            _ => None,
-        };
         for undo in step.undo.steps() {
-            let item = Item { step: undo.clone(), call: redo.clone(), stage: step.stage, origin: step.origin };
+            let item = Item::undoing(undo, step);
             let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
             script.add(item, 0, &after)?;
         }
@@ -291,7 +322,7 @@ pub fn in_order(system: &System, steps: Vec<Step>) -> Result<Vec<PlannedStep>, V
     let mut script = Script::new(&mut view);
     for step in steps {
         let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-        let item = Item { step, call: None, stage: Stage::Changes, origin: Origin::NONE };
+        let item = Item::bare(step, Stage::Changes, Origin::NONE);
         // Not through `add`: a difference knows what it does with failed components.
         script.push(item, 0, &after)?;
     }

@@ -1,0 +1,205 @@
+//! The net of a list of steps: fewer steps to the same system.
+//!
+//! What this leaves out is argued step by step below; all the same, whoever uses the result on a live system simulates it
+//! and compares, and falls back to the whole list where they differ.
+
+use crate::model::{ComponentName, MemberRef, Step};
+use crate::plan::footprint::Slot;
+use crate::plan::undo::{Item, absolute};
+use crate::system::{View, step};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// The net of `items`. `present` is the system they begin in, where it is known; `bound` tells whether a property may be
+/// set only in certain run states.
+pub fn reduce<V: View>(items: Vec<Item>, present: Option<&V>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<Item> {
+    cancel(drop_writes(items, present), bound)
+}
+
+/// Absolute writes: only the last one to a slot counts, none to a component that is destroyed afterwards, and none of the
+/// value that is there. No precondition depends on what a property or a port holds, so leaving one out harms nothing.
+fn drop_writes<V: View>(items: Vec<Item>, present: Option<&V>) -> Vec<Item> {
+    let mut lives: FxHashMap<ComponentName, (u32, bool)> = FxHashMap::default();
+    let mut later: FxHashSet<(Slot, u32)> = FxHashSet::default();
+    let mut kept: Vec<Item> = Vec::with_capacity(items.len());
+    for item in items.into_iter().rev() {
+        let component = item.step.component();
+        match &item.step {
+            Step::Create { .. } => {
+                let life = lives.entry(component).or_default();
+                *life = (life.0 + 1, false);
+            }
+            Step::Destroy { .. } => {
+                let life = lives.entry(component).or_default();
+                *life = (life.0 + 1, true);
+            }
+            _ => {
+                if let Some(slot) = absolute(&item.step) {
+                    let (life, doomed) = lives.get(&component).copied().unwrap_or_default();
+                    if doomed || !later.insert((slot, life)) {
+                        continue;
+                    }
+                }
+            }
+        }
+        kept.push(item);
+    }
+    kept.reverse();
+    let Some(present) = present else { return kept };
+    let mut replaced: FxHashSet<ComponentName> = FxHashSet::default();
+    kept.retain(|item| match &item.step {
+        Step::Create { component, .. } | Step::Destroy { component } => {
+            replaced.insert(*component);
+            true
+        }
+        step if absolute(step).is_some() => replaced.contains(&step.component()) || !holds(step, present),
+        _ => true,
+    });
+    kept
+}
+
+/// Whether the slot of an absolute write holds its value in `view` already.
+fn holds(step: &Step, view: &impl View) -> bool {
+    match step {
+        Step::PropertySet { property, value } => {
+            view.component(property.component).and_then(|n| n.value(property.member)) == Some(value)
+        }
+        Step::PortWrite { port, value } => step::written(*port, view).as_ref() == Some(value),
+        _ => false,
+    }
+}
+
+/// What a slot's surviving steps are, newest last.
+#[derive(Default)]
+struct Trail(Vec<usize>);
+
+impl Trail {
+    fn last(&mut self, out: &[Option<Item>]) -> Option<usize> {
+        while let Some(at) = self.0.last() {
+            if out[*at].is_some() {
+                return Some(*at);
+            }
+            self.0.pop();
+        }
+        None
+    }
+}
+
+#[derive(PartialEq, Eq, Hash, Clone, Copy)]
+enum Kind {
+    /// Moves of a component.
+    Moves(ComponentName),
+    /// What needs the component's run state as it is there.
+    Needs(ComponentName),
+    /// Creates and destroys.
+    Exists(ComponentName),
+    /// Anything at all.
+    Any(ComponentName),
+    /// Steps on one connection.
+    Link(MemberRef, MemberRef),
+    /// Steps that an in-port's being driven or not matters to.
+    Drive(MemberRef),
+}
+
+struct Trails {
+    trails: FxHashMap<Kind, Trail>,
+    out: Vec<Option<Item>>,
+}
+
+impl Trails {
+    fn last(&mut self, kind: Kind) -> Option<usize> {
+        self.trails.get_mut(&kind).and_then(|t| t.last(&self.out))
+    }
+
+    fn since(&mut self, kind: Kind, at: usize) -> bool {
+        self.last(kind).is_some_and(|last| last > at)
+    }
+
+    fn push(&mut self, item: Item, kinds: &[Kind]) {
+        for kind in kinds {
+            self.trails.entry(*kind).or_default().0.push(self.out.len());
+        }
+        self.out.push(Some(item));
+    }
+}
+
+/// Pairs that take each other back, where nothing between needs the first.
+fn cancel(items: Vec<Item>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<Item> {
+    let mut t = Trails { trails: FxHashMap::default(), out: Vec::with_capacity(items.len()) };
+    for item in items {
+        match &item.step {
+            Step::State { component, transition } => {
+                let c = *component;
+                if let Some(at) = t.last(Kind::Moves(c))
+                    && let Some(Item { step: Step::State { transition: before, .. }, .. }) = &t.out[at]
+                    && before.inverse() == *transition
+                    && !t.since(Kind::Needs(c), at)
+                {
+                    t.out[at] = None;
+                } else {
+                    t.push(item, &[Kind::Moves(c), Kind::Any(c)]);
+                }
+            }
+            Step::PropertySet { property, .. } => {
+                let c = property.component;
+                if bound(*property) {
+                    t.push(item, &[Kind::Needs(c), Kind::Any(c)]);
+                } else {
+                    t.push(item, &[Kind::Any(c)]);
+                }
+            }
+            Step::PortWrite { port, .. } => {
+                let (port, c) = (*port, port.component);
+                t.push(item, &[Kind::Drive(port), Kind::Any(c)]);
+            }
+            Step::Operation(call) => {
+                let c = call.operation.component;
+                t.push(item, &[Kind::Needs(c), Kind::Any(c)]);
+            }
+            Step::Create { component, .. } => {
+                let c = *component;
+                t.push(item, &[Kind::Exists(c), Kind::Needs(c), Kind::Any(c)]);
+            }
+            Step::Destroy { component } => {
+                let c = *component;
+                // Created and destroyed again, with nothing left in between that happened to it.
+                if let Some(at) = t.last(Kind::Exists(c))
+                    && matches!(&t.out[at], Some(Item { step: Step::Create { .. }, .. }))
+                    && !t.since(Kind::Any(c), at)
+                {
+                    t.out[at] = None;
+                } else {
+                    t.push(item, &[Kind::Exists(c), Kind::Needs(c), Kind::Any(c)]);
+                }
+            }
+            Step::Connect { from, to, .. } | Step::Disconnect { from, to } => {
+                let (from, to) = (*from, *to);
+                if let Some(at) = t.last(Kind::Link(from, to))
+                    && undone(&mut t, at, &item, from, to)
+                {
+                    t.out[at] = None;
+                } else {
+                    let (a, b) = (from.component, to.component);
+                    t.push(item, &[Kind::Link(from, to), Kind::Drive(to), Kind::Any(a), Kind::Any(b)]);
+                }
+            }
+        }
+    }
+    t.out.into_iter().flatten().collect()
+}
+
+/// Whether `item` takes back the step at `at` on the same connection.
+fn undone(t: &mut Trails, at: usize, item: &Item, from: MemberRef, to: MemberRef) -> bool {
+    if t.since(Kind::Exists(from.component), at) || t.since(Kind::Exists(to.component), at) {
+        return false;
+    }
+    let before = t.out[at].as_ref();
+    match (before.map(|b| (&b.step, b.was)), &item.step) {
+        // A connection less in between: nothing that was allowed with it is refused without it.
+        (Some((Step::Connect { .. }, _)), Step::Disconnect { .. }) => true,
+        // A connection more in between: only what needs the in-port undriven, or drives it, minds.
+        (Some((Step::Disconnect { .. }, Some(was))), Step::Connect { policy, .. }) => {
+            was == *policy && !t.since(Kind::Drive(to), at)
+        }
+        _ => false,
+    }
+}
