@@ -93,6 +93,64 @@ pub fn load_coordinator(from: &Sources, path: &Path, options: &LoadOptions) -> L
     LoadedCoordinator { coordinator, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
 }
 
+/// What a file turned out to hold.
+#[derive(Debug)]
+pub enum Content {
+    /// Configurations.
+    Configurations(Vec<Configuration>),
+    /// A coordinator.
+    Coordinator(Statechart),
+}
+
+/// Loads a file of configurations or a coordinator's file, whichever it is.
+pub(super) fn load_any(
+    from: &Sources,
+    path: &Path,
+    options: &LoadOptions,
+) -> (Option<Content>, Findings, SourceMap, bool) {
+    let mut cx = Cx::default();
+    let mut params = Params::new(&mut cx, Vec::new(), &options.set);
+    let content = any(&mut cx, from, path, &mut params);
+    params.finish(&mut cx);
+    (content, cx.findings, cx.sources, cx.unreadable)
+}
+
+fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<Content> {
+    let (reading, language) = open(cx, from, path, Origin::NONE)?;
+    let (configurations, chart) = match language {
+        Language::Lua => {
+            let made = lua::read(cx, reading, params, &stem(path))?;
+            (made.configurations, made.chart)
+        }
+        Language::Yaml => {
+            let node = yaml::read(cx, reading)?;
+            let is = |key: &str| matches!(&node.kind, Kind::Map(entries) if entries.iter().any(|e| e.key == key));
+            if is("davit") {
+                let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "a deployment is written in YAML only");
+                cx.report(finding.at(reading.whole).help("convert the files of configurations and the coordinator it names"));
+                return None;
+            }
+            if is("coordinator") {
+                (None, only_key(cx, node, reading, "coordinator", "a coordinator's file"))
+            } else {
+                (only_key(cx, node, reading, "configurations", "a file of configurations"), None)
+            }
+        }
+    };
+    match (configurations, chart) {
+        (_, Some(node)) => chart::statechart(cx, node).map(Content::Coordinator),
+        (Some(node), None) => {
+            let mut list = configuration::configurations(cx, node);
+            unique(cx, &mut list);
+            Some(Content::Configurations(list))
+        }
+        (None, None) => {
+            nothing(cx, reading, "configuration and no coordinator", "`ConfiguratorConf { … }` or `return state { … }`");
+            None
+        }
+    }
+}
+
 /// Reads a text into the source map. `named_at` is the place that named the file.
 fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -> Option<(Reading, Language)> {
     let Some(language) = files::language(path) else {

@@ -5,14 +5,17 @@
 //! exist. Whether a component has that port is the business of later rooms, which find the place through the
 //! [`SourceMap`].
 
+mod convert;
 mod files;
 mod load;
 mod lower;
 mod lua;
 mod params;
+pub mod print;
 mod tree;
 mod yaml;
 
+pub use convert::{Converted, convert};
 pub use files::Sources;
 pub use load::{
     LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, load, load_configurations, load_coordinator,

@@ -2,3 +2,4 @@
 
 mod helpers;
 mod listings;
+mod round_trip;

@@ -1,0 +1,34 @@
+//! One file in the other language.
+
+use super::files::Sources;
+use super::load::{self, Content, LoadOptions};
+use super::print;
+use crate::diagnostics::{Language, SourceMap};
+use crate::model::Findings;
+use std::path::Path;
+
+/// What converting gave.
+#[derive(Debug)]
+pub struct Converted {
+    /// The text in the language asked for; none when the file is refused.
+    pub text: Option<String>,
+    /// What was found.
+    pub findings: Findings,
+    /// The text that was read.
+    pub sources: SourceMap,
+    /// Whether the text could not be read or parsed at all.
+    pub unreadable: bool,
+}
+
+/// A file of configurations or a coordinator's file, in the language given. The model is the same; comments, loops,
+/// parameters and the layout of the text are not part of it.
+pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions) -> Converted {
+    let (content, findings, sources, unreadable) = load::load_any(from, path, options);
+    let text = match content {
+        _ if crate::model::finding::has_errors(&findings) => None,
+        Some(Content::Configurations(list)) => Some(print::configurations(&list, to)),
+        Some(Content::Coordinator(chart)) => Some(print::coordinator(&chart, to)),
+        None => None,
+    };
+    Converted { text, findings, sources, unreadable }
+}

@@ -1,0 +1,84 @@
+//! Model → text, in both languages. What is printed reads back as the same model, to the last digit; comments and the
+//! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
+
+mod lua;
+mod yaml;
+
+pub use lua::{configurations_lua, coordinator_lua};
+pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
+
+use crate::diagnostics::Language;
+use crate::model::{Configuration, Deployment, Statechart};
+use std::time::Duration;
+
+/// Configurations in a language.
+pub fn configurations(list: &[Configuration], language: Language) -> String {
+    match language {
+        Language::Lua => configurations_lua(list),
+        Language::Yaml => configurations_yaml(list),
+    }
+}
+
+/// A coordinator in a language.
+pub fn coordinator(chart: &Statechart, language: Language) -> String {
+    match language {
+        Language::Lua => coordinator_lua(chart),
+        Language::Yaml => coordinator_yaml(chart),
+    }
+}
+
+/// A deployment as files, by name: itself first (always YAML), then its configurations and its coordinator in the
+/// language given.
+pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, String)> {
+    let ending = match language {
+        Language::Lua => "lua",
+        Language::Yaml => "yaml",
+    };
+    let (c, k) = (format!("configurations.{ending}"), format!("coordinator.{ending}"));
+    vec![
+        (format!("{}.deployment.yaml", deployment.name), deployment_yaml(deployment, &[&c], &k)),
+        (c, configurations(&deployment.configurations, language)),
+        (k, coordinator(&deployment.coordinator, language)),
+    ]
+}
+
+/// A float that reads back as the same float, and as a float in every reader of YAML: with a point.
+fn float(v: f64) -> String {
+    let text = format!("{v:?}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) if !mantissa.contains('.') => format!("{mantissa}.0e{exponent}"),
+        _ => text,
+    }
+}
+
+/// A time as a decimal number of units of `10^digits` nanoseconds, exact.
+fn decimal(time: Duration, digits: u32) -> String {
+    let unit = 10_u128.pow(digits);
+    let (whole, rest) = (time.as_nanos() / unit, time.as_nanos() % unit);
+    let width = digits as usize;
+    let fraction = format!("{rest:0width$}");
+    let fraction = fraction.trim_end_matches('0');
+    format!("{whole}.{}", if fraction.is_empty() { "0" } else { fraction })
+}
+
+fn seconds(time: Duration) -> String {
+    decimal(time, 9)
+}
+
+fn milliseconds(time: Duration) -> String {
+    decimal(time, 6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_what_they_are() {
+        assert_eq!([float(1.0), float(1e21), float(-0.0), float(1.5e-7)], ["1.0", "1.0e21", "-0.0", "1.5e-7"]);
+        assert_eq!(seconds(Duration::from_millis(500)), "0.5");
+        assert_eq!(seconds(Duration::from_nanos(86_400_000_000_001)), "86400.000000001");
+        assert_eq!(milliseconds(Duration::from_micros(1_500)), "1.5");
+        assert_eq!(milliseconds(Duration::from_secs(2)), "2000.0");
+    }
+}

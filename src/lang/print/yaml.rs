@@ -1,0 +1,361 @@
+//! Printing in YAML.
+
+use super::{float, milliseconds, seconds};
+use crate::model::statechart::{Action, Node, State, Transition, Trigger};
+use crate::model::{
+    Call, ChangeKind, ComponentType, Configuration, Deployment, Direction, Durability, Effect, OnFailure, Origin,
+    Policy, StateEntry, Statechart, Tunable, Value,
+};
+use std::fmt::{Display, Write as _};
+
+/// A text: plain where every reader takes it for a text, else in quotes.
+fn text(t: &str) -> String {
+    let mut bytes = t.bytes();
+    let plain = bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')
+        && bytes.all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'/'));
+    // Words that YAML 1.2, or other readers, take for something else.
+    const WORDS: &[&str] = &["true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"];
+    if plain && !WORDS.contains(&t.to_ascii_lowercase().as_str()) { t.to_owned() } else { quoted(t) }
+}
+
+fn quoted(t: &str) -> String {
+    let mut out = String::with_capacity(t.len() + 2);
+    out.push('"');
+    for c in t.chars() {
+        let code = c as u32;
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            '\r' => out.push_str("\\r"),
+            c if c.is_control() => _ = write!(out, "\\x{code:02x}"),
+            // Line separators, directions, and what YAML does not let stand as it is.
+            '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' => {
+                _ = write!(out, "\\u{code:04x}");
+            }
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+fn t(name: &dyn Display) -> String {
+    text(&name.to_string())
+}
+
+fn value(v: &Value) -> String {
+    match v {
+        Value::Bool(v) => v.to_string(),
+        Value::Int(v) => v.to_string(),
+        Value::Float(v) => float(*v),
+        Value::Str(v) => text(v),
+        Value::Array(list) => format!("[{}]", list.iter().map(value).collect::<Vec<_>>().join(", ")),
+        Value::Record(fields) => {
+            let fields: Vec<_> = fields.iter().map(|(name, v)| format!("{}: {}", t(name), value(v))).collect();
+            format!("{{ {} }}", fields.join(", "))
+        }
+    }
+}
+
+fn list(texts: impl IntoIterator<Item = String>) -> String {
+    format!("[{}]", texts.into_iter().collect::<Vec<_>>().join(", "))
+}
+
+fn states(out: &mut String, name: &str, entries: &[StateEntry]) {
+    if !entries.is_empty() {
+        let entries = list(entries.iter().map(|e| quoted(&format!("{}:{}", e.target, e.state))));
+        _ = writeln!(out, "    {name}: {entries}");
+    }
+}
+
+fn call(c: &Call) -> String {
+    let args = if c.args.is_empty() { String::new() } else { format!(", args: {}", list(c.args.iter().map(value))) };
+    format!("operation: {}{args}", t(&c.operation))
+}
+
+fn change(kind: &ChangeKind) -> String {
+    match kind {
+        ChangeKind::Create { component, ty, activity, properties } => {
+            let mut out = format!("component: {}, type: {}", t(component), t(ty));
+            if let Some(activity) = activity {
+                _ = write!(out, ", activity: {}", t(activity));
+            }
+            if !properties.is_empty() {
+                let fields: Vec<_> = properties.iter().map(|(name, v)| format!("{}: {}", t(name), value(v))).collect();
+                _ = write!(out, ", properties: {{ {} }}", fields.join(", "));
+            }
+            out
+        }
+        ChangeKind::Destroy { component } => format!("component: {}", t(component)),
+        ChangeKind::Connect { from, to, policy } => {
+            let policy = match policy {
+                Policy::Data => String::new(),
+                Policy::Buffer(n) => format!(", policy: {{ buffer: {n} }}"),
+            };
+            format!("from: {}, to: {}{policy}", t(from), t(to))
+        }
+        ChangeKind::Disconnect { from, to } => format!("from: {}, to: {}", t(from), t(to)),
+        ChangeKind::PropertySet { property, value: v } => format!("property: {}, value: {}", t(property), value(v)),
+        ChangeKind::PortWrite { port, value: v } => format!("port: {}, value: {}", t(port), value(v)),
+        ChangeKind::OperationCall { call: c, undo } => {
+            let undo = undo.as_ref().map_or(String::new(), |undo| format!(", undo: {{ {} }}", call(undo)));
+            format!("{}{undo}", call(c))
+        }
+    }
+}
+
+/// `configurations: …`
+pub fn configurations_yaml(configurations: &[Configuration]) -> String {
+    if configurations.is_empty() {
+        return "configurations: {}\n".to_owned();
+    }
+    let mut out = String::from("configurations:\n");
+    for c in configurations {
+        let mut body = String::new();
+        if let Some(description) = &c.description {
+            _ = writeln!(body, "    description: {}", quoted(description));
+        }
+        if let Some(time) = c.timeout {
+            _ = writeln!(body, "    timeout: {}", seconds(time));
+        }
+        if let Some(group) = c.group {
+            _ = writeln!(body, "    group: {}", t(&group));
+        }
+        if c.safe {
+            body.push_str("    safe: true\n");
+        }
+        if c.on_failure == OnFailure::Hold {
+            body.push_str("    on_failure: hold\n");
+        }
+        if let Some(confirm) = &c.confirm {
+            let (event, within) = (t(&confirm.event), seconds(confirm.within));
+            _ = writeln!(body, "    confirm: {{ event: {event}, within: {within} }}");
+        }
+        if c.irreversible {
+            body.push_str("    irreversible: true\n");
+        }
+        states(&mut body, "pre_conf_state", &c.pre);
+        if !c.changes.is_empty() {
+            body.push_str("    changes:\n");
+            for c in &c.changes {
+                _ = writeln!(body, "      - {}: {{ {} }}", c.kind.verb(), change(&c.kind));
+            }
+        }
+        states(&mut body, "post_conf_state", &c.post);
+        let id = t(&c.id);
+        if body.is_empty() {
+            _ = writeln!(out, "  {id}: {{}}");
+        } else {
+            _ = write!(out, "  {id}:\n{body}");
+        }
+    }
+    out
+}
+
+fn raised(actions: &[(Action, Origin)]) -> Vec<String> {
+    let one = |(action, _): &(Action, Origin)| match action {
+        Action::Raise(event) => Some(t(event)),
+        Action::Function(_) => None,
+    };
+    actions.iter().filter_map(one).collect()
+}
+
+fn transition(tr: &Transition) -> String {
+    let mut parts = Vec::new();
+    for (name, reference) in [("src", &tr.src), ("tgt", &tr.tgt)] {
+        if let Some((path, _)) = reference {
+            parts.push(format!("{name}: {}", text(path)));
+        }
+    }
+    let events = tr.events.iter().filter(|(trigger, _)| !matches!(trigger, Trigger::Predicate(_)));
+    let events: Vec<_> = events.map(|(trigger, _)| t(trigger)).collect();
+    if !events.is_empty() {
+        parts.push(format!("events: {}", list(events)));
+    }
+    let effect = raised(&tr.effect);
+    if !effect.is_empty() {
+        parts.push(format!("effect: {}", list(effect)));
+    }
+    if tr.pn != 0.0 {
+        parts.push(format!("pn: {}", float(tr.pn)));
+    }
+    if let Some(doc) = &tr.doc {
+        parts.push(format!("doc: {}", quoted(doc)));
+    }
+    if parts.is_empty() { "{}".to_owned() } else { format!("{{ {} }}", parts.join(", ")) }
+}
+
+fn state(out: &mut String, s: &State, indent: usize) {
+    let pad = "  ".repeat(indent);
+    let mut body = String::new();
+    if let Some(doc) = &s.doc {
+        _ = writeln!(body, "{pad}doc: {}", quoted(doc));
+    }
+    let config: Vec<String> = s.config.iter().map(|(id, _)| t(id)).collect();
+    for (name, names) in [("config", config), ("entry", raised(&s.entry)), ("exit", raised(&s.exit))] {
+        if !names.is_empty() {
+            _ = writeln!(body, "{pad}{name}: {}", list(names));
+        }
+    }
+    if !s.children.is_empty() {
+        _ = writeln!(body, "{pad}states:");
+        for child in &s.children {
+            _ = write!(body, "{pad}  {}:", t(&child.name()));
+            match child {
+                Node::State(child) => state(&mut body, child, indent + 2),
+                Node::Connector(c) => {
+                    let doc = c.doc.as_ref().map_or(String::new(), |doc| format!(", doc: {}", quoted(doc)));
+                    _ = writeln!(body, " {{ connector: true{doc} }}");
+                }
+            }
+        }
+    }
+    if !s.transitions.is_empty() {
+        _ = writeln!(body, "{pad}transitions:");
+        for t in &s.transitions {
+            _ = writeln!(body, "{pad}  - {}", transition(t));
+        }
+    }
+    if body.is_empty() {
+        out.push_str(" {}\n");
+    } else {
+        _ = write!(out, "\n{body}");
+    }
+}
+
+/// `coordinator: …`
+pub fn coordinator_yaml(chart: &Statechart) -> String {
+    let mut out = String::from("coordinator:");
+    state(&mut out, &chart.root, 1);
+    out
+}
+
+fn component_type(out: &mut String, ty: &ComponentType) {
+    _ = writeln!(out, "  {}:", t(&ty.name));
+    let mut body = String::new();
+    if !ty.doc.is_empty() {
+        _ = writeln!(body, "    doc: {}", quoted(&ty.doc));
+    }
+    let doc = |doc: &str| if doc.is_empty() { String::new() } else { format!(", doc: {}", quoted(doc)) };
+    let unit = |unit: &Option<std::sync::Arc<str>>| unit.as_ref().map_or(String::new(), |u| format!(", unit: {}", text(u)));
+    if !ty.ports.is_empty() {
+        body.push_str("    ports:\n");
+    }
+    for (name, port) in &ty.ports {
+        let direction = match port.direction {
+            Direction::In => "in",
+            Direction::Out => "out",
+        };
+        let buffered = if port.buffered { ", buffered: true" } else { "" };
+        let (ty, unit, doc) = (text(&port.ty.to_string()), unit(&port.unit), doc(&port.doc));
+        _ = writeln!(body, "      {}: {{ direction: {direction}, type: {ty}{unit}{buffered}{doc} }}", t(name));
+    }
+    if !ty.properties.is_empty() {
+        body.push_str("    properties:\n");
+    }
+    for (name, property) in &ty.properties {
+        let mut parts = format!("type: {}", text(&property.ty.to_string()));
+        if let Some(default) = &property.default {
+            _ = write!(parts, ", default: {}", value(default));
+        }
+        for (name, limit) in [("min", property.min), ("max", property.max)] {
+            if let Some(limit) = limit {
+                _ = write!(parts, ", {name}: {}", float(limit));
+            }
+        }
+        match property.tunable {
+            Tunable::Always => {}
+            Tunable::Stopped => parts.push_str(", tunable: stopped"),
+            Tunable::Unconfigured => parts.push_str(", tunable: unconfigured"),
+        }
+        _ = writeln!(body, "      {}: {{ {parts}{}{} }}", t(name), unit(&property.unit), doc(&property.doc));
+    }
+    if !ty.operations.is_empty() {
+        body.push_str("    operations:\n");
+    }
+    for (name, operation) in &ty.operations {
+        let args = list(operation.args.iter().map(|ty| text(&ty.to_string())));
+        let returns =
+            operation.returns.as_ref().map_or(String::new(), |ty| format!(", returns: {}", text(&ty.to_string())));
+        let effect = match &operation.effect {
+            Effect::None => "none".to_owned(),
+            Effect::Irreversible => "irreversible".to_owned(),
+            Effect::Undo(operation) => format!("{{ undo: {} }}", t(operation)),
+        };
+        let doc = doc(&operation.doc);
+        _ = writeln!(body, "      {}: {{ args: {args}{returns}, effect: {effect}{doc} }}", t(name));
+    }
+    for (name, types) in [("start_after", &ty.start_after), ("stop_before", &ty.stop_before)] {
+        if !types.is_empty() {
+            _ = writeln!(body, "    {name}: {}", list(types.iter().map(|ty| t(ty))));
+        }
+    }
+    if ty.actuator {
+        body.push_str("    actuator: true\n");
+    }
+    let marks = [
+        (ty.irreversible.configure, "configure"),
+        (ty.irreversible.stop, "stop"),
+        (ty.irreversible.destroy, "destroy"),
+    ];
+    let moves: Vec<String> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| (*name).to_owned()).collect();
+    if !moves.is_empty() {
+        _ = writeln!(body, "    irreversible: {}", list(moves));
+    }
+    if body.is_empty() {
+        out.truncate(out.trim_end().len());
+        out.push_str(" {}\n");
+    }
+    out.push_str(&body);
+}
+
+/// The deployment file, with the names of the files of its configurations and its coordinator.
+pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinator: &str) -> String {
+    let mut out = format!("davit: 1\nname: {}\nplatform: {}\n", t(&d.name), t(&d.platform));
+    _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
+    if !d.types.is_empty() {
+        out.push_str("types:\n");
+        d.types.iter().for_each(|ty| component_type(&mut out, ty));
+    }
+    if !d.activities.is_empty() {
+        out.push_str("activities:\n");
+    }
+    for (name, activity) in &d.activities {
+        let mut parts = Vec::new();
+        if let Some(period) = activity.period {
+            parts.push(format!("period_ms: {}", milliseconds(period)));
+        }
+        if activity.priority > 0 {
+            parts.push(format!("priority: {}", activity.priority));
+        }
+        if let Some(cpu) = activity.cpu {
+            parts.push(format!("cpu: {cpu}"));
+        }
+        let parts = if parts.is_empty() { "{}".to_owned() } else { format!("{{ {} }}", parts.join(", ")) };
+        _ = writeln!(out, "  {}: {parts}", t(name));
+    }
+    _ = writeln!(out, "configurations: {}", list(configurations.iter().map(|file| text(file))));
+    _ = writeln!(out, "coordinator: {}", text(coordinator));
+    if !d.emits.is_empty() {
+        _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));
+    }
+    let (event, up, within) = (t(&d.deploy.event), text(&d.deploy.up), seconds(d.deploy.within));
+    let failed = if d.deploy.failed.is_empty() {
+        String::new()
+    } else {
+        format!(", failed: {}", list(d.deploy.failed.iter().map(|s| text(s))))
+    };
+    _ = writeln!(out, "deploy: {{ event: {event}, up: {up}{failed}, within_s: {within} }}");
+    let (event, down, within) = (t(&d.shutdown.event), text(&d.shutdown.down), seconds(d.shutdown.within));
+    _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within} }}");
+    let (stack, timeout) = (d.limits.stack, seconds(d.limits.step_timeout));
+    _ = writeln!(out, "limits: {{ stack: {stack}, step_timeout_s: {timeout} }}");
+    let durability = match d.durability {
+        Durability::Full => "full",
+        Durability::Relaxed => "relaxed",
+    };
+    _ = writeln!(out, "durability: {durability}");
+    out
+}
