@@ -127,7 +127,9 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
             let is = |key: &str| matches!(&node.kind, Kind::Map(entries) if entries.iter().any(|e| e.key == key));
             if is("davit") {
                 let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "a deployment is written in YAML only");
-                cx.report(finding.at(reading.whole).help("convert the files of configurations and the coordinator it names"));
+                cx.report(
+                    finding.at(reading.whole).help("convert the files of configurations and the coordinator it names"),
+                );
                 return None;
             }
             if is("coordinator") {
@@ -145,7 +147,12 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
             Some(Content::Configurations(list))
         }
         (None, None) => {
-            nothing(cx, reading, "configuration and no coordinator", "`ConfiguratorConf { … }` or `return state { … }`");
+            nothing(
+                cx,
+                reading,
+                "configuration and no coordinator",
+                "`ConfiguratorConf { … }` or `return state { … }`",
+            );
             None
         }
     }

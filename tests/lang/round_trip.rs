@@ -14,7 +14,7 @@ use std::time::Duration;
 
 fn cases() -> ProptestConfig {
     let cases = std::env::var("DAVIT_LAW_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(10_000);
-    ProptestConfig { cases, ..ProptestConfig::default() }
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 /// Names: ordinary ones, words of Lua and of YAML.
@@ -98,8 +98,9 @@ fn call() -> impl Strategy<Value = Call> {
 fn change() -> impl Strategy<Value = Change> {
     let policy = prop_oneof![Just(Policy::Data), (1_u32..1_000_000).prop_map(Policy::Buffer)];
     prop_oneof![
-        (component(), type_name(), option::of(ident()), btree_map(ident(), value(), 0..3))
-            .prop_map(|(component, ty, activity, properties)| ChangeKind::Create { component, ty, activity, properties }),
+        (component(), type_name(), option::of(ident()), btree_map(ident(), value(), 0..3)).prop_map(
+            |(component, ty, activity, properties)| ChangeKind::Create { component, ty, activity, properties }
+        ),
         component().prop_map(|component| ChangeKind::Destroy { component }),
         (member(), member(), policy).prop_map(|(from, to, policy)| ChangeKind::Connect { from, to, policy }),
         (member(), member()).prop_map(|(from, to)| ChangeKind::Disconnect { from, to }),
@@ -158,12 +159,12 @@ fn trigger() -> impl Strategy<Value = Trigger> {
 }
 
 fn edge() -> impl Strategy<Value = Edge> {
-    let reference = || option::weighted(0.9, "\\.?[a-z]{1,4}(\\.[a-z]{1,4}){0,2}".prop_map(|text| (text, Origin::NONE)));
+    let reference =
+        || option::weighted(0.9, "\\.?[a-z]{1,4}(\\.[a-z]{1,4}){0,2}".prop_map(|text| (text, Origin::NONE)));
     let names = || vec(event().prop_map(|e| (Action::Raise(e), Origin::NONE)), 0..3);
     let triggers = vec(trigger().prop_map(|t| (t, Origin::NONE)), 0..3);
-    (reference(), reference(), triggers, names(), finite(), option::of(any_text())).prop_map(
-        |(src, tgt, events, effect, pn, doc)| Edge { src, tgt, events, effect, pn, doc, ..Edge::default() },
-    )
+    (reference(), reference(), triggers, names(), finite(), option::of(any_text()))
+        .prop_map(|(src, tgt, events, effect, pn, doc)| Edge { src, tgt, events, effect, pn, doc, ..Edge::default() })
 }
 
 fn state() -> impl Strategy<Value = State> {
@@ -212,19 +213,23 @@ fn value_type() -> impl Strategy<Value = ValueType> {
 
 fn component_type() -> impl Strategy<Value = ComponentType> {
     let unit = || option::of(any_text().prop_map(std::sync::Arc::from));
-    let port = (any::<[bool; 2]>(), prop_oneof![4 => value_type(), 1 => Just(ValueType::Event)], unit(), any_text()).prop_map(
-        |([input, buffered], ty, unit, doc)| PortType {
+    let port = (any::<[bool; 2]>(), prop_oneof![4 => value_type(), 1 => Just(ValueType::Event)], unit(), any_text())
+        .prop_map(|([input, buffered], ty, unit, doc)| PortType {
             direction: if input { Direction::In } else { Direction::Out },
             ty,
             unit,
             buffered,
             doc,
             origin: Origin::NONE,
-        },
-    );
+        });
     let tunable = prop::sample::select(vec![Tunable::Unconfigured, Tunable::Stopped, Tunable::Always]);
     let limits = prop_oneof![
-        (-9.0..0.0_f64, 10.0..19.0_f64, 0.0..10.0_f64).prop_map(|(min, max, v)| (ValueType::Float, Some(min), Some(max), Some(Value::Float(v)))),
+        (-9.0..0.0_f64, 10.0..19.0_f64, 0.0..10.0_f64).prop_map(|(min, max, v)| (
+            ValueType::Float,
+            Some(min),
+            Some(max),
+            Some(Value::Float(v))
+        )),
         (value_type(), option::of(finite())).prop_map(|(ty, min)| (ty, min, None, None)),
         any_text().prop_map(|v| (ValueType::Str, None, None, Some(Value::str(&v)))),
     ];
@@ -234,10 +239,16 @@ fn component_type() -> impl Strategy<Value = ComponentType> {
     let effect = prop_oneof![Just(Effect::None), Just(Effect::Irreversible), ident().prop_map(Effect::Undo)];
     let operation = (vec(value_type(), 0..3), option::of(value_type()), effect, any_text())
         .prop_map(|(args, returns, effect, doc)| OperationType { args, returns, effect, doc, origin: Origin::NONE });
-    let members = (btree_map(ident(), port, 0..3), btree_map(ident(), property, 0..3), btree_map(ident(), operation, 0..3));
+    let members =
+        (btree_map(ident(), port, 0..3), btree_map(ident(), property, 0..3), btree_map(ident(), operation, 0..3));
     let others = (vec(type_name(), 0..2), vec(type_name(), 0..2), any::<[bool; 4]>());
     (type_name(), any_text(), members, others).prop_map(
-        |(name, doc, (ports, properties, operations), (start_after, stop_before, [actuator, configure, stop, destroy]))| ComponentType {
+        |(
+            name,
+            doc,
+            (ports, properties, operations),
+            (start_after, stop_before, [actuator, configure, stop, destroy]),
+        )| ComponentType {
             doc,
             ports,
             properties,
@@ -255,8 +266,12 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     let activity = (option::of(time()), 0_u8..100, option::of(0_u32..64))
         .prop_map(|(period, priority, cpu)| Activity { period, priority, cpu, origin: Origin::NONE });
     let path = || "[a-z]{1,4}(\\.[a-z]{1,4}){0,2}";
-    let up = (event(), path(), vec(path(), 0..3), time())
-        .prop_map(|(event, up, failed, within)| BringUp { event, up, failed, within });
+    let up = (event(), path(), vec(path(), 0..3), time()).prop_map(|(event, up, failed, within)| BringUp {
+        event,
+        up,
+        failed,
+        within,
+    });
     let down = (event(), path(), time()).prop_map(|(event, down, within)| TakeDown { event, down, within });
     let types = vec(component_type(), 0..3).prop_map(|mut types| {
         let mut seen = BTreeSet::new();

@@ -239,7 +239,8 @@ fn component_type(out: &mut String, ty: &ComponentType) {
         _ = writeln!(body, "    doc: {}", quoted(&ty.doc));
     }
     let doc = |doc: &str| if doc.is_empty() { String::new() } else { format!(", doc: {}", quoted(doc)) };
-    let unit = |unit: &Option<std::sync::Arc<str>>| unit.as_ref().map_or(String::new(), |u| format!(", unit: {}", text(u)));
+    let unit =
+        |unit: &Option<std::sync::Arc<str>>| unit.as_ref().map_or(String::new(), |u| format!(", unit: {}", text(u)));
     if !ty.ports.is_empty() {
         body.push_str("    ports:\n");
     }
