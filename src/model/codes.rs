@@ -162,6 +162,36 @@ codes! {
     TYPE_BAD_DEFAULT = "type::bad_default", "a property's default or limits contradict its type",
         "The default of a property must be of its type and lie within `min` and `max`, and `min` may not exceed `max`: \
          a component could otherwise never be created without breaking its own rules. Correct the declaration.";
+    DEPLOY_UNKNOWN_STATE = "deploy::unknown_state", "the deployment names a state that the coordinator does not have",
+        "`deploy.up`, `deploy.failed` and `shutdown.down` name states of the coordinator, by their own name \
+         (`operational`), their full name (`root.operational`) or any end of it that only one state has. Without the \
+         state, nobody could tell when the system is up or down. Correct the name, or add the state.";
+    DEPLOY_EVENT_UNHEARD = "deploy::event_unheard", "no transition waits for the event that starts or ends the deployment",
+        "`deploy.event` starts the bring-up and `shutdown.event` the shutdown. The coordinator has no transition on the \
+         event, so nothing would ever happen. Correct the event's name in the deployment or in the coordinator.";
+    DEPLOY_NEVER_UP = "deploy::never_up", "the bring-up does not reach the state that means up",
+        "The coordinator was driven with the deploy event and every request answered `ok`, and came to rest somewhere \
+         else than in `deploy.up`. A bring-up that fails when everything goes well cannot work: look at the trace for the \
+         place where it stops, and at the event it waits for there. Events of components were tried where nothing else \
+         could go on.";
+    DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down",
+        "From the state that means up, the coordinator was driven with the shutdown event and every request answered \
+         `ok`, and did not reach `shutdown.down`. The shutdown would have to be forced. Look at the trace for the place \
+         where it stops.";
+    DEPLOY_LEFTOVERS = "deploy::leftovers", "the shutdown leaves components behind",
+        "The coordinator reaches the state that means down, but components that the bring-up created are still there. \
+         Shutdown would have to be forced, without the order that the coordinator knows. Let the coordinator undo what it \
+         applied, or apply a configuration that destroys what is left; the finding names it.";
+    DEPLOY_UNKNOWN_LIBRARY = "deploy::unknown_library", "there is no such component library",
+        "`libraries` names the component libraries that this program was built with. A library of your own is linked into \
+         a program of your own: `davit::cli::main(libraries)`. `davit types` lists what this program has.";
+    TYPE_UNKNOWN_TYPE = "type::unknown_type", "a component type refers to a type that there is not",
+        "`start_after` and `stop_before` name other component types, whose components start before and stop after those of \
+         this one. A name that no type has would silently order nothing. Correct it, or leave it out.";
+    TYPE_UNKNOWN_OPERATION = "type::unknown_operation", "the undo of an operation is not an operation that fits",
+        "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
+         or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \
+         arguments, or declare the effect as `none` or `irreversible`.";
     // ---- configurations and plans ----------------------------------------------------------------------------------
     CONF_KEYED_ENTRIES = "conf::keyed_entries", "two keyed entries in a state list have no order",
         "A state list is applied in its order, but the named entries of a Lua table have none: with two or more keys, \
@@ -355,6 +385,54 @@ codes! {
     CHART_RESERVED_NAME = "chart::reserved_name", "a state has a name that means something else",
         "The words entry, exit, doo, config, doc, type, new and rfsm have a meaning in a state's table, so a state of \
          that name could not be told from it, or breaks references in rFSM. Choose another name.";
+    COORD_UNKNOWN_REQUEST = "coord::unknown_request", "the coordinator asks for a configuration that there is not",
+        "A name that a coordinator raises is a request when it is a configuration's name, `NAME.undo` or `undo`; else it \
+         must be listed under `emits` in the deployment. This one is neither, so nobody would hear it. Correct the name, \
+         add the configuration, or list the event under `emits`.";
+    COORD_UNKNOWN_ANSWER = "coord::unknown_answer", "a transition waits for an answer that no configurator gives",
+        "Answers are named after the request: `ID.ok`, `ID.failed`, `ID.broken`, `ID.cancelled`, `ID.reverted`, \
+         `ID.undone`, `ID.undo.failed`, `ID.undo.broken`. This event has such a form, but there is no such configuration \
+         or no such answer, so the transition would wait for ever. Correct the name.";
+    COORD_ANSWER_NEVER_COMES = "coord::answer_never_comes", "a transition waits for an answer to a request that is never made",
+        "Answers go to whoever asked. The coordinator waits for the answer to a request that it makes nowhere, so the \
+         transition can never be taken. Raise the request where it is wanted, or remove the event.";
+    COORD_NEVER_EMITTED = "coord::never_emitted", "an event that the deployment emits is raised nowhere",
+        "`emits` lists the events that leave the deployment. The coordinator raises this one nowhere, so whoever waits for \
+         it outside waits in vain. Raise it in the coordinator, or remove it from the list.";
+    COORD_NEAR_EVENT = "coord::near_event", "an event is nearly, but not quite, one that the deployment raises",
+        "Events are plain names, and components and operators may raise any, so an unknown one is no error by itself. This \
+         one differs by a letter or two from an event that the deployment raises, and is probably a slip. Correct it, or \
+         give it a name that cannot be mistaken.";
+    COORD_FAILURE_UNHANDLED = "coord::failure_unhandled", "nobody hears that a request failed",
+        "Every request can fail. The coordinator asks for a configuration in a state where no transition waits for \
+         `ID.failed` (or `ID.broken`), so after a failure it stays where it is as if nothing had happened. Add a transition \
+         to a state that knows what to do: try again, go back, or stop.";
+    COORD_NOT_PURE = "coord::not_pure", "the coordinator has functions",
+        "A coordinator of states, transitions and names of events can be verified in full. Functions can do anything, so \
+         what `check` says about requests, failures and shutdown holds only as far as no function is involved. Names of \
+         events in place of functions make a coordinator pure.";
+    COORD_REQUEST_REFUSED = "coord::request_refused", "a request is refused in a state in which the coordinator makes it",
+        "`check` follows the coordinator through every order of events and answers. On the way shown, it asks for a \
+         configuration that does not fit the system as it is then: a component is there already or not there, a port is \
+         driven, a property cannot be set in this run state. The request would be answered `failed`. Make the request \
+         where it fits, or write the configuration so that it fits both states: demands (run states, values) are fulfilled \
+         when already so, acts (create, destroy, connect, disconnect) are not.";
+    COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
+        "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
+         neither from inside nor from outside. Only a forced shutdown gets the system out. Add a transition, at least on \
+         the shutdown event.";
+    COORD_NO_WAY_DOWN = "coord::no_way_down", "the state that means down cannot be reached from here",
+        "`check` followed every order of events from the state shown, and none leads to `shutdown.down`, even if every \
+         request succeeds from there on. A shutdown would have to be forced. Add the transitions that lead down from there.";
+    COORD_LEFTOVERS = "coord::leftovers", "a way down leaves components behind",
+        "On the way shown the coordinator reaches the state that means down with components still there. The shutdown \
+         would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \
+         applied on the way up.";
+    COORD_STACK_GROWS = "coord::stack_grows", "going round makes the stack grow",
+        "The coordinator can go round a circle of states that applies a configuration each time and never undoes it, \
+         though elsewhere it undoes that configuration by name. Each round leaves a frame; past the limit the oldest are \
+         squashed together and can no longer be undone one by one. Undo it on the way round, scope it to a state \
+         (`config = …`), or give it a group.";
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
     // ---- youbot and standard libraries -----------------------------------------------------------------------------
     // ---- command line ----------------------------------------------------------------------------------------------

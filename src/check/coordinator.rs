@@ -1,0 +1,300 @@
+//! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
+
+use crate::model::codes::{
+    COORD_ANSWER_NEVER_COMES, COORD_FAILURE_UNHANDLED, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_NOT_PURE,
+    COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
+};
+use crate::model::finding::{did_you_mean, nearest};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
+use crate::statechart::{Chart, EdgeId, NodeId, RaiseSite, When};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a raised name asks for; none when it is no request.
+pub fn ask_of(deployment: &Deployment, name: EventName) -> Option<Ask> {
+    let text = name.as_str();
+    if text == "undo" {
+        return Some(Ask::Undo);
+    }
+    if let Some(id) = text.strip_suffix(".undo") {
+        return ConfigId::new(id).ok().map(Ask::UndoOf);
+    }
+    ConfigId::new(text).ok().filter(|id| deployment.configuration(*id).is_some()).map(Ask::Apply)
+}
+
+/// The answers to `ask` that need somebody to hear them.
+pub fn bad_answers(ask: Ask) -> [EventName; 2] {
+    match ask {
+        Ask::Apply(_) => [Verdict::Failed.event(ask), Verdict::Broken.event(ask)],
+        _ => [Verdict::UndoFailed.event(ask), Verdict::UndoBroken.event(ask)],
+    }
+}
+
+/// What is wrong between the coordinator and the deployment.
+pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+    let mut findings = Vec::new();
+    states(deployment, chart, &mut findings);
+    raised(deployment, chart, &mut findings);
+    heard(deployment, chart, &mut findings);
+    unhandled(deployment, chart, &mut findings);
+    if !chart.is_pure() {
+        findings.push(
+            Finding::info(COORD_NOT_PURE, "the coordinator has functions: what depends on them is not verified")
+                .at(deployment.coordinator.root.origin)
+                .help("names of events in place of functions make it pure"),
+        );
+    }
+    findings
+}
+
+fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+    let mut named = vec![("deploy.up".to_owned(), &deployment.deploy.up), ("shutdown.down".to_owned(), &deployment.shutdown.down)];
+    named.extend(deployment.deploy.failed.iter().enumerate().map(|(i, s)| (format!("deploy.failed[{i}]"), s)));
+    for (key, state) in named {
+        if let Err(error) = chart.find(state) {
+            let at = deployment.key_origins.get(&key).copied();
+            let at = at.unwrap_or_else(|| deployment.key_origin(key.split('[').next().unwrap_or(&key)));
+            let names: Vec<String> =
+                chart.nodes().filter(|n| chart.is_state(*n)).map(|n| chart.name(n).to_string()).collect();
+            let own = state.rsplit('.').next().unwrap_or(state);
+            findings.push(
+                Finding::error(DEPLOY_UNKNOWN_STATE, format!("{key}: {error}"))
+                    .at(at)
+                    .path(key)
+                    .also(deployment.coordinator.root.origin, "the coordinator")
+                    .help(did_you_mean(own, "states", names.iter().map(String::as_str))),
+            );
+        }
+    }
+    for (key, event) in [("deploy.event", deployment.deploy.event), ("shutdown.event", deployment.shutdown.event)] {
+        if !listens(chart, event) {
+            let heard: Vec<&str> = outside_events(deployment, chart).into_iter().map(|e| e.as_str()).collect();
+            findings.push(
+                Finding::error(DEPLOY_EVENT_UNHEARD, format!("{key}: no transition of the coordinator waits for `{event}`"))
+                    .at(deployment.key_origin(key))
+                    .path(key)
+                    .also(deployment.coordinator.root.origin, "the coordinator")
+                    .help(did_you_mean(event.as_str(), "events", heard)),
+            );
+        }
+    }
+}
+
+/// Whether some transition lists `event`.
+fn listens(chart: &Chart, event: EventName) -> bool {
+    chart.events().contains(&event)
+}
+
+/// Events that transitions list and that can only come from components, operators or other deployments.
+pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> {
+    let answers = answers(deployment, chart);
+    chart
+        .events()
+        .iter()
+        .copied()
+        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !looks_like_answer(deployment, e.as_str()))
+        .collect()
+}
+
+/// Completion and time events: raised in the chart itself.
+fn is_internal(event: &str) -> bool {
+    event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
+}
+
+const SUFFIXES: [&str; 8] =
+    [".undo.failed", ".undo.broken", ".ok", ".failed", ".broken", ".cancelled", ".undone", ".reverted"];
+
+/// The configuration that an event seems to be an answer about, with the suffix.
+fn split_answer(event: &str) -> Option<(&str, &'static str)> {
+    SUFFIXES.iter().find_map(|suffix| event.strip_suffix(suffix).map(|id| (id, *suffix)))
+}
+
+fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
+    match split_answer(event) {
+        Some((id, _)) => ConfigId::new(id).is_ok(),
+        None => event.rsplit_once('.').is_some_and(|(id, _)| {
+            let id = id.strip_suffix(".undo").unwrap_or(id);
+            ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some())
+        }),
+    }
+}
+
+/// All answers to what the chart asks for.
+fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
+    use Verdict::{Broken, Cancelled, Failed, Ok, Reverted, UndoBroken, UndoFailed, Undone};
+    let mut answers = BTreeSet::new();
+    for site in chart.raises() {
+        if let Some(ask) = ask_of(deployment, site.name) {
+            let verdicts: &[Verdict] = match ask {
+                Ask::Apply(_) => &[Ok, Failed, Broken, Cancelled, Reverted],
+                _ => &[Undone, UndoFailed, UndoBroken],
+            };
+            answers.extend(verdicts.iter().map(|v| v.event(ask)));
+        }
+    }
+    answers
+}
+
+fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+    let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
+    for site in chart.raises() {
+        let known = match ask_of(deployment, site.name) {
+            Some(Ask::UndoOf(id)) => deployment.configuration(id).is_some(),
+            Some(_) => true,
+            None => emits.contains(&site.name),
+        };
+        // The undo of a state-scoped configuration was not written by anybody; its entry is reported.
+        if known || (site.scoped && matches!(site.when, When::Exit(_))) {
+            continue;
+        }
+        let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
+        let candidates = ids.iter().copied().chain(emits.iter().map(|e| e.as_str()).filter(|_| undo.is_empty()));
+        let help = did_you_mean(id, "configurations", candidates);
+        let message = if site.scoped || !undo.is_empty() {
+            format!("there is no configuration `{id}`")
+        } else {
+            format!("`{}` is neither a configuration nor an event that the deployment emits", site.name)
+        };
+        findings.push(
+            Finding::error(COORD_UNKNOWN_REQUEST, message)
+                .at(site.origin)
+                .labelled("raised here")
+                .path(place(chart, site.when))
+                .also(deployment.key_origin("configurations"), "the configurations of the deployment")
+                .help(format!("{help}; an event that is meant to leave the deployment is listed under `emits`")),
+        );
+    }
+    let raised: BTreeSet<EventName> = chart.raises().iter().map(|s| s.name).collect();
+    for (event, origin) in &deployment.emits {
+        if !raised.contains(event) {
+            let known: Vec<&str> = raised.iter().map(|e| e.as_str()).collect();
+            let near = nearest(event.as_str(), known).map_or_else(
+                || "raise it in the coordinator, or leave it out".to_owned(),
+                |near| format!("did you mean `{near}`?"),
+            );
+            findings.push(
+                Finding::warning(COORD_NEVER_EMITTED, format!("nothing in the coordinator raises `{event}`"))
+                    .at(*origin)
+                    .path("emits")
+                    .help(near),
+            );
+        }
+    }
+}
+
+fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+    let answers = answers(deployment, chart);
+    let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let mut known: BTreeSet<&str> = deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
+    known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
+    let mut said: BTreeSet<EventName> = BTreeSet::new();
+    for edge in edges(chart) {
+        for trigger in chart.triggers(edge).unwrap_or(&[]) {
+            let text = chart.event_text(*trigger);
+            let Ok(event) = EventName::new(&text) else { continue };
+            if is_internal(&text) || answers.contains(&event) || known.contains(text.as_str()) || !said.insert(event) {
+                continue;
+            }
+            let at = chart.edge_origin(edge);
+            if !looks_like_answer(deployment, &text) {
+                if let Some(near) = nearest(&text, known.iter().copied())
+                    && strsim::damerau_levenshtein(&text, near) <= 2
+                {
+                    findings.push(
+                        Finding::warning(COORD_NEAR_EVENT, format!("`{event}` is nearly `{near}`, which the deployment raises"))
+                            .at(at)
+                            .help(format!("did you mean `{near}`? if not, a component or an operator must raise `{event}`")),
+                    );
+                }
+                continue;
+            }
+            let (id, suffix) = split_answer(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));
+            let id = id.strip_suffix(".undo").unwrap_or(id);
+            let exists = ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some());
+            if !exists {
+                findings.push(
+                    Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` answers nothing: there is no configuration `{id}`"))
+                        .at(at)
+                        .labelled("waits for it")
+                        .also(deployment.key_origin("configurations"), "the configurations of the deployment")
+                        .help(did_you_mean(id, "configurations", ids.iter().copied())),
+                );
+            } else if SUFFIXES.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
+                let undo = text.contains(".undo") || text.ends_with(".undone");
+                let what = if undo { format!("{id}.undo") } else { id.to_owned() };
+                findings.push(
+                    Finding::warning(COORD_ANSWER_NEVER_COMES, format!("`{event}` never comes: the coordinator does not ask for `{what}`"))
+                        .at(at)
+                        .help(format!("raise `{what}` where it is wanted, or leave the event out: answers go to whoever asked")),
+                );
+            } else {
+                findings.push(
+                    Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` is no answer of a configurator"))
+                        .at(at)
+                        .labelled("waits for it")
+                        .help(did_you_mean(suffix, "answers", SUFFIXES.iter().map(|s| s.trim_start_matches('.')))),
+                );
+            }
+        }
+    }
+}
+
+/// Every transition of the chart.
+pub fn edges(chart: &Chart) -> impl Iterator<Item = EdgeId> + '_ {
+    chart.nodes().flat_map(|node| chart.outgoing(node))
+}
+
+/// Requests whose failure no transition waits for that could be there to hear it.
+fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+    let mut missing: BTreeMap<EventName, (&RaiseSite, BTreeSet<EventName>)> = BTreeMap::new();
+    for site in chart.raises() {
+        let Some(ask) = ask_of(deployment, site.name) else { continue };
+        // Undoing what a state brought with it: nobody waits for that, and the stack keeps the frame.
+        if site.scoped && matches!(site.when, When::Exit(_)) {
+            continue;
+        }
+        for answer in bad_answers(ask) {
+            let heard = edges(chart).any(|edge| {
+                let hears = chart.triggers(edge).is_none_or(|t| t.iter().any(|e| chart.event_text(*e) == answer.as_str()));
+                let source = chart.ends(edge).0;
+                hears
+                    && match site.when {
+                        When::Entry(owner) => chart.is_inside(source, owner) || chart.is_inside(owner, source),
+                        When::Exit(_) | When::Effect(_) => true,
+                    }
+            });
+            if !heard {
+                missing.entry(site.name).or_insert_with(|| (site, BTreeSet::new())).1.insert(answer);
+            }
+        }
+    }
+    for (name, (site, answers)) in missing {
+        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed"));
+        let list: Vec<String> = answers.iter().map(|a| format!("`{a}`")).collect();
+        let message = format!("no transition hears {} of the request raised here", list.join(" or "));
+        let finding = if failed {
+            Finding::warning(COORD_FAILURE_UNHANDLED, message)
+        } else {
+            Finding::info(COORD_FAILURE_UNHANDLED, message)
+        };
+        findings.push(
+            finding
+                .at(site.origin)
+                .labelled(format!("asks for {name}"))
+                .path(place(chart, site.when))
+                .help(format!("add a transition on {} that leaves the state, so that the coordinator does not wait for ever", list.join(", "))),
+        );
+    }
+}
+
+/// Where a name is raised, as a path of the model.
+pub fn place(chart: &Chart, when: When) -> String {
+    match when {
+        When::Entry(node) => format!("coordinator.{}.entry", chart.fqn(node)),
+        When::Exit(node) => format!("coordinator.{}.exit", chart.fqn(node)),
+        When::Effect(edge) => {
+            let (from, to): (NodeId, NodeId) = chart.ends(edge);
+            format!("coordinator.{} -> {}", chart.fqn(from), chart.fqn(to))
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! All components that any configuration creates: what names in configurations may mean at all.
+
+use crate::model::{Catalogue, ChangeKind, ComponentName, ComponentType, Deployment, Origin, TypeName};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A component that some configuration creates.
+#[derive(Debug, Clone)]
+pub struct Creation {
+    /// Its type, as written.
+    pub ty: TypeName,
+    /// The type's description, if there is one of that name.
+    pub description: Option<Arc<ComponentType>>,
+    /// Where it is created.
+    pub origin: Origin,
+}
+
+/// The components of a deployment, whichever configuration creates them; one name may be created as several types.
+#[derive(Debug, Clone, Default)]
+pub struct Universe {
+    components: BTreeMap<ComponentName, Vec<Creation>>,
+}
+
+impl Universe {
+    /// What the configurations of `deployment` create.
+    pub fn new(deployment: &Deployment, catalogue: &Catalogue) -> Self {
+        let mut components: BTreeMap<ComponentName, Vec<Creation>> = BTreeMap::new();
+        for change in deployment.configurations.iter().flat_map(|c| &c.changes) {
+            if let ChangeKind::Create { component, ty, .. } = &change.kind {
+                let creations = components.entry(*component).or_default();
+                if creations.iter().all(|c| c.ty != *ty) {
+                    let description = catalogue.get(*ty).cloned();
+                    creations.push(Creation { ty: *ty, description, origin: change.origin });
+                }
+            }
+        }
+        Self { components }
+    }
+
+    /// How a component of that name may have been created; empty when none creates it.
+    pub fn of(&self, component: ComponentName) -> &[Creation] {
+        self.components.get(&component).map_or(&[], Vec::as_slice)
+    }
+
+    /// All names.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> + '_ {
+        self.components.keys().map(ComponentName::as_str)
+    }
+}
