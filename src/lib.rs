@@ -1,6 +1,7 @@
 //! Davit brings component-based robot systems up, switches them while they run, undoes what it did, and takes them down
 //! again.
 
+pub mod check;
 pub mod cli;
 pub mod coordinator;
 pub mod diagnostics;

@@ -97,9 +97,12 @@ impl<'a> Check<'a> {
             }
             if entry.state == RunState::Faulted {
                 self.add(
-                    Finding::error(FAULTED_DEMANDED, format!("{}: the state `faulted` cannot be demanded", entry.target))
-                        .at(entry.origin)
-                        .help("demand unconfigured, stopped or running: components fault by themselves"),
+                    Finding::error(
+                        FAULTED_DEMANDED,
+                        format!("{}: the state `faulted` cannot be demanded", entry.target),
+                    )
+                    .at(entry.origin)
+                    .help("demand unconfigured, stopped or running: components fault by themselves"),
                 );
             }
         }
@@ -319,8 +322,7 @@ impl<'a> Check<'a> {
 
     fn call(&mut self, call: &Call, at: Origin) {
         let Some(creation) = self.member(call.operation, Member::Operation, at) else { return };
-        let Some(operation) =
-            creation.description.as_ref().and_then(|ty| ty.operations.get(&call.operation.member))
+        let Some(operation) = creation.description.as_ref().and_then(|ty| ty.operations.get(&call.operation.member))
         else {
             return;
         };

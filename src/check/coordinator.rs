@@ -47,7 +47,8 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
 }
 
 fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
-    let mut named = vec![("deploy.up".to_owned(), &deployment.deploy.up), ("shutdown.down".to_owned(), &deployment.shutdown.down)];
+    let mut named =
+        vec![("deploy.up".to_owned(), &deployment.deploy.up), ("shutdown.down".to_owned(), &deployment.shutdown.down)];
     named.extend(deployment.deploy.failed.iter().enumerate().map(|(i, s)| (format!("deploy.failed[{i}]"), s)));
     for (key, state) in named {
         if let Err(error) = chart.find(state) {
@@ -69,11 +70,14 @@ fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         if !listens(chart, event) {
             let heard: Vec<&str> = outside_events(deployment, chart).into_iter().map(|e| e.as_str()).collect();
             findings.push(
-                Finding::error(DEPLOY_EVENT_UNHEARD, format!("{key}: no transition of the coordinator waits for `{event}`"))
-                    .at(deployment.key_origin(key))
-                    .path(key)
-                    .also(deployment.coordinator.root.origin, "the coordinator")
-                    .help(did_you_mean(event.as_str(), "events", heard)),
+                Finding::error(
+                    DEPLOY_EVENT_UNHEARD,
+                    format!("{key}: no transition of the coordinator waits for `{event}`"),
+                )
+                .at(deployment.key_origin(key))
+                .path(key)
+                .also(deployment.coordinator.root.origin, "the coordinator")
+                .help(did_you_mean(event.as_str(), "events", heard)),
             );
         }
     }
@@ -185,7 +189,8 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
 fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let answers = answers(deployment, chart);
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
-    let mut known: BTreeSet<&str> = deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
+    let mut known: BTreeSet<&str> =
+        deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
@@ -201,9 +206,14 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                     && strsim::damerau_levenshtein(&text, near) <= 2
                 {
                     findings.push(
-                        Finding::warning(COORD_NEAR_EVENT, format!("`{event}` is nearly `{near}`, which the deployment raises"))
-                            .at(at)
-                            .help(format!("did you mean `{near}`? if not, a component or an operator must raise `{event}`")),
+                        Finding::warning(
+                            COORD_NEAR_EVENT,
+                            format!("`{event}` is nearly `{near}`, which the deployment raises"),
+                        )
+                        .at(at)
+                        .help(format!(
+                            "did you mean `{near}`? if not, a component or an operator must raise `{event}`"
+                        )),
                     );
                 }
                 continue;
@@ -213,19 +223,27 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
             let exists = ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some());
             if !exists {
                 findings.push(
-                    Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` answers nothing: there is no configuration `{id}`"))
-                        .at(at)
-                        .labelled("waits for it")
-                        .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                        .help(did_you_mean(id, "configurations", ids.iter().copied())),
+                    Finding::error(
+                        COORD_UNKNOWN_ANSWER,
+                        format!("`{event}` answers nothing: there is no configuration `{id}`"),
+                    )
+                    .at(at)
+                    .labelled("waits for it")
+                    .also(deployment.key_origin("configurations"), "the configurations of the deployment")
+                    .help(did_you_mean(id, "configurations", ids.iter().copied())),
                 );
             } else if SUFFIXES.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
                 let undo = text.contains(".undo") || text.ends_with(".undone");
                 let what = if undo { format!("{id}.undo") } else { id.to_owned() };
                 findings.push(
-                    Finding::warning(COORD_ANSWER_NEVER_COMES, format!("`{event}` never comes: the coordinator does not ask for `{what}`"))
-                        .at(at)
-                        .help(format!("raise `{what}` where it is wanted, or leave the event out: answers go to whoever asked")),
+                    Finding::warning(
+                        COORD_ANSWER_NEVER_COMES,
+                        format!("`{event}` never comes: the coordinator does not ask for `{what}`"),
+                    )
+                    .at(at)
+                    .help(format!(
+                        "raise `{what}` where it is wanted, or leave the event out: answers go to whoever asked"
+                    )),
                 );
             } else {
                 findings.push(
@@ -255,7 +273,8 @@ fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         }
         for answer in bad_answers(ask) {
             let heard = edges(chart).any(|edge| {
-                let hears = chart.triggers(edge).is_none_or(|t| t.iter().any(|e| chart.event_text(*e) == answer.as_str()));
+                let hears =
+                    chart.triggers(edge).is_none_or(|t| t.iter().any(|e| chart.event_text(*e) == answer.as_str()));
                 let source = chart.ends(edge).0;
                 hears
                     && match site.when {
@@ -277,13 +296,12 @@ fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         } else {
             Finding::info(COORD_FAILURE_UNHANDLED, message)
         };
-        findings.push(
-            finding
-                .at(site.origin)
-                .labelled(format!("asks for {name}"))
-                .path(place(chart, site.when))
-                .help(format!("add a transition on {} that leaves the state, so that the coordinator does not wait for ever", list.join(", "))),
-        );
+        findings.push(finding.at(site.origin).labelled(format!("asks for {name}")).path(place(chart, site.when)).help(
+            format!(
+                "add a transition on {} that leaves the state, so that the coordinator does not wait for ever",
+                list.join(", ")
+            ),
+        ));
     }
 }
 

@@ -12,10 +12,13 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             for other in others.iter().filter(|other| catalogue.get(**other).is_none()) {
                 let known = catalogue.iter().map(|ty| ty.name.as_str());
                 findings.push(
-                    Finding::error(TYPE_UNKNOWN_TYPE, format!("{}: {key} names a type `{other}` that there is not", ty.name))
-                        .at(ty.origin)
-                        .path(format!("types.{}.{key}", ty.name))
-                        .help(did_you_mean(other.as_str(), "types", known)),
+                    Finding::error(
+                        TYPE_UNKNOWN_TYPE,
+                        format!("{}: {key} names a type `{other}` that there is not", ty.name),
+                    )
+                    .at(ty.origin)
+                    .path(format!("types.{}.{key}", ty.name))
+                    .help(did_you_mean(other.as_str(), "types", known)),
                 );
             }
         }
@@ -25,21 +28,27 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             let Some(inverse) = ty.operations.get(&undo) else {
                 let known = ty.operations.keys().map(Ident::as_str);
                 findings.push(
-                    Finding::error(TYPE_UNKNOWN_OPERATION, format!("{}.{name} is undone by `{undo}`, which {} does not have", ty.name, ty.name))
-                        .at(operation.origin)
-                        .path(path)
-                        .also(ty.origin, "the type is declared here")
-                        .help(did_you_mean(undo.as_str(), "operations", known)),
+                    Finding::error(
+                        TYPE_UNKNOWN_OPERATION,
+                        format!("{}.{name} is undone by `{undo}`, which {} does not have", ty.name, ty.name),
+                    )
+                    .at(operation.origin)
+                    .path(path)
+                    .also(ty.origin, "the type is declared here")
+                    .help(did_you_mean(undo.as_str(), "operations", known)),
                 );
                 continue;
             };
             if !inverse.args.is_empty() && inverse.args != operation.args {
                 findings.push(
-                    Finding::error(TYPE_UNKNOWN_OPERATION, format!("{}.{undo} cannot undo {}.{name}: it takes other arguments", ty.name, ty.name))
-                        .at(operation.origin)
-                        .path(path)
-                        .also(inverse.origin, "declared here")
-                        .help("an undo takes the same arguments, or none"),
+                    Finding::error(
+                        TYPE_UNKNOWN_OPERATION,
+                        format!("{}.{undo} cannot undo {}.{name}: it takes other arguments", ty.name, ty.name),
+                    )
+                    .at(operation.origin)
+                    .path(path)
+                    .also(inverse.origin, "declared here")
+                    .help("an undo takes the same arguments, or none"),
                 );
             }
         }
