@@ -5,18 +5,24 @@
 //! To add a command: a file with an `Args` struct (its doc comment is the help text) that implements [`Run`], and one
 //! line in `commands!` below.
 
+mod check;
 mod completions;
 pub mod exit;
 mod explain;
+pub mod input;
 mod log;
 pub mod output;
 mod remote;
 mod request;
 mod shutdown;
+mod sim;
 mod stack;
 mod status;
+mod types;
 
+use crate::diagnostics::{SourceMap, to_json};
 use crate::model::{Code, Finding, Findings};
+use crate::runtime::Libraries;
 use clap::Parser;
 use exit::Exit;
 use output::{Color, Output};
@@ -53,6 +59,9 @@ macro_rules! commands {
 }
 
 commands! {
+    Check = check::Args,
+    Types = types::Args,
+    Sim = sim::Args,
     Shutdown = shutdown::Args,
     Status = status::Args,
     Stack = stack::Args,
@@ -69,6 +78,8 @@ commands! {
 pub struct Context {
     /// Its streams.
     pub out: Output,
+    /// The component libraries of this program.
+    pub libraries: Libraries,
 }
 
 /// A command.
@@ -90,22 +101,39 @@ pub struct Failure {
     pub exit: Exit,
     /// Why.
     pub findings: Findings,
+    /// The texts the findings are about.
+    pub sources: SourceMap,
+    /// Whether the findings go to stdout as `{"ok":false,"findings":[…]}`.
+    pub json: bool,
+}
+
+impl Default for Failure {
+    fn default() -> Self {
+        Self { exit: Exit::No, findings: Vec::new(), sources: SourceMap::new(), json: false }
+    }
 }
 
 impl Failure {
     /// One error; the answer is no.
     pub fn no(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { exit: Exit::No, findings: vec![Finding::error(code, message).help(help)] }
+        Self { findings: vec![Finding::error(code, message).help(help)], ..Self::default() }
     }
 
     /// One error of usage, or input that cannot be read.
     pub fn usage(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { exit: Exit::Usage, findings: vec![Finding::error(code, message).help(help)] }
+        Self { exit: Exit::Usage, ..Self::no(code, message, help) }
+    }
+
+    /// The same, as JSON if so asked.
+    #[must_use]
+    pub fn as_json(mut self, json: bool) -> Self {
+        self.json = json;
+        self
     }
 }
 
-/// The whole command line: parses the arguments, runs the command, prints what it has to say.
-pub fn main() -> ExitCode {
+/// The whole command line, with the component libraries a program has: parses the arguments, runs the command, prints what it has to say.
+pub fn main(libraries: Libraries) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -114,15 +142,15 @@ pub fn main() -> ExitCode {
             return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
         }
     };
-    let context = Context { out: Output::new(cli.color) };
+    let context = Context { out: Output::new(cli.color), libraries };
     match cli.command.run(&context) {
         Ok(exit) => exit.into(),
         Err(failure) => {
-            for finding in &failure.findings {
-                context.out.error(format!("error: {} [davit::{}]\n", finding.message, finding.code));
-                if let Some(help) = &finding.help {
-                    context.out.error(format!("  help: {help}\n"));
-                }
+            if failure.json {
+                let findings = to_json(&failure.findings, &failure.sources);
+                context.out.json(&serde_json::json!({ "ok": false, "findings": findings }));
+            } else {
+                context.out.findings(&failure.findings, &failure.sources);
             }
             failure.exit.into()
         }

@@ -3,6 +3,8 @@
 //! A reader that goes away (`davit plan … | head`) is no error of ours: what is left is thrown away and the command's
 //! answer stands.
 
+use crate::diagnostics::{SourceMap, render};
+use crate::model::Finding;
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -100,6 +102,13 @@ impl Output {
     pub fn json_line(&self, value: &impl Serialize) {
         let text = serde_json::to_string(value).expect("views are plain data");
         self.line(text);
+    }
+
+    /// Findings to stderr, each with its place and its help.
+    pub fn findings(&self, findings: &[Finding], sources: &SourceMap) {
+        if !findings.is_empty() {
+            self.error(render(findings, sources, self.stderr_color));
+        }
     }
 
     /// Text to stderr as it is.

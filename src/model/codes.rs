@@ -436,6 +436,21 @@ codes! {
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
     // ---- youbot and standard libraries -----------------------------------------------------------------------------
     // ---- command line ----------------------------------------------------------------------------------------------
+    CLI_BAD_SET = "cli::bad_set", "`--set` gives no parameter a value",
+        "Parameters of the files are given as `--set NAME=VALUE`; the name may have dots, `--set gains.k=2.5`. They \
+         override what the deployment says under `with:`. Without an equals sign there is nothing to give.";
+    CLI_UNWRITABLE = "cli::unwritable", "the output cannot be written",
+        "`-o FILE` names a file that cannot be created or written: the directory is missing, it is a directory itself, or \
+         permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal.";
+    CLI_UNKNOWN_TYPE = "cli::unknown_type", "there is no such component type",
+        "`davit types` was asked for a type that neither the libraries of this program nor the deployment has. `davit types` \
+         without a name lists all of them; types of a deployment are listed with `davit types FILE`.";
+    CLI_UNKNOWN_CONFIGURATION = "cli::unknown_configuration", "the deployment has no such configuration",
+        "`davit plan FILE ID…` plans configurations of the deployment, one after the other. There is none of this name in \
+         the files that the deployment lists under `configurations`. Correct the name; without names, all are planned.";
+    CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
+        "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
+         a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";

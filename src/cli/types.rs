@@ -1,0 +1,188 @@
+//! `davit types`
+
+use super::exit::Exit;
+use super::input::{Input, Parameters};
+use super::output::{Output, Style, Table};
+use super::{Answer, Context, Failure, Run};
+use crate::model::codes::CLI_UNKNOWN_TYPE;
+use crate::model::finding::did_you_mean;
+use crate::model::{Catalogue, ComponentType, Direction, Effect, Tunable};
+use std::path::PathBuf;
+
+/// What component types offer: ports, properties, operations, with types, units, limits and what can be undone.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A deployment file (then: the types it may use), or a type (then: that one in full); without either, all types of
+    /// this program's libraries.
+    #[arg(value_name = "FILE|TYPE")]
+    what: Option<String>,
+    /// With a file: show this type in full.
+    #[arg(value_name = "TYPE")]
+    ty: Option<String>,
+    /// The types of this library of the program.
+    #[arg(long, value_name = "NAME")]
+    library: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    parameters: Parameters,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
+        let is_file =
+            self.what.as_ref().is_some_and(|w| w.contains('/') || w.ends_with(".yaml") || w.ends_with(".yml"));
+        let (catalogue, wanted) = if is_file {
+            let file = PathBuf::from(self.what.unwrap_or_default());
+            let read = Input { file, parameters: self.parameters }.read(context)?;
+            (read.catalogue, self.ty)
+        } else {
+            let catalogue = match &self.library {
+                None => context.libraries.catalogue(),
+                Some(name) => {
+                    let found = context.libraries.iter().find(|l| l.name().as_str() == name);
+                    let Some(library) = found else {
+                        let known: Vec<String> = context.libraries.iter().map(|l| l.name().to_string()).collect();
+                        return Err(Failure::no(
+                            crate::model::codes::DEPLOY_UNKNOWN_LIBRARY,
+                            format!("this program has no component library `{name}`"),
+                            did_you_mean(name, "libraries", known.iter().map(String::as_str)),
+                        ));
+                    };
+                    library.catalogue()
+                }
+            };
+            (catalogue, self.what)
+        };
+        let out = &context.out;
+        match wanted {
+            None if self.json => out.json(&catalogue.iter().collect::<Vec<_>>()),
+            None => list(out, &catalogue),
+            Some(name) => {
+                let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name) else {
+                    return Err(Failure::no(
+                        CLI_UNKNOWN_TYPE,
+                        format!("there is no component type `{name}`"),
+                        did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
+                    ));
+                };
+                if self.json { out.json(ty) } else { one(out, ty) }
+            }
+        }
+        Ok(Exit::Done)
+    }
+}
+
+fn list(out: &Output, catalogue: &Catalogue) {
+    let mut table = Table::new(0);
+    for ty in catalogue.iter() {
+        table.row([out.paint(Style::Name, ty.name), first_sentence(&ty.doc)]);
+    }
+    if table.is_empty() {
+        out.line("no component types");
+    }
+    out.text(table.to_string());
+}
+
+fn first_sentence(doc: &str) -> String {
+    doc.lines().next().unwrap_or_default().split_inclusive(". ").next().unwrap_or_default().trim().to_owned()
+}
+
+fn one(out: &Output, ty: &ComponentType) {
+    out.line(out.paint(Style::Bold, ty.name));
+    if !ty.doc.is_empty() {
+        out.line(&ty.doc);
+    }
+    let mut facts = Vec::new();
+    if ty.actuator {
+        facts.push("moves something (actuator)".to_owned());
+    }
+    for (flag, what) in [
+        (ty.irreversible.configure, "configuring"),
+        (ty.irreversible.stop, "stopping"),
+        (ty.irreversible.destroy, "destroying"),
+    ] {
+        if flag {
+            facts.push(format!("{what} cannot be undone"));
+        }
+    }
+    for (word, types) in [("starts after", &ty.start_after), ("stops before", &ty.stop_before)] {
+        if !types.is_empty() {
+            facts.push(format!("{word} {}", types.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")));
+        }
+    }
+    for fact in facts {
+        out.line(format!("  {fact}"));
+    }
+    for (heading, direction) in [("in-ports", Direction::In), ("out-ports", Direction::Out)] {
+        let mut table = Table::new(2);
+        for (name, port) in ty.ports.iter().filter(|(_, p)| p.direction == direction) {
+            let buffered = if port.buffered { " (buffered)" } else { "" };
+            let unit = port.unit.as_deref().unwrap_or_default();
+            table.row([
+                out.paint(Style::Name, name),
+                format!("{}{buffered}", port.ty),
+                unit.to_owned(),
+                port.doc.clone(),
+            ]);
+        }
+        section(out, heading, &table);
+    }
+    let mut table = Table::new(2);
+    for (name, property) in &ty.properties {
+        let limits = match (property.min, property.max) {
+            (Some(min), Some(max)) => format!("{min} … {max}"),
+            (Some(min), None) => format!("≥ {min}"),
+            (None, Some(max)) => format!("≤ {max}"),
+            (None, None) => String::new(),
+        };
+        let tunable = match property.tunable {
+            Tunable::Always => "always",
+            Tunable::Stopped => "stopped",
+            Tunable::Unconfigured => "unconfigured",
+        };
+        let default = property.default.as_ref().map_or_else(|| "required".to_owned(), |v| format!("= {v}"));
+        let unit = property.unit.as_deref().unwrap_or_default().to_owned();
+        table.row([
+            out.paint(Style::Name, name),
+            property.ty.to_string(),
+            default,
+            unit,
+            limits,
+            tunable.to_owned(),
+            property.doc.clone(),
+        ]);
+    }
+    section(out, "properties", &table);
+    let mut table = Table::new(2);
+    for (name, operation) in &ty.operations {
+        let args: Vec<String> = operation.args.iter().map(ToString::to_string).collect();
+        let returns = operation.returns.as_ref().map_or_else(String::new, |ty| format!(" -> {ty}"));
+        let effect = match &operation.effect {
+            Effect::None => "leaves nothing behind".to_owned(),
+            Effect::Undo(undo) => format!("undone by {undo}"),
+            Effect::Irreversible => "irreversible".to_owned(),
+        };
+        table.row([
+            format!("{}({}){returns}", out.paint(Style::Name, name), args.join(", ")),
+            effect,
+            operation.doc.clone(),
+        ]);
+    }
+    section(out, "operations", &table);
+}
+
+fn section(out: &Output, heading: &str, table: &Table) {
+    if !table.is_empty() {
+        out.line(format!("\n{}", out.paint(Style::Bold, heading)));
+        out.text(table.to_string());
+    }
+}
