@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod cli;
+pub mod configurator;
 pub mod coordinator;
 pub mod diagnostics;
 pub mod draw;

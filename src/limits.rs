@@ -81,3 +81,31 @@ pub const HEARD: usize = 1024;
 /// Operation calls in the inverse of squashed frames. Calls do not cancel like writes do, so they would pile up; with more
 /// than this the oldest frames become a floor instead.
 pub const SQUASHED_CALLS: usize = 256;
+
+/// Requests that may wait for the configurator. A coordinator raises a few per step; hundreds waiting mean that it asks
+/// faster than anything can be done, and the answer *failed* tells it so.
+pub const REQUEST_QUEUE: usize = 256;
+
+/// Requests for safe configurations that may wait beside them: these get in when the queue is full.
+pub const SAFE_QUEUE: usize = 64;
+
+/// Reports of the platform (faults, late returns, confirmations) that may wait for the configurator. When more come at
+/// once, it looks at the whole platform instead.
+pub const PLATFORM_REPORTS: usize = 1024;
+
+/// Commands of the session (views, teardown) that may wait for the configurator.
+pub const CONFIGURATOR_COMMANDS: usize = 32;
+
+/// Blocking platform calls made at the same time where the deployment does not say: enough to hide the latency of slow
+/// components behind each other, few enough for a small board.
+pub const WORKERS: usize = 8;
+
+/// Blocking platform calls made at the same time at most, whatever the deployment says: each takes a thread.
+pub const WORKERS_MOST: usize = 64;
+
+/// Workers that may be stuck in calls a platform never answered, beside those at work.
+pub const WORKERS_GIVEN_UP: usize = 64;
+
+/// How long after its deadline a platform call may answer before its worker is given up: a platform promises "a little
+/// later at most".
+pub const PLATFORM_GRACE: Duration = Duration::from_millis(100);

@@ -434,6 +434,50 @@ codes! {
          squashed together and can no longer be undone one by one. Undo it on the way round, scope it to a state \
          (`config = …`), or give it a group.";
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
+    UNKNOWN_REQUEST = "run::unknown_configuration", "a request names no configuration",
+        "A request was raised whose name is not a configuration of the running deployment. It was answered `ID.failed` and \
+         nothing was done. Correct the name in the coordinator or in the command, or add the configuration to the deployment.";
+    QUEUE_FULL = "run::queue_full", "the configurator's queue is full",
+        "More requests are waiting than the configurator's bounded queue holds. The request was answered *failed* instead of \
+         being dropped silently. A coordinator should wait for an answer before it asks for more.";
+    STEP_FAILED = "run::step_failed", "a step failed",
+        "The platform answered that a step did not happen: it was refused, or the component's own code failed or panicked. \
+         What the request had done before was undone, unless the answer is *broken*. Mend what the message names and ask again.";
+    STEP_TIMEOUT = "run::step_timeout", "a step did not answer in time",
+        "A component did not answer before the step's deadline. What really happened was read back from the platform, and the \
+         request was undone. A component whose call never returns is kept in quarantine: no plan may use it until it returns. \
+         Find out what the component waits for, or raise `limits.step_timeout_s`.";
+    CONFIGURATION_TIMEOUT = "run::timeout", "a configuration was not applied within its time",
+        "The configuration has a `timeout`, and it was over before all steps were done. What had been done was undone. Raise the \
+         timeout, or see in the log which step takes so long.";
+    BROKEN = "run::broken", "the system is neither as before nor as asked for",
+        "An application failed and could not be undone completely (a step failed while undoing, something irreversible had been \
+         done, an outcome could not be settled, or the configuration says `on_failure = \"hold\"`). The finding names exactly what \
+         differs. Until that is recovered every request but a safe one is answered *failed*. Use `davit drift` and `davit recover`.";
+    STILL_BROKEN = "run::still_broken", "the system is broken since an earlier request",
+        "An earlier request left the system neither as before nor as asked for. Plans are made from a known system, so nothing \
+         but safe configurations is applied until the difference is recovered: `davit recover --back`, `--forward`, or a shutdown.";
+    INTERRUPTED = "run::interrupted", "a safe configuration went first",
+        "A configuration marked `safe` was requested while this request was being carried out. No further step of it was issued, \
+         the safe configuration was applied, and what it did not touch was rolled back. Ask again when it is safe to.";
+    OVERTAKEN = "run::overtaken", "a queued request was overtaken by its own undo",
+        "`ID` was still waiting when `ID.undo` of the same requester came: both cancel each other and nothing is done at all. \
+         The first is answered `ID.cancelled`, the second `ID.undone`.";
+    NOT_CONFIRMED = "run::not_confirmed", "a confirmation did not come",
+        "The configuration says `confirm`: after it was applied an event had to come within a time, and it did not. Its frame was \
+         popped and `ID.reverted` raised. Find out why the event did not come, or give it more time.";
+    CONFIGURATOR_PANIC = "run::configurator_panic", "the configurator itself failed",
+        "A defect of the configurator was caught: the request was answered *broken*, and the configurator was started anew with \
+         its picture of the system read back from the platform. Please report it with the log; compare with `davit drift`.";
+    NOTHING_TO_UNDO = "run::nothing_to_undo", "there is no frame to undo",
+        "An undo was asked for while no configuration is in force (or not as many as were to be undone), so there was nothing to \
+         take back and nothing was done. `davit stack` shows the frames in force.";
+    ENDED = "run::ended", "the system is being taken down",
+        "The request came while everything was being taken down, or after the configurator had ended. It was answered instead of \
+         being dropped, and nothing was done. Deploy again before asking for configurations.";
+    QUARANTINED = "run::quarantined", "a component is in quarantine",
+        "An earlier call of this component never returned, so nobody knows what it is doing. No plan may use it until the call \
+         returns and the platform has cleaned it up. Restart the component or the platform it runs on, or leave it out.";
     // ---- youbot and standard libraries -----------------------------------------------------------------------------
     // ---- command line ----------------------------------------------------------------------------------------------
     CLI_BAD_SET = "cli::bad_set", "`--set` gives no parameter a value",

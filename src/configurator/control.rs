@@ -1,0 +1,123 @@
+//! What the session asks of the configurator beside requests: how things stand, and to take everything down.
+
+use super::request::{Reason, Request, Residual};
+use crate::model::{ComponentName, ConfigId, RequestId, Snapshot, Step};
+use crate::stack::Requester;
+use crate::time::{Sender, Time};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// A frame as it is shown.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrameView {
+    /// The configuration.
+    pub configuration: ConfigId,
+    /// Who asked.
+    pub by: Requester,
+    /// When it was applied.
+    pub at: Time,
+    /// Undo does not pass it.
+    pub floor: bool,
+    /// How many frames were squashed into it; 1 for a plain frame.
+    pub parts: usize,
+}
+
+/// What is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Busy {
+    /// The request.
+    pub request: RequestId,
+    /// Since when.
+    pub since: Time,
+}
+
+/// How things stand, at one moment.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Changes whenever anything below does; equal numbers mean an equal view.
+    pub revision: u64,
+    /// The system as the configurator knows it, if it was asked for.
+    pub system: Option<Arc<Snapshot>>,
+    /// Frames in force, newest last.
+    pub stack: Vec<FrameView>,
+    /// What is under way.
+    pub busy: Option<Busy>,
+    /// Requests that wait.
+    pub waiting: usize,
+    /// Why the system is broken, if it is.
+    pub broken: Option<Arc<Residual>>,
+    /// Components whose call has not returned.
+    pub quarantined: Vec<ComponentName>,
+}
+
+/// How a teardown ended.
+#[derive(Debug, Clone, Default)]
+pub struct TakenDown {
+    /// Configurations whose frames were popped, in that order.
+    pub popped: Vec<ConfigId>,
+    /// Safe configurations that were applied first.
+    pub safe: Vec<ConfigId>,
+    /// What had to be forced: steps that belong to no frame's undo, done.
+    pub forced: Vec<Step>,
+    /// What went wrong on the way.
+    pub troubles: Vec<Reason>,
+    /// What is still there.
+    pub left: Snapshot,
+    /// Components whose call has not returned.
+    pub quarantined: Vec<ComponentName>,
+    /// Whether `left` was read from the platform (else the platform did not answer).
+    pub observed: bool,
+    /// Whether it was done before its deadline.
+    pub in_time: bool,
+}
+
+impl TakenDown {
+    /// Whether nothing is left.
+    pub fn is_clean(&self) -> bool {
+        self.left.is_empty() && self.quarantined.is_empty()
+    }
+}
+
+/// The difference between the picture and the platform.
+#[derive(Debug, Clone, Default)]
+pub struct Drift {
+    /// Steps from the system as it should be to the system as it is.
+    pub steps: Vec<Step>,
+    /// Components that are faulted and should not be.
+    pub faulted: Vec<ComponentName>,
+    /// Whether the platform answered.
+    pub observed: bool,
+}
+
+/// How a broken system is recovered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// To the system before the interrupted application.
+    Back,
+    /// The system as it is becomes the one that should be; the stack is discarded. For when a person has decided that
+    /// what is there is right.
+    Accept,
+}
+
+/// A command, with where its answer goes.
+pub(super) enum Command {
+    View { system: bool, reply: Sender<Arc<View>> },
+    Drift { reply: Sender<Drift> },
+    Recover { direction: Direction, reply: Sender<Result<(), Arc<Residual>>> },
+    TakeDown { forced: bool, deadline: Time, reply: Sender<TakenDown> },
+    DiscardStack,
+    Stop,
+}
+
+impl Command {
+    /// Whether what is under way gives way to it.
+    pub fn is_urgent(&self) -> bool {
+        matches!(self, Self::TakeDown { .. } | Self::Stop)
+    }
+}
+
+impl Busy {
+    pub(super) fn of(request: &Request, since: Time) -> Self {
+        Self { request: request.id, since }
+    }
+}

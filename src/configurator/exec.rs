@@ -1,0 +1,446 @@
+//! Carrying out steps: immediate ones in this thread, blocking ones on workers, independent ones side by side; every
+//! outcome settled before it is believed.
+
+use super::engine::Engine;
+use super::log::{Progress, StepEnd, StepName, What};
+use super::pool::{self, Call, Reply, Ticket};
+use super::request::Reason;
+use super::work::{Item, Order};
+use crate::limits;
+use crate::model::{ComponentName, Finding, RunState, Step};
+use crate::platform::{Cause, Execution, Outcome};
+use crate::system::{View as _, Violation, step};
+use crate::time::Time;
+use smallvec::SmallVec;
+
+/// A call that is out.
+pub(super) struct Flight {
+    ticket: Ticket,
+    item: u32,
+    started: Time,
+    deadline: Time,
+}
+
+/// How a carrying out stands.
+pub(super) struct Run {
+    /// It takes something back: failures do not stop it.
+    pub undoing: bool,
+    /// It belongs to a safe configuration.
+    pub safe: bool,
+    /// It gives way to safe configurations.
+    pub gives_way: bool,
+    /// No step's deadline is later.
+    pub until: Time,
+    /// Items that were done, in the order they were.
+    pub done: Vec<u32>,
+    /// Items that are over, done or not.
+    pub over: Vec<bool>,
+    pub failures: Vec<(u32, Reason)>,
+    /// Components that steps of this made faulted, with the state they were in.
+    pub faulted: Vec<(ComponentName, RunState)>,
+    /// Items of which nobody knows.
+    pub unsettled: Vec<u32>,
+    /// Any outcome was unknown at first.
+    pub doubted: bool,
+    flights: Vec<Flight>,
+    /// Unknown outcomes that wait to be settled.
+    unread: Vec<(u32, Cause)>,
+}
+
+/// How a carrying out came to an end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    /// Every item is over.
+    All,
+    /// An item failed; nothing is out any more.
+    Failed,
+    /// It gave way; calls may be out.
+    GaveWay,
+}
+
+impl Run {
+    pub fn new(work: &[Item], undoing: bool, gives_way: bool, until: Time) -> Self {
+        Self {
+            undoing,
+            safe: false,
+            gives_way,
+            until,
+            done: Vec::with_capacity(work.len()),
+            over: vec![false; work.len()],
+            failures: Vec::new(),
+            faulted: Vec::new(),
+            unsettled: Vec::new(),
+            doubted: false,
+            flights: Vec::new(),
+            unread: Vec::new(),
+        }
+    }
+
+    fn stops(&self) -> bool {
+        !self.undoing && !(self.failures.is_empty() && self.unsettled.is_empty())
+    }
+}
+
+impl Engine {
+    /// Carries out what of `work` is not over.
+    pub(super) fn carry_out(&mut self, work: &[Item], run: &mut Run) -> End {
+        let items = work;
+        // As long as every step is immediate the list's own order serves, and nothing needs to be counted.
+        let mut at = 0;
+        while at < items.len() {
+            if run.over[at] {
+                at += 1;
+                continue;
+            }
+            if run.gives_way && self.urgent() {
+                return End::GaveWay;
+            }
+            if self.platform.execution(&items[at].step) != Execution::Immediate {
+                break;
+            }
+            self.inline(work, at as u32, run);
+            if !run.unread.is_empty() && !self.settle_unread(work, run) {
+                return End::GaveWay;
+            }
+            if run.stops() {
+                return End::Failed;
+            }
+            at += 1;
+            if at % 64 == 0 {
+                self.glance();
+            }
+        }
+        if at == items.len() {
+            return End::All;
+        }
+        self.side_by_side(work, run, at)
+    }
+
+    /// Carries out `items[from..]` with blocking steps among them.
+    fn side_by_side(&mut self, work: &[Item], run: &mut Run, from: usize) -> End {
+        let platform = self.platform.clone();
+        let immediate = |step: &Step| platform.execution(step) == Execution::Immediate;
+        let mut order = Order::new(work, from, &immediate);
+        loop {
+            if run.gives_way && self.urgent() {
+                return End::GaveWay;
+            }
+            if run.stops() {
+                return if self.collect(work, run) { End::Failed } else { End::GaveWay };
+            }
+            if let Some(i) = order.next_immediate() {
+                self.inline(work, i, run);
+                if !run.unread.is_empty() && !self.settle_unread(work, run) {
+                    return End::GaveWay;
+                }
+                order.ended(i);
+                continue;
+            }
+            if self.pool.has_room()
+                && let Some(i) = order.next_blocking()
+            {
+                if let Some(reason) = self.forbidden(&work[i as usize].step, run) {
+                    run.over[i as usize] = true;
+                    run.failures.push((i, reason));
+                    order.ended(i);
+                } else {
+                    self.launch(work, i, run);
+                }
+                continue;
+            }
+            if run.flights.is_empty() {
+                return if order.is_over() { End::All } else { End::Failed };
+            }
+            self.await_flight(run);
+            let landed = self.landed(run);
+            let over: SmallVec<[u32; 8]> = landed.iter().map(|(i, _)| *i).collect();
+            for (i, outcome) in landed {
+                self.conclude(work, i, outcome, run);
+            }
+            if !self.settle_unread(work, run) {
+                return End::GaveWay;
+            }
+            over.into_iter().for_each(|i| order.ended(i));
+        }
+    }
+
+    /// Waits for the calls that are out and settles what is unknown. False: it gave way.
+    pub(super) fn collect(&mut self, work: &[Item], run: &mut Run) -> bool {
+        loop {
+            if !self.settle_unread(work, run) {
+                return false;
+            }
+            if run.flights.is_empty() {
+                return true;
+            }
+            if run.gives_way && self.urgent() {
+                return false;
+            }
+            self.await_flight(run);
+            for (i, outcome) in self.landed(run) {
+                self.conclude(work, i, outcome, run);
+            }
+        }
+    }
+
+    /// Why `step` must not be given to the platform now, if so: its precondition on the live model, and the time.
+    fn forbidden(&mut self, step: &Step, run: &Run) -> Option<Reason> {
+        if run.until != Time::NEVER && self.clock.now() >= run.until {
+            return Some(Reason::Timeout(self.allowed));
+        }
+        self.false_precondition(step)
+    }
+
+    fn false_precondition(&self, step: &Step) -> Option<Reason> {
+        let violations = step::precondition(step, &self.system);
+        if violations.is_empty() {
+            return None;
+        }
+        let finding = |violation: &Violation| {
+            let finding = Finding::error(violation.code(), format!("`{step}`: {violation}"));
+            match violation.help(&self.system) {
+                Some(help) => finding.help(help),
+                None => finding,
+            }
+        };
+        Some(Reason::Refused(violations.iter().map(finding).collect()))
+    }
+
+    fn inline(&mut self, work: &[Item], i: u32, run: &mut Run) {
+        let step = &work[i as usize].step;
+        if let Some(reason) = self.forbidden(step, run) {
+            run.over[i as usize] = true;
+            run.failures.push((i, reason));
+            return;
+        }
+        let started = self.clock.now();
+        self.tell_started(step);
+        let deadline = (started + self.limits.step_timeout).min(run.until);
+        let outcome = pool::execute(&*self.platform, step, deadline);
+        let took = self.clock.now().since(started);
+        self.tell_ended(step, &outcome, took, run.undoing);
+        self.conclude(work, i, outcome, run);
+    }
+
+    fn launch(&mut self, work: &[Item], i: u32, run: &mut Run) {
+        let step = &work[i as usize].step;
+        let started = self.clock.now();
+        self.tell_started(step);
+        let deadline = (started + self.limits.step_timeout).min(run.until);
+        let ticket = self.pool.start(Call::Execute(step.clone()), deadline);
+        run.flights.push(Flight { ticket, item: i, started, deadline });
+        self.names.push((ticket, StepName::of(step), run.undoing));
+    }
+
+    /// Waits until a call is back or given up, or something urgent came.
+    fn await_flight(&mut self, run: &Run) {
+        while !run.flights.iter().any(|flight| self.has_reply(flight.ticket)) {
+            if run.gives_way && self.urgent() {
+                return;
+            }
+            let until = run.flights.iter().map(|flight| flight.deadline).min().unwrap_or(Time::NEVER);
+            let until = until + limits::PLATFORM_GRACE;
+            if self.clock.now() >= until {
+                return;
+            }
+            self.pump(until);
+        }
+    }
+
+    /// Takes the calls that are back, and those given up, off the list.
+    fn landed(&mut self, run: &mut Run) -> Vec<(u32, Outcome)> {
+        let mut landed = Vec::new();
+        let now = self.clock.now();
+        let mut at = 0;
+        while at < run.flights.len() {
+            let flight = &run.flights[at];
+            let outcome = match self.take_reply(flight.ticket) {
+                Some(Reply::Executed(outcome)) => outcome,
+                Some(_) => Outcome::Unknown(Cause::Lost("the answer was to another question".to_owned())),
+                None if now >= flight.deadline + limits::PLATFORM_GRACE => {
+                    self.give_up(flight.ticket);
+                    Outcome::Unknown(Cause::Timeout)
+                }
+                None => {
+                    at += 1;
+                    continue;
+                }
+            };
+            let flight = run.flights.remove(at);
+            if let Some(place) = self.names.iter().position(|(ticket, ..)| *ticket == flight.ticket) {
+                let (_, step, undoing) = self.names.swap_remove(place);
+                let took = now.since(flight.started);
+                self.tell(step, StepEnd::from(&outcome), took, undoing);
+            }
+            landed.push((flight.item, outcome));
+        }
+        landed
+    }
+
+    /// Draws the conclusion from an outcome; an unknown one waits to be settled.
+    fn conclude(&mut self, work: &[Item], i: u32, outcome: Outcome, run: &mut Run) {
+        let step = &work[i as usize].step;
+        match outcome {
+            Outcome::Done(_) => self.happened(work, i, run),
+            Outcome::NotDone(cause) => self.did_not_happen(step, i, cause, run),
+            Outcome::Unknown(cause) => {
+                run.doubted = true;
+                run.unread.push((i, cause));
+            }
+        }
+    }
+
+    fn happened(&mut self, work: &[Item], i: u32, run: &mut Run) {
+        let step = &work[i as usize].step;
+        run.over[i as usize] = true;
+        // While the call was out, its component may have failed by itself; then the model's precondition is gone.
+        if let Some(reason) = self.false_precondition(step) {
+            run.doubted = true;
+            run.failures.push((i, reason));
+            return;
+        }
+        step::effect(step, &mut self.system);
+        run.done.push(i);
+    }
+
+    fn did_not_happen(&mut self, step: &Step, i: u32, cause: Cause, run: &mut Run) {
+        run.over[i as usize] = true;
+        if matches!(cause, Cause::Panicked(_)) {
+            self.made_faulted(step.component(), run);
+        }
+        run.failures.push((i, Reason::Step { step: step.clone(), cause }));
+    }
+
+    fn made_faulted(&mut self, component: ComponentName, run: &mut Run) {
+        if let Some(node) = self.system.component(component) {
+            run.faulted.push((component, node.state));
+            self.system.set_state(component, RunState::Faulted);
+        }
+    }
+
+    /// Settles unknown outcomes by reading the platform back. False: it gave way (and some are still unknown).
+    fn settle_unread(&mut self, work: &[Item], run: &mut Run) -> bool {
+        while let Some((i, cause)) = run.unread.pop() {
+            let step = &work[i as usize].step;
+            self.note_quarantine();
+            match self.settle(step, run) {
+                Settled::Happened => self.happened(work, i, run),
+                Settled::DidNot => self.did_not_happen(step, i, cause, run),
+                Settled::Nobody => {
+                    run.over[i as usize] = true;
+                    run.unsettled.push(i);
+                }
+                Settled::GaveWay => {
+                    run.unread.push((i, cause));
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Reads back whether `step`, which the model does not have yet, happened.
+    fn settle(&mut self, step: &Step, run: &mut Run) -> Settled {
+        let component = step.component();
+        let call = match step {
+            Step::State { .. } | Step::Create { .. } | Step::Destroy { .. } | Step::PropertySet { .. } => {
+                Call::ObserveComponent(component)
+            }
+            Step::Connect { .. } | Step::Disconnect { .. } | Step::PortWrite { .. } => Call::Observe,
+            // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known.
+            Step::Operation(call) => {
+                let leaves_nothing = self
+                    .system
+                    .component(component)
+                    .and_then(|node| node.ty.operations.get(&call.operation.member))
+                    .is_some_and(|operation| operation.effect == crate::model::Effect::None);
+                return if leaves_nothing { Settled::DidNot } else { Settled::Nobody };
+            }
+        };
+        let reply = match self.ask(call, run.gives_way) {
+            Ok(reply) => reply,
+            Err(GaveWay) => return Settled::GaveWay,
+        };
+        let is = match reply {
+            Some(Reply::ObservedComponent(Ok(seen))) => match step {
+                Step::State { transition, .. } => match seen {
+                    Some(seen) if seen.state == transition.target() => Some(true),
+                    Some(seen) if seen.state == RunState::Faulted => {
+                        self.made_faulted(component, run);
+                        Some(false)
+                    }
+                    Some(seen) => {
+                        (self.system.component(component).map(|node| node.state) == Some(seen.state)).then_some(false)
+                    }
+                    None => None,
+                },
+                Step::Create { ty, .. } => Some(seen.is_some_and(|seen| seen.ty == *ty)),
+                Step::Destroy { .. } => Some(seen.is_none()),
+                Step::PropertySet { property, value } => {
+                    seen.and_then(|seen| seen.properties.get(&property.member).map(|now| now == value))
+                }
+                _ => None,
+            },
+            Some(Reply::Observed(Ok(seen))) => match step {
+                Step::Connect { from, to, policy } => Some(seen.connections.get(&(*from, *to)) == Some(policy)),
+                Step::Disconnect { from, to } => Some(!seen.connections.contains_key(&(*from, *to))),
+                Step::PortWrite { port, value } => Some(seen.ports.get(port) == value.as_ref()),
+                _ => None,
+            },
+            _ => None,
+        };
+        match is {
+            Some(true) => Settled::Happened,
+            Some(false) => Settled::DidNot,
+            None => Settled::Nobody,
+        }
+    }
+
+    /// Asks the platform something on a worker. None: no answer.
+    pub(super) fn ask(&mut self, call: Call, gives_way: bool) -> Result<Option<Reply>, GaveWay> {
+        let deadline = self.clock.now() + self.limits.step_timeout;
+        let ticket = self.pool.start(call, deadline);
+        let until = deadline + limits::PLATFORM_GRACE;
+        loop {
+            if let Some(reply) = self.take_reply(ticket) {
+                return Ok(Some(reply));
+            }
+            if gives_way && self.urgent() {
+                self.give_up(ticket);
+                return Err(GaveWay);
+            }
+            if self.clock.now() >= until {
+                self.give_up(ticket);
+                return Ok(None);
+            }
+            self.pump(until);
+        }
+    }
+
+    fn tell_started(&self, step: &Step) {
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Started(StepName::of(step)));
+        }
+    }
+
+    fn tell_ended(&self, step: &Step, outcome: &Outcome, took: std::time::Duration, undoing: bool) {
+        self.tell(StepName::of(step), StepEnd::from(outcome), took, undoing);
+    }
+
+    fn tell(&self, step: StepName, end: StepEnd, took: std::time::Duration, undoing: bool) {
+        self.log.write(self.clock.now(), What::Step { step, end, took, undoing });
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Ended { step, end, took, undoing });
+        }
+    }
+}
+
+enum Settled {
+    Happened,
+    DidNot,
+    Nobody,
+    GaveWay,
+}
+
+/// Something urgent came while an answer was waited for.
+pub(super) struct GaveWay;

@@ -1,0 +1,114 @@
+//! The configurator's one inbox: requests, replies of workers, reports of the platform.
+//!
+//! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
+//! gets in when the queue of requests is full, and the reply of a worker always does.
+
+use super::pool::{Reply, Ticket};
+use super::request::Batch;
+use crate::limits;
+use crate::model::EventName;
+use crate::platform::PlatformEvent;
+use crate::time::{Clock, Receiver, Sender};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// What comes in.
+pub(super) enum Mail {
+    Batch(Batch),
+    Reply(Ticket, Reply),
+    /// A component became faulted, or came back.
+    Platform(PlatformEvent),
+    /// An event that some configuration waits for as its confirmation.
+    Event(EventName),
+    /// To be done between requests, in the configurator's own thread.
+    Command(super::control::Command),
+}
+
+#[derive(Default)]
+pub(super) struct Counts {
+    /// Requests that have not begun, safe ones apart.
+    pub requests: AtomicUsize,
+    /// Safe requests that have not begun.
+    pub safe: AtomicUsize,
+    reports: AtomicUsize,
+    commands: AtomicUsize,
+    /// Reports did not fit: the platform must be looked at as a whole.
+    pub reports_lost: AtomicBool,
+}
+
+/// The end mail is put in at.
+#[derive(Clone)]
+pub(super) struct Post {
+    sender: Sender<Mail>,
+    pub counts: Arc<Counts>,
+}
+
+pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
+    let room = limits::REQUEST_QUEUE
+        + limits::SAFE_QUEUE
+        + limits::PLATFORM_REPORTS
+        + limits::WORKERS_MOST
+        + limits::WORKERS_GIVEN_UP
+        + limits::CONFIGURATOR_COMMANDS;
+    let (sender, receiver) = clock.channel(room);
+    (Post { sender, counts: Arc::default() }, receiver)
+}
+
+impl Counts {
+    /// A report was taken out: its room is free again.
+    pub fn report_taken(&self) {
+        self.reports.fetch_sub(1, Ordering::AcqRel);
+    }
+
+    /// A command was taken out: its room is free again.
+    pub fn command_taken(&self) {
+        self.commands.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+fn reserve(count: &AtomicUsize, wanted: usize, bound: usize) -> bool {
+    count.fetch_update(Ordering::AcqRel, Ordering::Acquire, |n| (n + wanted <= bound).then_some(n + wanted)).is_ok()
+}
+
+impl Post {
+    /// Puts a batch in; `safe` of its requests ask for safe configurations. Gives it back when there is no room.
+    pub fn batch(&self, batch: Batch, safe: usize) -> Result<(), Batch> {
+        let plain = batch.requests.len() - safe;
+        if plain > 0 && !reserve(&self.counts.requests, plain, limits::REQUEST_QUEUE) {
+            return Err(batch);
+        }
+        if safe > 0 && !reserve(&self.counts.safe, safe, limits::SAFE_QUEUE) {
+            self.counts.requests.fetch_sub(plain, Ordering::AcqRel);
+            return Err(batch);
+        }
+        self.sender.try_send(Mail::Batch(batch)).map_err(|refused| {
+            self.counts.requests.fetch_sub(plain, Ordering::AcqRel);
+            self.counts.safe.fetch_sub(safe, Ordering::AcqRel);
+            match refused {
+                crate::time::TrySendError::Full(Mail::Batch(batch))
+                | crate::time::TrySendError::Closed(Mail::Batch(batch)) => batch,
+                _ => Batch::default(),
+            }
+        })
+    }
+
+    /// Puts a report or an event in.
+    pub fn report(&self, mail: Mail) {
+        if !reserve(&self.counts.reports, 1, limits::PLATFORM_REPORTS) || self.sender.try_send(mail).is_err() {
+            // There is much to read: whoever reads it looks at everything then.
+            self.counts.reports_lost.store(true, Ordering::Release);
+        }
+    }
+
+    /// Puts a command in; answers whether there was room.
+    pub fn command(&self, command: super::control::Command) -> bool {
+        reserve(&self.counts.commands, 1, limits::CONFIGURATOR_COMMANDS)
+            && self.sender.try_send(Mail::Command(command)).is_ok()
+    }
+
+    /// Puts a worker's reply in: there is room for every call that is out. When the configurator has ended, nobody
+    /// wants it.
+    pub fn send(&self, mail: Mail) {
+        let _ = self.sender.try_send(mail);
+    }
+}

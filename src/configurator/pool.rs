@@ -1,0 +1,127 @@
+//! The workers that make blocking calls to the platform, so that the configurator's own thread never waits for a
+//! component.
+//!
+//! A worker is given one call at a time and reports its end to the configurator's inbox. A platform promises to answer
+//! by the deadline; a worker whose call is not back a while after it is given up and replaced, and its late report is
+//! told apart by its ticket.
+
+use super::inbox::{Mail, Post};
+use crate::limits;
+use crate::model::{ComponentName, ComponentSnapshot, Snapshot, Step};
+use crate::platform::{Cause, ObserveError, Outcome, Platform};
+use crate::time::{Clock, Receiver, Sender, Time};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+/// A call of the platform, by its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Ticket(pub u64);
+
+/// What a worker is to call.
+pub(super) enum Call {
+    Execute(Step),
+    Observe,
+    ObserveComponent(ComponentName),
+}
+
+/// What came of it.
+pub(super) enum Reply {
+    Executed(Outcome),
+    Observed(Result<Snapshot, ObserveError>),
+    ObservedComponent(Result<Option<ComponentSnapshot>, ObserveError>),
+}
+
+struct Job {
+    ticket: Ticket,
+    call: Call,
+    deadline: Time,
+}
+
+pub(super) struct Pool {
+    clock: Clock,
+    platform: Arc<dyn Platform>,
+    post: Post,
+    jobs: (Sender<Job>, Receiver<Job>),
+    /// Workers that wait for a job or are at one, not counting those given up.
+    workers: usize,
+    busy: usize,
+    bound: usize,
+    next: u64,
+}
+
+/// Calls `platform` and survives its panic: whether the step happened is then unknown.
+pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time) -> Outcome {
+    catch_unwind(AssertUnwindSafe(|| platform.execute(step, deadline))).unwrap_or_else(|payload| {
+        Outcome::Unknown(Cause::Lost(format!("the platform panicked: {}", crate::time::clock::panic_text(&*payload))))
+    })
+}
+
+fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
+    let lost = || ObserveError::Lost("the platform panicked".to_owned());
+    match call {
+        Call::Execute(step) => Reply::Executed(execute(platform, &step, deadline)),
+        Call::Observe => Reply::Observed(
+            catch_unwind(AssertUnwindSafe(|| platform.observe(deadline))).unwrap_or_else(|_| Err(lost())),
+        ),
+        Call::ObserveComponent(name) => Reply::ObservedComponent(
+            catch_unwind(AssertUnwindSafe(|| platform.observe_component(name, deadline)))
+                .unwrap_or_else(|_| Err(lost())),
+        ),
+    }
+}
+
+impl Pool {
+    pub fn new(clock: Clock, platform: Arc<dyn Platform>, post: Post, bound: usize) -> Self {
+        let jobs = clock.channel(bound.max(1) + limits::WORKERS_GIVEN_UP);
+        Self { clock, platform, post, jobs, workers: 0, busy: 0, bound: bound.max(1), next: 0 }
+    }
+
+    /// Whether a worker is free (or can be had).
+    pub fn has_room(&self) -> bool {
+        self.busy < self.bound
+    }
+
+    /// Hands `call` to a worker.
+    pub fn start(&mut self, call: Call, deadline: Time) -> Ticket {
+        if self.busy >= self.workers {
+            self.hire();
+        }
+        self.next += 1;
+        let ticket = Ticket(self.next);
+        self.busy += 1;
+        // There is room: at most `bound` calls are out at once.
+        if self.jobs.0.try_send(Job { ticket, call, deadline }).is_err() {
+            self.post.send(Mail::Reply(ticket, Reply::Executed(Outcome::NotDone(Cause::Lost("no worker".to_owned())))));
+        }
+        ticket
+    }
+
+    /// The call is back.
+    pub fn ended(&mut self) {
+        self.busy = self.busy.saturating_sub(1);
+    }
+
+    /// The call is not back long after its deadline: its worker is given up.
+    pub fn given_up(&mut self) {
+        self.busy = self.busy.saturating_sub(1);
+        self.workers = self.workers.saturating_sub(1);
+    }
+
+    /// A call that was given up is back after all, and its worker with it.
+    pub fn came_back(&mut self) {
+        self.workers += 1;
+    }
+
+    fn hire(&mut self) {
+        let (jobs, post, platform) = (self.jobs.1.clone(), self.post.clone(), self.platform.clone());
+        let worker = move || {
+            while let Ok(Job { ticket, call, deadline }) = jobs.recv() {
+                post.send(Mail::Reply(ticket, perform(&*platform, call, deadline)));
+            }
+        };
+        // Without a thread the job waits for a worker that comes back; its deadline bounds that.
+        if self.clock.try_spawn("configurator: worker", worker).is_ok() {
+            self.workers += 1;
+        }
+    }
+}
