@@ -112,7 +112,7 @@ return state {
     trans { src = "initial",   tgt = "unsync" },
     trans { src = "unsync",    tgt = "sync",      events = { "e_qos_ok" } },
     trans { src = "sync",      tgt = "unsync",    events = { "e_link_lost" } },
-    trans { src = "sync",      tgt = "soft_stop", events = { "e_force_spike" } },
+    trans { src = ".sync.copying", tgt = "soft_stop", events = { "e_force_spike" } },
     trans { src = "soft_stop", tgt = "unsync",    events = { "e_reset" } },
   },
 

@@ -1,6 +1,7 @@
 //! One robot of the coupling: its numbers, its mechanics, and the components that control it.
 
 pub mod base;
+pub mod components;
 pub mod drives;
 pub mod dynamics;
 pub mod hand;
@@ -13,3 +14,5 @@ pub mod plant;
 pub mod rigid_body;
 pub mod robot;
 pub mod watch;
+
+pub use components::library;

@@ -1,0 +1,305 @@
+//! `youbot.Driver`: the robot's driver, with the robot itself simulated behind it.
+
+use super::aged;
+use super::samples::{DriverState, JointState, MotorStates, Odometry, Twist, stamp};
+use crate::libraries::youbot::drives::{DriveParameters, Drives, Happening, Mode};
+use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
+use crate::libraries::youbot::plant::ArmPlant;
+use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
+use crate::model::{EventName, Tunable};
+use crate::runtime::{Answer, Builder, Component, Context, EventOut, In, Out, Prop, Ticket};
+use nalgebra::Vector3;
+
+/// Falling by more than this when the drives go off is dropping the arm, in m.
+const DROP: f64 = 0.02;
+/// Heating per current squared and time constant of a motor, °C/A² and s (assumed).
+const HEATING: f64 = 1.5;
+const HEAT_TIME: f64 = 120.0;
+const AMBIENT: f64 = 25.0;
+
+/// Faults that `comm_fault` injects: the property's value, the event, the flag.
+const FAULTS: [(&str, &str, i64); 5] = [
+    ("overcurrent", "e_OVERCURRENT", 0x01),
+    ("overtemp", "e_OVERTEMP", 0x04),
+    ("ec_timeout", "e_EC_TIMEOUT", 0x40),
+    ("encoder", "e_ENCODER_ERR", 0x20),
+    ("emergency", "e_EMERGENCY_STOP", 0x80),
+];
+
+struct Events {
+    soft_limit: EventName,
+    soft_limit_exit: EventName,
+    command_watchdog: EventName,
+    base_watchdog: EventName,
+    calibrated: EventName,
+    calibration_failed: EventName,
+    arrived: EventName,
+    dropped: EventName,
+    emergency: EventName,
+    faults: [EventName; FAULTS.len()],
+}
+
+/// The component.
+pub struct Driver {
+    effort: In<J5>,
+    cmd_twist: In<Twist>,
+    gripper: In<i32>,
+    ext_force: In<Vector3<f64>>,
+    jointstate: Out<JointState>,
+    odometry: Out<Odometry>,
+    motor_states: Out<MotorStates>,
+    driver_state: Out<DriverState>,
+    control_mode: Out<u8>,
+    events: EventOut,
+    tau_max: Prop<J5>,
+    q_start: Prop<J5>,
+    cmd_timeout: Prop<f64>,
+    base_timeout: Prop<f64>,
+    soft_limit: Prop<f64>,
+    scale_end: Prop<f64>,
+    friction_scale: Prop<f64>,
+    mass_scale: Prop<f64>,
+    comm_fault: Prop<String>,
+    ifname: Prop<String>,
+    names: Events,
+    drives: Drives,
+    running: bool,
+    motors: MotorStates,
+    bus: DriverState,
+    task: Option<Ticket>,
+}
+
+impl Component for Driver {
+    fn new(b: &mut Builder<Self>) -> Self {
+        b.describe(
+            "The youBot's driver, with arm and base simulated behind it (rigid-body dynamics, friction, stops, base lag). \
+             Drives start off; the arm then rests on its stops or sinks onto them.",
+        )
+        .actuator()
+        .on_configure(|c, _| {
+            let model = ArmModel::youbot(GRIPPER.mass, c.mass_scale.get());
+            c.drives = Drives::new(ArmPlant::new(model, c.q_start.get()));
+            c.motors = MotorStates { temp: [AMBIENT; JOINTS], ..MotorStates::default() };
+            c.bus = DriverState::default();
+            if c.ifname.get_ref().is_empty() {
+                return Err("no network interface is named (ifname)".into());
+            }
+            Ok(())
+        })
+        .on_start(|c, _| {
+            c.running = true;
+            Ok(())
+        })
+        .on_stop(|c, _| {
+            c.running = false;
+            c.task = None;
+            if c.drives.switch_off() > DROP {
+                c.events.raise(c.names.dropped);
+            }
+            Ok(())
+        });
+        b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
+            "setControlMode",
+            |c, _, (mode,): (u8,)| match Mode::from_number(mode) {
+                Some(mode) => c.drives.set_mode(mode).map_or_else(Answer::failed, Answer::Done),
+                None => Answer::failed(format!("no control mode {mode}: 0, 1 or 6")),
+            },
+        );
+        b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds.")
+            .no_effect()
+            .operation("start_calibration", |c, cx, (): ()| c.begin(cx, Drives::calibrate));
+        b.doc("Moves the arm from its stops to the working pose and holds it there. Takes seconds.")
+            .undone_by("fold")
+            .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
+        b.doc("Moves the arm onto its stops. Takes seconds.")
+            .undone_by("unfold")
+            .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
+        b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
+            c.motors.error_flags = 0;
+            Answer::Done(())
+        });
+        b.doc("The drives hold where they are, whatever is commanded; raises e_EMERGENCY_STOP.").no_effect().operation(
+            "emergency_stop",
+            |c, _, (): ()| {
+                c.task = None;
+                c.drives.hold();
+                c.events.raise(c.names.emergency);
+                Answer::Done(())
+            },
+        );
+        b.doc("Whether torques are passed on also near the joints' limits.").operation(
+            "disable_jntlim_safety",
+            |c, _, (off,): (bool,)| {
+                c.drives.limit_safety = !off;
+                Answer::Done(())
+            },
+        );
+        let p = DriveParameters::default();
+        Self {
+            effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
+            cmd_twist: b.doc("Motion of the base, in its frame.").input("cmd_twist"),
+            gripper: b.doc("1 opens, 0 closes the gripper.").input("gripper_cmd"),
+            ext_force: b.doc("What pushes the tool in the simulation, in the world.").unit("N").input("ext_force"),
+            jointstate: b.doc("What the joints measure.").output("jointstate"),
+            odometry: b.doc("Where the base is.").output("odometry"),
+            motor_states: b.doc("How the motors are.").output("motor_states"),
+            driver_state: b.doc("How the field bus is.").output("driver_state"),
+            control_mode: b.doc("What the drives do: 0, 1 or 6.").output("control_mode"),
+            events: b.doc("Limits, watchdogs, errors.").event_output("events"),
+            tau_max: b
+                .doc("Largest torques.")
+                .unit("N m")
+                .range(0.0..=20.0)
+                .property("tau_max", J5::from(TORQUE_LIMIT)),
+            q_start: b
+                .doc("Where the arm is when the simulation begins, rad from candle.")
+                .unit("rad")
+                .range(-3.0..=3.0)
+                .tunable(Tunable::Unconfigured)
+                .property("q_start", radians(PARK_POSE_DEG)),
+            cmd_timeout: b
+                .doc("Without a torque command for so long the drives hold by themselves.")
+                .unit("s")
+                .range(0.001..=10.0)
+                .property("cmd_timeout", p.cmd_timeout),
+            base_timeout: b
+                .doc("Without a twist for so long the base stands.")
+                .unit("s")
+                .range(0.001..=10.0)
+                .property("base_timeout", p.base_timeout),
+            soft_limit: b
+                .doc("Share of a joint's range from which outward torque is reduced.")
+                .range(0.1..=1.0)
+                .property("soft_limit", p.soft_limit),
+            scale_end: b
+                .doc("Share of a joint's range at which no outward torque is left.")
+                .range(0.1..=1.0)
+                .property("scale_end", p.scale_end),
+            friction_scale: b
+                .doc("The simulated friction, as a multiple of the nominal one.")
+                .range(0.0..=10.0)
+                .property("friction_scale", 1.0),
+            mass_scale: b
+                .doc("The simulated masses, as a multiple of the nominal ones.")
+                .range(0.1..=3.0)
+                .tunable(Tunable::Unconfigured)
+                .property("mass_scale", 1.0),
+            comm_fault: b
+                .doc("Fault to inject: none, overcurrent, overtemp, ec_timeout, encoder, emergency.")
+                .property("comm_fault", "none".to_owned()),
+            ifname: b
+                .doc("The network interface of the field bus.")
+                .tunable(Tunable::Unconfigured)
+                .property("ifname", "sim0".to_owned()),
+            names: Events {
+                soft_limit: b.event("e_JNT_SOFT_LIMIT_EXEEDED"),
+                soft_limit_exit: b.event("e_JNT_SOFT_LIMIT_EXEEDED_EXIT"),
+                command_watchdog: b.event("e_cmd_watchdog"),
+                base_watchdog: b.event("e_base_cmd_watchdog"),
+                calibrated: b.event("e_calibrated"),
+                calibration_failed: b.event("e_calibration_failed"),
+                arrived: b.event("e_arrived"),
+                dropped: b.event("e_arm_dropped"),
+                emergency: b.event("e_EMERGENCY_STOP"),
+                faults: FAULTS.map(|(_, event, _)| b.event(event)),
+            },
+            drives: Drives::new(ArmPlant::new(ArmModel::youbot(GRIPPER.mass, 1.0), radians(PARK_POSE_DEG))),
+            running: false,
+            motors: MotorStates::default(),
+            bus: DriverState::default(),
+            task: None,
+        }
+    }
+
+    fn update(&mut self, cx: &mut Context) {
+        self.drives.parameters = DriveParameters {
+            tau_max: self.tau_max.get(),
+            cmd_timeout: self.cmd_timeout.get(),
+            base_timeout: self.base_timeout.get(),
+            soft_limit: self.soft_limit.get(),
+            scale_end: self.scale_end.get(),
+        };
+        self.drives.arm.friction_scale = self.friction_scale.get();
+        self.inject();
+        let effort = aged(&mut self.effort, cx);
+        let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
+        let push = self.ext_force.get().unwrap_or_default();
+        let _ = self.gripper.take();
+        if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
+            // Nobody waits any more: the motion ends where it is.
+            self.task = None;
+            self.drives.hold();
+        }
+        let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
+        self.drives.update(effort, twist, &push, cx.dt(), &mut |what| match what {
+            Happening::SoftLimit => events.raise(names.soft_limit),
+            Happening::SoftLimitExit => events.raise(names.soft_limit_exit),
+            Happening::CommandWatchdog => events.raise(names.command_watchdog),
+            Happening::BaseWatchdog => events.raise(names.base_watchdog),
+            Happening::Calibrated | Happening::Arrived => {
+                events.raise(if what == Happening::Arrived { names.arrived } else { names.calibrated });
+                if let Some(ticket) = task.take() {
+                    ticket.done(());
+                }
+            }
+            Happening::CalibrationFailed => {
+                events.raise(names.calibration_failed);
+                if let Some(ticket) = task.take() {
+                    ticket.failed("the stops were not found");
+                }
+            }
+        });
+        self.publish(cx);
+    }
+}
+
+impl Driver {
+    /// Begins something that takes many updates; its ticket answers when it has ended.
+    fn begin(&mut self, cx: &mut Context, f: fn(&mut Drives) -> Result<(), &'static str>) -> Answer {
+        if !self.running {
+            return Answer::failed("the driver is not running");
+        }
+        match f(&mut self.drives) {
+            Ok(()) => {
+                self.task = Some(cx.ticket());
+                Answer::Pending
+            }
+            Err(why) => Answer::failed(why),
+        }
+    }
+
+    /// Faults that the property asks for.
+    fn inject(&mut self) {
+        if !self.comm_fault.changed() {
+            return;
+        }
+        let wanted = self.comm_fault.get_ref();
+        if let Some(i) = FAULTS.iter().position(|(name, ..)| name == wanted) {
+            self.motors.error_flags |= FAULTS[i].2;
+            self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
+            self.task = None;
+            self.drives.hold();
+            self.events.raise(self.names.faults[i]);
+        }
+    }
+
+    fn publish(&mut self, cx: &Context) {
+        let d = &self.drives;
+        self.jointstate.write(JointState {
+            pos: d.arm.q.into(),
+            vel: d.arm.qd.into(),
+            eff: d.torque.into(),
+            stamp: stamp(cx.now()),
+        });
+        self.odometry.write(Odometry::new(d.base.pose, d.base.twist));
+        for i in 0..JOINTS {
+            let current = d.torque[i] / (TORQUE_CONSTANT[i] * GEAR[i]);
+            let heat = AMBIENT + HEATING * current * current - self.motors.temp[i];
+            self.motors.current[i] = current;
+            self.motors.temp[i] += heat * cx.dt() / HEAT_TIME;
+        }
+        self.motor_states.write(self.motors);
+        self.driver_state.write(self.bus);
+        self.control_mode.write(d.mode().number());
+    }
+}

@@ -1,0 +1,109 @@
+//! `youbot.Cart_Impedance`: the coupling's spring and damper.
+
+use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
+use crate::libraries::youbot::impedance::{Impedance, ImpedanceParameters, Reference};
+use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use nalgebra::Vector3;
+
+/// The component.
+pub struct CartImpedance {
+    tool_pose: In<ToolPose>,
+    tool_twist: In<ToolTwist>,
+    ext_ref: In<ExtRef>,
+    ext_ref_mode: In<bool>,
+    f_des: Out<Vector3<f64>>,
+    f_raw_norm: Out<f64>,
+    ref_age: Out<f64>,
+    active: Out<bool>,
+    stiffness: Prop<f64>,
+    damping_rel: Prop<f64>,
+    damping_abs: Prop<f64>,
+    f_max: Prop<f64>,
+    f_rate: Prop<f64>,
+    ref_max_age: Prop<f64>,
+    offset: Prop<Vector3<f64>>,
+    law: Impedance,
+}
+
+impl Component for CartImpedance {
+    fn new(b: &mut Builder<Self>) -> Self {
+        let p = ImpedanceParameters::default();
+        b.describe(
+            "The force that pulls this tool to the other robot's: spring, damper, bounded, ramped. It is always computed \
+             and put out only while ext_ref_mode is true; it fades by itself when the reference grows stale.",
+        )
+        .start_after("youbot.Arm_Kinematics")
+        .on_start(|c, _| {
+            c.law.reset();
+            Ok(())
+        });
+        b.doc("The force begins from zero again.").no_effect().operation("reset", |c, _, (): ()| {
+            c.law.reset();
+            Answer::Done(())
+        });
+        Self {
+            tool_pose: b.doc("Where this tool is.").input("tool_pose"),
+            tool_twist: b.doc("How it moves.").input("tool_twist"),
+            ext_ref: b.doc("Where the other tool was.").input("ext_ref"),
+            ext_ref_mode: b.doc("Whether the force is put out. Never written: no.").input("ext_ref_mode"),
+            f_des: b
+                .doc("Force wanted on the tool, in the world; zero while ext_ref_mode is false.")
+                .unit("N")
+                .output("f_des"),
+            f_raw_norm: b.doc("Norm of the force it would want, coupled or not.").unit("N").output("f_raw_norm"),
+            ref_age: b.doc("Age of the reference; not written before the first one.").unit("s").output("ref_age"),
+            active: b.doc("Whether the force is put out.").output("active"),
+            stiffness: b.doc("Spring.").unit("N/m").range(0.0..=1000.0).property("stiffness", p.stiffness),
+            damping_rel: b
+                .doc("Damper on the difference of velocities.")
+                .unit("N s/m")
+                .range(0.0..=200.0)
+                .property("damping_rel", p.damping_rel),
+            damping_abs: b
+                .doc("Damper on the own velocity; at least 1.2 times stiffness times delay.")
+                .unit("N s/m")
+                .range(0.0..=200.0)
+                .property("damping_abs", p.damping_abs),
+            f_max: b.doc("Largest force.").unit("N").range(0.0..=30.0).property("f_max", p.f_max),
+            f_rate: b.doc("Fastest change of it.").unit("N/s").range(0.1..=1000.0).property("f_rate", p.f_rate),
+            ref_max_age: b
+                .doc("Age from which the reference is not believed.")
+                .unit("s")
+                .range(0.001..=1.0)
+                .property("ref_max_age", p.ref_max_age),
+            offset: b
+                .doc("This robot's world minus the other's.")
+                .unit("m")
+                .range(-100.0..=100.0)
+                .property("offset", p.offset),
+            law: Impedance::default(),
+        }
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn update(&mut self, cx: &mut Context) {
+        let (Some(pose), Some(twist)) = (self.tool_pose.get(), self.tool_twist.get()) else { return };
+        self.law.parameters = ImpedanceParameters {
+            stiffness: self.stiffness.get(),
+            damping_rel: self.damping_rel.get(),
+            damping_abs: self.damping_abs.get(),
+            f_max: self.f_max.get(),
+            f_rate: self.f_rate.get(),
+            ref_max_age: self.ref_max_age.get(),
+            offset: self.offset.get(),
+        };
+        let reference = self.ext_ref.get().map(|r| Reference {
+            position: r.p.into(),
+            velocity: r.v.into(),
+            age: (stamp(cx.now()) - r.stamp) as f64 * 1e-9,
+        });
+        let coupled = self.ext_ref_mode.get().unwrap_or(false);
+        let out = self.law.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, cx.dt());
+        self.f_des.write(out.force);
+        if let Some(reference) = reference {
+            self.f_raw_norm.write(out.raw_norm);
+            self.ref_age.write(reference.age);
+        }
+        self.active.write(coupled);
+    }
+}

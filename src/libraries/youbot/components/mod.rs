@@ -1,0 +1,51 @@
+//! The components: ports, properties and operations around the laws of the neighbouring files.
+
+mod base_ctrl;
+mod driver;
+mod dynamics;
+mod impedance;
+mod kinematics;
+mod link;
+mod monitors;
+mod operator;
+mod peer;
+mod reporter;
+pub mod samples;
+
+pub use base_ctrl::BaseCtrl;
+pub use driver::Driver;
+pub use dynamics::DynamicsComponent;
+pub use impedance::CartImpedance;
+pub use kinematics::ArmKinematics;
+pub use link::{LinkRx, LinkTx};
+pub use monitors::{ForceMonitor, LinkMonitor, SafetyMonitor};
+pub use operator::{ModeSwitch, Operator};
+pub use peer::Peer;
+pub use reporter::Reporter;
+
+use crate::runtime::{Context, In, Library, PortValue};
+use samples::seconds_since;
+
+/// The library `youbot`.
+pub fn library() -> Library {
+    Library::new("youbot")
+        .with::<Driver>("youbot.Driver")
+        .with::<ArmKinematics>("youbot.Arm_Kinematics")
+        .with::<CartImpedance>("youbot.Cart_Impedance")
+        .with::<DynamicsComponent>("youbot.Dynamics")
+        .with::<BaseCtrl>("youbot.Base_Ctrl")
+        .with::<LinkTx>("youbot.Link_Tx")
+        .with::<LinkRx>("youbot.Link_Rx")
+        .with::<Peer>("youbot.Peer")
+        .with::<LinkMonitor>("youbot.Link_Monitor")
+        .with::<ForceMonitor>("youbot.Force_Monitor")
+        .with::<SafetyMonitor>("youbot.Safety_Monitor")
+        .with::<Operator>("youbot.Operator")
+        .with::<ModeSwitch>("youbot.Mode_Switch")
+        .with::<Reporter>("youbot.Reporter")
+}
+
+/// The value at a port with its age in s.
+fn aged<T: PortValue>(port: &mut In<T>, cx: &Context) -> Option<(T, f64)> {
+    port.sample().map(|sample| (sample.value.clone(), seconds_since(cx.now(), sample.at)))
+}

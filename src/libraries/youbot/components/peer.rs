@@ -1,0 +1,210 @@
+//! `youbot.Peer`: a stand-in for the other robot and for the network between the two.
+
+use super::samples::{ToolPose, stamp};
+use crate::libraries::youbot::hand::{Hand, Script};
+use crate::libraries::youbot::impedance::Reference;
+use crate::libraries::youbot::link::Packet;
+use crate::libraries::youbot::network::{Network, Quality};
+use crate::libraries::youbot::rigid_body::{J5, radians};
+use crate::libraries::youbot::robot::{CONTROL_PERIOD, Robot};
+use crate::libraries::youbot::watch::Held;
+use crate::model::Tunable;
+use crate::runtime::{Answer, Builder, Component, Context, Failure, In, Out, Prop};
+use nalgebra::Vector3;
+
+/// Between two packets of the other robot, in s.
+const SEND_PERIOD: f64 = 0.004;
+/// Where the other arm begins, in degrees: near the working pose, about 10 cm beside it.
+const START_DEG: [f64; 5] = [18.0, -22.0, 92.0, 60.0, 0.0];
+/// Below it the other robot counts as aligned, in N, and for how long, in s.
+const ALIGNED_FORCE: f64 = 2.0;
+const ALIGNED_TIME: f64 = 0.3;
+
+/// The component.
+pub struct Peer {
+    rx: In<Packet>,
+    tx: Out<Packet>,
+    tool_pose: Out<ToolPose>,
+    q_start: Prop<J5>,
+    script: Prop<String>,
+    stiffness: Prop<f64>,
+    damping_rel: Prop<f64>,
+    damping_abs: Prop<f64>,
+    force_gain: Prop<Vector3<f64>>,
+    delay: Prop<f64>,
+    jitter: Prop<f64>,
+    loss: Prop<f64>,
+    cut: Prop<bool>,
+    jump: Prop<Vector3<f64>>,
+    seed: Prop<i64>,
+    world: Box<World>,
+    epoch: i64,
+}
+
+struct World {
+    robot: Robot,
+    hand: Hand,
+    to_peer: Network<Packet>,
+    from_peer: Network<Packet>,
+    heard: Option<Packet>,
+    aligned: Held,
+    since: f64,
+    seq: i64,
+}
+
+impl World {
+    fn new(q: J5, script: Script, seed: u64) -> Self {
+        Self {
+            robot: Robot::new(q),
+            hand: Hand::new(script),
+            to_peer: Network::new(Quality::default(), seed),
+            from_peer: Network::new(Quality::default(), seed ^ 0x5555_5555),
+            heard: None,
+            aligned: Held::default(),
+            since: f64::INFINITY,
+            seq: 0,
+        }
+    }
+
+    /// One control period of the other robot, ending at `now` (s).
+    #[allow(clippy::cast_precision_loss)]
+    fn step(&mut self, now: f64) -> (bool, bool) {
+        while let Some(packet) = self.to_peer.receive(now) {
+            if self.heard.is_none_or(|h| (h.epoch, h.seq) < (packet.epoch, packet.seq)) {
+                self.heard = Some(packet);
+            }
+        }
+        let reference = self.heard.map(|h| Reference {
+            position: h.p.into(),
+            velocity: h.v.into(),
+            age: now - h.stamp as f64 * 1e-9,
+        });
+        let fresh = reference.is_some_and(|r| r.age < 0.1);
+        // It follows: engaged while it hears that we are.
+        let copying = fresh && self.heard.is_some_and(|h| h.copying);
+        let tool = self.robot.tool;
+        let push =
+            self.hand.update(&tool.position, &tool.velocity, reference.as_ref().map(|r| &r.position), CONTROL_PERIOD);
+        self.robot.step(reference.as_ref(), copying, &push);
+        let low = fresh && self.robot.raw_norm < ALIGNED_FORCE;
+        (self.aligned.update(low, ALIGNED_TIME, CONTROL_PERIOD), copying)
+    }
+}
+
+impl Component for Peer {
+    fn new(b: &mut Builder<Self>) -> Self {
+        b.describe(
+            "The other robot, simulated whole (plant, coupling, dynamics, hand), behind a network that delays, jitters, \
+             loses and can be cut. It engages while it hears that this robot is engaged.",
+        )
+        .on_configure(|c, _| {
+            let script = c.read_script()?;
+            c.world = Box::new(World::new(c.q_start.get(), script, c.seed.get().unsigned_abs()));
+            Ok(())
+        });
+        b.doc("The other robot begins anew: another epoch.").no_effect().operation("restart", |c, _, (): ()| {
+            c.epoch += 1;
+            c.world.seq = 0;
+            c.world.from_peer.clear();
+            Answer::Done(())
+        });
+        let law = crate::libraries::youbot::impedance::ImpedanceParameters::default();
+        Self {
+            rx: b.doc("Packets from this robot.").buffered().input("rx"),
+            tx: b.doc("Packets from the other robot, for a buffered connection.").output("tx"),
+            tool_pose: b.doc("Where the other tool really is now.").output("tool_pose"),
+            q_start: b
+                .doc("Where the other arm is when the simulation begins.")
+                .unit("rad")
+                .range(-3.0..=3.0)
+                .tunable(Tunable::Unconfigured)
+                .property("q_start", radians(START_DEG)),
+            script: b.doc("What a hand does to the other arm.").property("script", String::new()),
+            stiffness: b.doc("Of its coupling.").unit("N/m").range(0.0..=1000.0).property("stiffness", law.stiffness),
+            damping_rel: b
+                .doc("Of its coupling.")
+                .unit("N s/m")
+                .range(0.0..=200.0)
+                .property("damping_rel", law.damping_rel),
+            damping_abs: b
+                .doc("Of its coupling.")
+                .unit("N s/m")
+                .range(0.0..=200.0)
+                .property("damping_abs", law.damping_abs),
+            force_gain: b
+                .doc("How its base gives way, as of Dynamics.")
+                .range(0.0..=1.0)
+                .property("force_gain", Vector3::zeros()),
+            delay: b.doc("One way.").unit("s").range(0.0..=1.0).property("delay", 0.002),
+            jitter: b
+                .doc("Added to the delay, evenly spread up to this.")
+                .unit("s")
+                .range(0.0..=1.0)
+                .property("jitter", 0.0),
+            loss: b.doc("Share of packets lost.").range(0.0..=1.0).property("loss", 0.0),
+            cut: b.doc("Nothing gets through.").property("cut", false),
+            jump: b
+                .doc("Added to the positions the other robot sends: a corrupt sensor.")
+                .unit("m")
+                .range(-10.0..=10.0)
+                .property("jump", Vector3::zeros()),
+            seed: b.doc("Of the network's luck.").tunable(Tunable::Unconfigured).property("seed", 1_i64),
+            world: Box::new(World::new(radians(START_DEG), Script::default(), 1)),
+            epoch: 1,
+        }
+    }
+
+    fn update(&mut self, cx: &mut Context) {
+        if self.script.changed() {
+            match self.read_script() {
+                Ok(script) => self.world.hand.follow(script),
+                Err(Failure(why)) => return cx.fault(why),
+            }
+        }
+        let now = cx.now().as_secs_f64();
+        let quality =
+            Quality { delay: self.delay.get(), jitter: self.jitter.get(), loss: self.loss.get(), cut: self.cut.get() };
+        let w = &mut *self.world;
+        w.to_peer.quality = quality;
+        w.from_peer.quality = quality;
+        let p = &mut w.robot.impedance.parameters;
+        p.stiffness = self.stiffness.get();
+        p.damping_rel = self.damping_rel.get();
+        p.damping_abs = self.damping_abs.get();
+        w.robot.dynamics.parameters.force_gain = self.force_gain.get();
+        while let Some(packet) = self.rx.take() {
+            w.to_peer.send(now, packet);
+        }
+        let mut state = (false, false);
+        let steps = (cx.dt() / CONTROL_PERIOD).round().max(1.0) as u32;
+        for i in 0..steps {
+            state = w.step(now - f64::from(steps - 1 - i) * CONTROL_PERIOD);
+        }
+        let tool = &w.robot.tool;
+        w.since += cx.dt();
+        if w.since >= SEND_PERIOD - 0.5 * cx.dt() {
+            w.since = 0.0;
+            w.seq += 1;
+            let packet = Packet {
+                epoch: self.epoch,
+                seq: w.seq,
+                stamp: stamp(cx.now()),
+                p: (tool.position + self.jump.get()).into(),
+                v: tool.velocity.into(),
+                aligned: state.0,
+                copying: state.1,
+            };
+            w.from_peer.send(now, packet);
+        }
+        while let Some(packet) = w.from_peer.receive(now) {
+            self.tx.write(packet);
+        }
+        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
+    }
+}
+
+impl Peer {
+    fn read_script(&mut self) -> Result<Script, Failure> {
+        self.script.get_ref().parse::<Script>().map_err(|e| Failure::from_error(&e))
+    }
+}
