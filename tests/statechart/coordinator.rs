@@ -317,6 +317,7 @@ fn a_listener_may_end_it_from_inside() {
     coordinator.wait_for_state(chart.find("a").unwrap(), Time::NEVER);
     coordinator.deliver(Incoming::control(event("e"))).unwrap();
     let _ = coordinator.deliver(Incoming::control(event("e")));
+    clock.sleep(Duration::from_secs(1));
     coordinator.stop(Time::NEVER).unwrap();
     assert_eq!(log.take(), ["1 names"]);
 }

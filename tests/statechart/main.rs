@@ -1,5 +1,9 @@
 //! Statecharts: rFSM's behaviour, test by test, and a second, plain interpreter beside the engine.
 
+mod confirmed;
 mod coordinator;
+mod naive;
+mod random;
 mod rfsm;
+mod scripted;
 mod support;
