@@ -1,3 +1,10 @@
 //! Component libraries, written against the runtime as any user's library would be.
 
 pub mod youbot;
+
+use crate::runtime::Libraries;
+
+/// The libraries that come with the program.
+pub fn builtin() -> Libraries {
+    Libraries::new().with(youbot::library())
+}
