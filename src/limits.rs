@@ -109,3 +109,27 @@ pub const WORKERS_GIVEN_UP: usize = 64;
 /// How long after its deadline a platform call may answer before its worker is given up: a platform promises "a little
 /// later at most".
 pub const PLATFORM_GRACE: Duration = Duration::from_millis(100);
+/// Events that may wait in the queue of a connection of event ports whose policy is `data`.
+pub const EVENT_FIFO: u32 = 64;
+
+/// How long one round of an activity may take before it is reported stuck: a thousand periods of a fast control loop.
+pub const ACTIVITY_STUCK: Duration = Duration::from_secs(1);
+
+/// The shortest period of an activity; a shorter one would leave the operating system no time.
+pub const SHORTEST_PERIOD: Duration = Duration::from_micros(10);
+
+/// The period of the activity that components without one run in: quick enough to look at, cheap enough to forget.
+pub const DEFAULT_PERIOD: Duration = Duration::from_millis(10);
+
+/// Rounds that an event-driven activity makes without a rest before it takes one of [`EVENT_PAUSE`]: longer than any chain
+/// of components, short enough that a loop of them is noticed.
+pub const EVENT_ROUNDS: u32 = 1000;
+
+/// The rest of an event-driven activity whose components wake each other without end.
+pub const EVENT_PAUSE: Duration = Duration::from_millis(1);
+
+/// Operations that may wait for an activity. They are called one after the other by a few workers.
+pub const ACTIVITY_REQUESTS: usize = 64;
+
+/// How long taking down the embedded runtime waits for each thread of it; one that hangs is left behind.
+pub const RUNTIME_END: Duration = Duration::from_secs(1);

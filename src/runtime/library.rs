@@ -92,6 +92,11 @@ impl Kind {
         self.hooks[hook_index(transition)]
     }
 
+    /// Whether any transition does.
+    pub fn has_hooks(&self) -> bool {
+        self.hooks.contains(&true)
+    }
+
     pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<Made, String> {
         (self.make)(beat, values)
     }

@@ -7,16 +7,21 @@
 //! What is absent: a running component shares no lock with the configurator; a component knows no other component, no
 //! configuration and no coordinator; nothing reads a clock but the one it was given.
 
+pub mod activity;
 pub mod beat;
 pub mod builder;
+pub(crate) mod cell;
 pub mod component;
+pub(crate) mod guard;
 pub mod latest;
 pub mod library;
 pub mod links;
 pub mod port;
 pub mod property;
+mod realtime;
 pub mod value;
 
+pub use activity::ActivityStatus;
 pub use beat::{Notice, NoticeSink, Notices};
 pub use builder::Builder;
 pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, Returned, Ticket};

@@ -1,0 +1,188 @@
+//! The embedded platform: components of this process, run by the embedded runtime.
+//!
+//! * [`registry`]: what is there, behind one lock that no activity ever takes.
+//! * [`steps`]: the steps that are immediate. [`calls`]: those that run a component's own code, on workers under a deadline.
+//! * [`prepared`]: fixed lists of immediate steps. [`order`]: the data-flow order. [`workers`]: the threads of `calls`.
+//!
+//! What is immediate: everything but operations, and the state changes (and `destroy`) of types that declare a hook for
+//! them. A `stop` waits until an update under way has ended, at most until its deadline.
+//!
+//! A call of a component that has not returned by its deadline is *unknown*, the component in quarantine: it is not updated
+//! any more and every step on it is refused, but disconnecting its neighbours. When the call does return, the component is
+//! cleaned up, disconnected and destroyed, and [`PlatformEvent::Returned`] says so.
+
+mod calls;
+mod order;
+mod prepared;
+mod registry;
+mod steps;
+mod workers;
+
+use super::{
+    EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared,
+};
+use crate::limits;
+use crate::model::{
+    Activity as Spec, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot, Step, Transition,
+    TypeName,
+};
+use crate::runtime::{ActivityStatus, Kind, Libraries, Notice, Notices, guard};
+use crate::time::{Clock, Time, lock};
+use registry::Registry;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
+use workers::Workers;
+
+/// The embedded platform. Dropping it ends its threads and destroys its components.
+pub struct EmbeddedPlatform {
+    inner: Arc<Inner>,
+}
+
+/// What the platform is, for those of its threads that may outlive it.
+struct Inner {
+    own: Weak<Inner>,
+    clock: Clock,
+    catalogue: Catalogue,
+    kinds: FxHashMap<TypeName, Arc<Kind>>,
+    activities: BTreeMap<Ident, Spec>,
+    /// The activity of components that name none.
+    default_activity: Ident,
+    notices: Arc<Notices>,
+    sink: RwLock<Option<EventSink>>,
+    registry: Mutex<Registry>,
+    workers: Workers,
+}
+
+impl EmbeddedPlatform {
+    /// A platform without components that can make those of `libraries` and run them in these activities. Components that
+    /// name no activity run in the one named `default`; it need not be declared.
+    ///
+    /// # Panics
+    /// Never: `default` is a name.
+    pub fn new(clock: &Clock, libraries: &Libraries, activities: &BTreeMap<Ident, Spec>) -> Self {
+        guard::install();
+        let mut activities = activities.clone();
+        let default_activity = Ident::new("default").expect("a plain name");
+        activities.entry(default_activity).or_insert(Spec {
+            period: Some(limits::DEFAULT_PERIOD),
+            priority: 0,
+            cpu: None,
+            origin: Origin::NONE,
+        });
+        let inner = Arc::new_cyclic(|own| Inner {
+            own: own.clone(),
+            clock: clock.clone(),
+            catalogue: libraries.catalogue(),
+            kinds: libraries.kinds(),
+            activities,
+            default_activity,
+            notices: Arc::new(Notices::default()),
+            sink: RwLock::new(None),
+            registry: Mutex::new(Registry::default()),
+            workers: Workers::new(clock),
+        });
+        Self { inner }
+    }
+
+    /// What the activities did so far, by name; only those that have components.
+    pub fn activities(&self) -> Vec<ActivityStatus> {
+        let registry = lock(&self.inner.registry);
+        let mut list: Vec<_> = registry.crews().map(|crew| crew.activity.status(registry.cells(crew))).collect();
+        list.sort_by_key(|status| status.name);
+        list
+    }
+
+    /// The buffered connections with the number of values each has lost because it was full (the newest ones).
+    pub fn overflows(&self) -> Vec<((MemberRef, MemberRef), u64)> {
+        lock(&self.inner.registry).overflows()
+    }
+
+    /// The clock it runs on.
+    pub fn clock(&self) -> &Clock {
+        &self.inner.clock
+    }
+}
+
+impl Inner {
+    fn tell(&self, event: PlatformEvent) {
+        let sink = self.sink.read().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(sink) = sink {
+            sink(event);
+        }
+    }
+}
+
+impl Platform for EmbeddedPlatform {
+    fn catalogue(&self) -> &Catalogue {
+        &self.inner.catalogue
+    }
+
+    fn execution(&self, step: &Step) -> Execution {
+        let blocking = match step {
+            Step::Operation(_) => true,
+            Step::State { component, transition } => {
+                let registry = lock(&self.inner.registry);
+                registry.find(*component).is_ok_and(|slot| {
+                    let cell = &registry.entry(slot).cell;
+                    cell.kind.has_hook(*transition) || (*transition == Transition::Stop && cell.is_busy())
+                })
+            }
+            Step::Destroy { component } => {
+                let registry = lock(&self.inner.registry);
+                registry.find(*component).is_ok_and(|slot| registry.entry(slot).cell.kind.has_hooks())
+            }
+            _ => false,
+        };
+        if blocking { Execution::Blocking } else { Execution::Immediate }
+    }
+
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        self.inner.execute(step, deadline)
+    }
+
+    fn observe(&self, _: Time) -> Result<Snapshot, ObserveError> {
+        Ok(lock(&self.inner.registry).snapshot())
+    }
+
+    fn observe_component(
+        &self,
+        component: ComponentName,
+        _: Time,
+    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
+        let registry = lock(&self.inner.registry);
+        Ok(registry.find(component).ok().map(|slot| registry.component(slot)))
+    }
+
+    fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
+        prepared::prepare(&self.inner, steps)
+    }
+
+    fn subscribe(&self, sink: EventSink) {
+        *self.inner.sink.write().unwrap_or_else(PoisonError::into_inner) = Some(sink.clone());
+        self.inner.notices.subscribe(Arc::new(move |notice| {
+            sink(match notice {
+                Notice::Raised { event, component, at } => PlatformEvent::Raised { event, component, at },
+                Notice::Faulted { component, reason, at } => PlatformEvent::Faulted { component, reason, at },
+            });
+        }));
+    }
+
+    fn quarantined(&self) -> Vec<ComponentName> {
+        let mut names: Vec<_> = lock(&self.inner.registry).quarantined.iter().copied().collect();
+        names.sort_unstable();
+        names
+    }
+}
+
+impl Drop for EmbeddedPlatform {
+    fn drop(&mut self) {
+        let (threads, entries) = lock(&self.inner.registry).clear();
+        for thread in threads {
+            let _ = thread.join(self.inner.clock.now() + limits::RUNTIME_END);
+        }
+        self.inner.workers.close();
+        // The components' own code, here too.
+        let _ = guard::call(|| drop(entries));
+    }
+}

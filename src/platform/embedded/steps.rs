@@ -1,0 +1,257 @@
+//! Carrying out steps: the immediate ones here, the others by [`calls`](super::calls).
+
+use super::registry::{Registry, check_values};
+use super::{Inner, Outcome};
+use crate::model::{ComponentName, Ident, Policy, RunState, Step, Transition, TypeName, Value};
+use crate::platform::{Cause, PlatformEvent};
+use crate::runtime::activity::Activity;
+use crate::runtime::beat::Beat;
+use crate::runtime::cell::{Cell, Closed};
+use crate::runtime::guard;
+use crate::time::{Time, lock};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// `Ok(())` as *done*, an error as *not done*.
+pub(super) fn outcome(result: Result<(), Cause>) -> Outcome {
+    match result {
+        Ok(()) => Outcome::Done(None),
+        Err(cause) => Outcome::NotDone(cause),
+    }
+}
+
+/// How long to look again and again for an update to end before sleeping between looks: most updates are shorter.
+const SPINS: u32 = 200;
+/// The first of these sleeps; each is twice as long as the one before, up to the last.
+const FIRST_SLEEP: Duration = Duration::from_micros(20);
+const LAST_SLEEP: Duration = Duration::from_millis(1);
+
+pub(super) fn closed(closed: Closed, name: ComponentName, what: &str) -> Cause {
+    match closed {
+        Closed::State(state) => Cause::Refused(format!("cannot {what} `{name}` while it is {state}")),
+        Closed::Busy => Cause::Refused(format!("another call of `{name}` is under way")),
+        Closed::Quarantined => Cause::Quarantined,
+    }
+}
+
+impl Inner {
+    pub(super) fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        match step {
+            Step::State { component, transition } => self.transition(*component, *transition, deadline),
+            Step::Create { component, ty, activity, properties } => {
+                outcome(self.create(*component, *ty, *activity, properties))
+            }
+            Step::Destroy { component } => self.destroy(*component, deadline),
+            Step::Connect { from, to, policy } => outcome(self.connect(*from, *to, *policy)),
+            Step::Disconnect { from, to } => outcome(lock(&self.registry).disconnect(*from, *to)),
+            Step::PropertySet { property, value } => {
+                let mut registry = lock(&self.registry);
+                outcome(registry.find(property.component).and_then(|slot| {
+                    let index = registry.property(slot, property.member)?;
+                    registry.set_property(slot, index, value)
+                }))
+            }
+            Step::PortWrite { port, value } => {
+                let mut registry = lock(&self.registry);
+                outcome(registry.find(port.component).and_then(|slot| {
+                    let index = registry.writable(slot, port.member)?;
+                    registry.write_port(slot, index, value.as_ref(), self.clock.now())
+                }))
+            }
+            Step::Operation(call) => self.operation(call, deadline),
+        }
+    }
+
+    fn connect(
+        &self,
+        from: crate::model::MemberRef,
+        to: crate::model::MemberRef,
+        policy: Policy,
+    ) -> Result<(), Cause> {
+        lock(&self.registry).connect(from, to, policy)
+    }
+
+    fn create(
+        &self,
+        name: ComponentName,
+        ty: TypeName,
+        asked: Option<Ident>,
+        values: &[Value],
+    ) -> Result<(), Cause> {
+        let kind =
+            self.kinds.get(&ty).ok_or_else(|| Cause::Refused(format!("no library here makes a `{ty}`")))?;
+        let crew = asked.unwrap_or(self.default_activity);
+        let spec = *self
+            .activities
+            .get(&crew)
+            .ok_or_else(|| Cause::Refused(format!("there is no activity `{crew}`")))?;
+        check_values(&kind.ty, values)?;
+        let wake = {
+            let mut registry = lock(&self.registry);
+            registry.is_free(name)?;
+            let make = || {
+                let inner = self.own.clone();
+                let late = move |cell: &Arc<Cell>| {
+                    if let Some(inner) = inner.upgrade() {
+                        inner.come_back(cell.clone());
+                    }
+                };
+                Activity::new(crew, spec, &self.clock, Box::new(late))
+            };
+            let crew = registry.crew(crew, make, &self.clock);
+            crew.expected += 1;
+            let activity = &crew.activity;
+            activity.is_event_driven().then(|| activity.signal.clone())
+        };
+        // The component's own code, outside the lock: whatever it does delays nobody.
+        let beat = Arc::new(Beat::new(name, wake, self.notices.clone()));
+        beat.set_now(self.clock.now());
+        let made = guard::call(|| kind.make(&beat, values.to_vec()));
+        let mut registry = lock(&self.registry);
+        let result = match made {
+            Err(panic) => Err(Cause::Panicked(panic)),
+            Ok(Err(text)) => Err(Cause::Refused(text)),
+            Ok(Ok(made)) => registry.is_free(name).map(|()| made),
+        };
+        let result = result.map(|made| {
+            let cell = Arc::new(Cell::new(kind.clone(), beat, made.body));
+            registry.insert(cell, made.ends, made.values, asked, crew);
+        });
+        registry.arrived(crew);
+        result
+    }
+
+    fn destroy(&self, name: ComponentName, deadline: Time) -> Outcome {
+        let mut registry = lock(&self.registry);
+        let body = registry.find(name).and_then(|slot| {
+            let cell = registry.entry(slot).cell.clone();
+            if cell.is_quarantined() {
+                return Err(Cause::Quarantined);
+            }
+            registry.is_unconnected(slot)?;
+            let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
+            let mut inside = cell.enter_idle(may).map_err(|why| closed(why, name, "destroy"))?;
+            let body = inside.take();
+            // Nobody enters it again, whoever still knows it.
+            inside.hand_over();
+            drop(registry.remove(slot));
+            Ok((cell.kind.has_hooks(), body))
+        });
+        drop(registry);
+        match body {
+            Err(cause) => Outcome::NotDone(cause),
+            Ok((true, Some(body))) => self.bury(name, body, deadline),
+            Ok((_, body)) => match guard::call(|| drop(body)) {
+                Ok(()) => Outcome::Done(None),
+                Err(panic) => {
+                    // It is gone all the same.
+                    self.notices.send(crate::runtime::Notice::Faulted {
+                        component: name,
+                        reason: panic,
+                        at: self.clock.now(),
+                    });
+                    Outcome::Done(None)
+                }
+            },
+        }
+    }
+
+    fn transition(&self, name: ComponentName, transition: Transition, deadline: Time) -> Outcome {
+        let (cell, stopped) = {
+            let mut registry = lock(&self.registry);
+            let slot = match registry.find(name) {
+                Ok(slot) => slot,
+                Err(cause) => return Outcome::NotDone(cause),
+            };
+            let cell = registry.entry(slot).cell.clone();
+            let hook = cell.kind.has_hook(transition);
+            if transition == Transition::Stop || !hook {
+                if let Err(cause) = self.shift(&mut registry, slot, transition) {
+                    return Outcome::NotDone(cause);
+                }
+                if !hook && !cell.is_busy() {
+                    return Outcome::Done(None);
+                }
+            }
+            (cell, transition == Transition::Stop)
+        };
+        if stopped && let Err(outcome) = self.await_idle(&cell, deadline) {
+            return outcome;
+        }
+        if cell.kind.has_hook(transition) { self.hook(&cell, transition, deadline) } else { Outcome::Done(None) }
+    }
+
+    /// Moves a component to another state, without its hook and without waiting.
+    pub(super) fn shift(&self, registry: &mut Registry, slot: u32, transition: Transition) -> Result<(), Cause> {
+        if transition == Transition::Start {
+            registry.enlist(slot, &self.clock)?;
+        }
+        let cell = &registry.entry(slot).cell;
+        if transition == Transition::Start && cell.state() == RunState::Stopped {
+            cell.restart();
+        }
+        cell.shift(transition).map_err(|why| closed(why, cell.name, transition.as_str()))?;
+        match transition {
+            Transition::Start => registry.crew_of(slot).activity.started(cell),
+            Transition::Stop => registry.crew_of(slot).activity.stopped(),
+            Transition::Configure | Transition::Cleanup => {}
+        }
+        Ok(())
+    }
+
+    /// Waits until the update under way of a component that has been stopped has ended.
+    ///
+    /// # Errors
+    /// The outcome of the stop, when it is not simply done.
+    pub(super) fn await_idle(&self, cell: &Arc<Cell>, deadline: Time) -> Result<(), Outcome> {
+        let mut sleep = FIRST_SLEEP;
+        let mut spins = if self.clock.is_simulated() { SPINS } else { 0 };
+        while cell.is_busy() {
+            if spins < SPINS {
+                spins += 1;
+                std::hint::spin_loop();
+                continue;
+            }
+            let now = self.clock.now();
+            if now >= deadline {
+                if self.give_up(cell, true, || true) {
+                    return Err(Outcome::Unknown(Cause::Timeout));
+                }
+                break;
+            }
+            self.clock.sleep_until((now + sleep).min(deadline));
+            sleep = (sleep * 2).min(LAST_SLEEP);
+        }
+        match cell.state() {
+            RunState::Faulted => {
+                Err(Outcome::NotDone(Cause::Failed("it became faulted while it was being stopped".to_owned())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Puts a component in quarantine because a call of it has not returned, if it still has not and `really` says so too.
+    /// Whether it is.
+    /// `in_activity`: the call holds up the component's activity.
+    pub(super) fn give_up(&self, cell: &Arc<Cell>, in_activity: bool, really: impl FnOnce() -> bool) -> bool {
+        let mut registry = lock(&self.registry);
+        let Some(was_running) = (if really() { cell.quarantine() } else { None }) else { return false };
+        registry.quarantined.insert(cell.name);
+        let stuck = registry.find(cell.name).ok().map(|slot| {
+            let activity = &registry.crew_of(slot).activity;
+            if was_running {
+                activity.running.fetch_sub(1, Ordering::SeqCst);
+            }
+            in_activity.then_some(activity.name)
+        });
+        drop(registry);
+        if let Some(Some(activity)) = stuck {
+            // In the platform's own name: an update or operation of this component holds its whole activity up.
+            if let Ok(event) = crate::model::EventName::new(&format!("{activity}.stuck")) {
+                self.tell(PlatformEvent::Raised { event, component: cell.name, at: self.clock.now() });
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,352 @@
+//! Activities: the threads that update components.
+//!
+//! An activity shares with the configurator atomic words, a signal, a queue of operations and the latest list of its
+//! components, and no lock.
+
+use super::cell::{Cell, Closed};
+use super::component::{Call, Reply};
+use super::latest::Reader;
+use crate::limits;
+use crate::model::{Activity as Spec, ComponentName, Ident, RunState, Value};
+use crate::time::{Clock, Receiver, Signal, Time};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// The components of an activity, in the order in which they are updated.
+pub(crate) type Schedule = Arc<[Arc<Cell>]>;
+
+/// An operation to be run in the activity's thread.
+pub(crate) struct Request {
+    pub(crate) cell: Arc<Cell>,
+    pub(crate) operation: usize,
+    pub(crate) args: Vec<Value>,
+    pub(crate) call: Call,
+    pub(crate) stage: Arc<Stage>,
+}
+
+/// Whether a call has begun; decided once, between its caller's deadline and its thread.
+#[derive(Default)]
+pub(crate) struct Stage(AtomicU8);
+
+impl Stage {
+    const QUEUED: u8 = 0;
+    const BEGUN: u8 = 1;
+    const WITHDRAWN: u8 = 2;
+    const RETURNED: u8 = 3;
+
+    pub(crate) fn begin(&self) -> bool {
+        self.0.compare_exchange(Self::QUEUED, Self::BEGUN, Ordering::AcqRel, Ordering::Acquire).is_ok()
+    }
+
+    /// The component's code has come back (though its answer may come later).
+    pub(crate) fn returned(&self) {
+        self.0.store(Self::RETURNED, Ordering::Release);
+    }
+
+    /// Whether the component's code is being run.
+    pub(crate) fn is_inside(&self) -> bool {
+        self.0.load(Ordering::Acquire) == Self::BEGUN
+    }
+
+    /// Takes the call back if it has not begun.
+    pub(crate) fn withdraw(&self) -> bool {
+        self.0.compare_exchange(Self::QUEUED, Self::WITHDRAWN, Ordering::AcqRel, Ordering::Acquire).is_ok()
+    }
+}
+
+/// Counters of an activity. All times in nanoseconds.
+#[derive(Default)]
+struct Counters {
+    cycles: AtomicU64,
+    overruns: AtomicU64,
+    latency_last: AtomicU64,
+    latency_max: AtomicU64,
+    duration_last: AtomicU64,
+    duration_max: AtomicU64,
+}
+
+/// What an activity did so far.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ActivityStatus {
+    /// Its name.
+    pub name: Ident,
+    /// Its period; none: event-driven.
+    pub period: Option<Duration>,
+    /// Components created in it.
+    pub components: usize,
+    /// Components that run.
+    pub running: usize,
+    /// Rounds of updates begun.
+    pub cycles: u64,
+    /// Periods that were missed because a round took too long.
+    pub overruns: u64,
+    /// How late the last round began.
+    pub latency_last: Duration,
+    /// How late a round began at most.
+    pub latency_max: Duration,
+    /// How long the last round took.
+    pub duration_last: Duration,
+    /// How long a round took at most.
+    pub duration_max: Duration,
+    /// The component whose update or operation has been running for longer than [`limits::ACTIVITY_STUCK`].
+    pub stuck: Option<ComponentName>,
+    /// What the operating system refused: a priority, a CPU.
+    pub complaint: Option<String>,
+}
+
+pub(crate) struct Activity {
+    pub(crate) name: Ident,
+    spec: Spec,
+    clock: Clock,
+    pub(crate) signal: Signal,
+    /// Components that run.
+    pub(crate) running: AtomicUsize,
+    /// The thread waits for a component that runs.
+    parked: AtomicBool,
+    ended: AtomicBool,
+    /// Since when the present round lasts; `NEVER`: no round.
+    busy_since: AtomicU64,
+    counters: Counters,
+    complaint: Mutex<Option<String>>,
+    /// Called with a component that was put in quarantine and has come back.
+    late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>,
+}
+
+impl Activity {
+    pub(crate) fn new(
+        name: Ident,
+        spec: Spec,
+        clock: &Clock,
+        late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>,
+    ) -> Self {
+        Self {
+            name,
+            spec,
+            clock: clock.clone(),
+            signal: clock.signal(),
+            running: AtomicUsize::new(0),
+            parked: AtomicBool::new(false),
+            ended: AtomicBool::new(false),
+            busy_since: AtomicU64::new(Time::NEVER.0),
+            counters: Counters::default(),
+            complaint: Mutex::new(None),
+            late,
+        }
+    }
+
+    pub(crate) fn is_event_driven(&self) -> bool {
+        self.spec.period.is_none()
+    }
+
+    /// A component has begun to run.
+    pub(crate) fn started(&self, cell: &Cell) {
+        self.running.fetch_add(1, Ordering::SeqCst);
+        if self.is_event_driven() {
+            cell.beat.poke();
+        } else if self.parked.load(Ordering::SeqCst) {
+            self.signal.notify();
+        }
+    }
+
+    /// A component runs no longer.
+    pub(crate) fn stopped(&self) {
+        self.running.fetch_sub(1, Ordering::SeqCst);
+    }
+
+    /// The thread is to end.
+    pub(crate) fn end(&self) {
+        self.ended.store(true, Ordering::SeqCst);
+        self.signal.notify();
+    }
+
+    /// The component that is being called now, if the round has lasted too long.
+    pub(crate) fn stuck<'a>(&self, mut members: impl Iterator<Item = &'a Arc<Cell>>) -> Option<ComponentName> {
+        let since = self.busy_since.load(Ordering::Acquire);
+        (since != Time::NEVER.0 && self.clock.now().since(Time(since)) >= limits::ACTIVITY_STUCK)
+            .then(|| members.find(|cell| cell.is_busy()).map(|cell| cell.name))
+            .flatten()
+    }
+
+    pub(crate) fn status<'a>(&self, members: impl Iterator<Item = &'a Arc<Cell>> + Clone) -> ActivityStatus {
+        let nanos = |counter: &AtomicU64| Duration::from_nanos(counter.load(Ordering::Relaxed));
+        ActivityStatus {
+            name: self.name,
+            period: self.spec.period,
+            components: members.clone().count(),
+            running: self.running.load(Ordering::Relaxed),
+            cycles: self.counters.cycles.load(Ordering::Relaxed),
+            overruns: self.counters.overruns.load(Ordering::Relaxed),
+            latency_last: nanos(&self.counters.latency_last),
+            latency_max: nanos(&self.counters.latency_max),
+            duration_last: nanos(&self.counters.duration_last),
+            duration_max: nanos(&self.counters.duration_max),
+            stuck: self.stuck(members),
+            complaint: crate::time::lock(&self.complaint).clone(),
+        }
+    }
+
+    /// The thread.
+    pub(crate) fn run(&self, mut schedule: Reader<Schedule>, requests: &Receiver<Request>) {
+        if !self.clock.is_simulated() {
+            *crate::time::lock(&self.complaint) = super::realtime::apply(self.spec.priority, self.spec.cpu);
+        }
+        match self.spec.period {
+            Some(period) => self.run_periodic(period.max(limits::SHORTEST_PERIOD), &mut schedule, requests),
+            None => self.run_on_events(&mut schedule, requests),
+        }
+    }
+
+    /// Serves what is asked, and waits while nothing runs. False: the thread is to end.
+    fn attend(&self, requests: &Receiver<Request>) -> bool {
+        loop {
+            if self.ended.load(Ordering::SeqCst) {
+                return false;
+            }
+            while let Ok(request) = requests.try_recv() {
+                self.serve(request);
+            }
+            if self.running.load(Ordering::SeqCst) > 0 {
+                return true;
+            }
+            self.parked.store(true, Ordering::SeqCst);
+            if self.running.load(Ordering::SeqCst) == 0 {
+                self.signal.wait(Time::NEVER);
+            }
+            self.parked.store(false, Ordering::SeqCst);
+        }
+    }
+
+    fn run_periodic(&self, period: Duration, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
+        let step = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
+        let mut release = self.clock.now();
+        loop {
+            let idle = self.running.load(Ordering::SeqCst) == 0;
+            if !self.attend(requests) {
+                return;
+            }
+            let now = self.clock.now();
+            if idle {
+                release = release.max(now);
+            }
+            if now < release {
+                self.signal.wait(release);
+                continue;
+            }
+            let late = now.since(release);
+            self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
+            self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
+            self.round(now, schedule, |cell| {
+                if let Some(inside) = cell.enter_running() {
+                    let dt = cell.elapsed(release, period.as_secs_f64());
+                    self.update(cell, inside, now, dt);
+                }
+            });
+            release = Time(release.0.saturating_add(step));
+            let now = self.clock.now();
+            if now > release {
+                // The releases that are past are missed; the phase is kept.
+                let missed = (now.0 - release.0).div_ceil(step);
+                self.counters.overruns.fetch_add(missed, Ordering::Relaxed);
+                release = Time(release.0.saturating_add(missed.saturating_mul(step)));
+            }
+        }
+    }
+
+    fn run_on_events(&self, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
+        let mut restless = 0;
+        loop {
+            if !self.attend(requests) {
+                return;
+            }
+            let now = self.clock.now();
+            let (mut any, mut next) = (false, Time::NEVER);
+            self.round(now, schedule, |cell| {
+                let wake_at = Time(cell.beat.wake_at.load(Ordering::Relaxed));
+                let pending = cell.beat.pending.load(Ordering::Acquire);
+                if !pending && wake_at > now {
+                    next = next.min(wake_at);
+                } else if let Some(inside) = cell.enter_running() {
+                    any = true;
+                    cell.beat.pending.store(false, Ordering::Release);
+                    if wake_at <= now {
+                        cell.beat.wake_at.store(Time::NEVER.0, Ordering::Relaxed);
+                    }
+                    let dt = cell.elapsed(now, 0.0);
+                    self.update(cell, inside, now, dt);
+                }
+            });
+            if !any {
+                restless = 0;
+                self.signal.wait(next);
+            } else if restless < limits::EVENT_ROUNDS {
+                restless += 1;
+            } else {
+                // A loop of components that wake each other would hold simulated time still and a CPU busy for ever.
+                restless = 0;
+                self.counters.overruns.fetch_add(1, Ordering::Relaxed);
+                self.clock.sleep(limits::EVENT_PAUSE);
+            }
+        }
+    }
+
+    fn round(&self, now: Time, schedule: &mut Reader<Schedule>, mut visit: impl FnMut(&Arc<Cell>)) {
+        self.busy_since.store(now.0, Ordering::Release);
+        schedule.update();
+        for cell in schedule.value().iter() {
+            visit(cell);
+        }
+        self.busy_since.store(Time::NEVER.0, Ordering::Release);
+        let took = nanos(self.clock.now().since(now));
+        self.counters.cycles.fetch_add(1, Ordering::Relaxed);
+        self.counters.duration_last.store(took, Ordering::Relaxed);
+        self.counters.duration_max.fetch_max(took, Ordering::Relaxed);
+    }
+
+    #[inline]
+    fn update(&self, cell: &Arc<Cell>, mut inside: super::cell::Inside<'_>, now: Time, dt: f64) {
+        let fault = inside.update(&self.clock, now, dt).err();
+        self.leave(cell, inside, fault);
+    }
+
+    fn serve(&self, request: Request) {
+        let Request { cell, operation, args, call, stage } = request;
+        if !stage.begin() {
+            return;
+        }
+        self.busy_since.store(self.clock.now().0, Ordering::Release);
+        match cell.enter_for_operation() {
+            Ok(mut inside) => {
+                let fault = inside.operation(&self.clock, operation, &args, call).err();
+                stage.returned();
+                self.leave(&cell, inside, fault);
+            }
+            Err(closed) => {
+                let text = match closed {
+                    Closed::Quarantined => "the component is in quarantine",
+                    _ => "another call is under way",
+                };
+                let _ = call.reply.try_send(Reply::Refused(text.to_owned()));
+            }
+        }
+        self.busy_since.store(Time::NEVER.0, Ordering::Release);
+    }
+
+    #[inline]
+    fn leave(&self, cell: &Arc<Cell>, inside: super::cell::Inside<'_>, fault: Option<String>) {
+        let left = inside.leave(fault.is_some().then_some(RunState::Faulted));
+        if left.ended_running {
+            self.stopped();
+        }
+        if let Some(reason) = fault {
+            cell.beat.faulted(reason, self.clock.now());
+        }
+        if left.quarantined {
+            (self.late)(cell);
+        }
+    }
+}
+
+fn nanos(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
