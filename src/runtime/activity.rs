@@ -114,12 +114,7 @@ pub(crate) struct Activity {
 }
 
 impl Activity {
-    pub(crate) fn new(
-        name: Ident,
-        spec: Spec,
-        clock: &Clock,
-        late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>,
-    ) -> Self {
+    pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>) -> Self {
         Self {
             name,
             spec,

@@ -138,7 +138,9 @@ impl Cell {
 
     /// Enters while it does not run, for a hook or an operation on a worker.
     pub(crate) fn enter_idle(&self, allowed: impl Fn(RunState) -> bool) -> Result<Inside<'_>, Closed> {
-        self.enter(|state| if state != RunState::Running && allowed(state) { Ok(()) } else { Err(Closed::State(state)) })
+        self.enter(
+            |state| if state != RunState::Running && allowed(state) { Ok(()) } else { Err(Closed::State(state)) },
+        )
     }
 
     /// Enters a component that was put in quarantine and has come back, to clean it up.

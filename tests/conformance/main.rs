@@ -4,6 +4,7 @@
 //! fail, panic or hang in a hook, and how to make one raise an event.
 
 mod bed;
+mod embedded;
 mod rules;
 mod simulated;
 
@@ -52,3 +53,4 @@ macro_rules! every_rule {
 }
 
 every_rule!(on_simulated, crate::simulated::SimulatedBed);
+every_rule!(on_embedded, crate::embedded::EmbeddedBed);

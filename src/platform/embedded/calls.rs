@@ -29,7 +29,9 @@ impl Inner {
     /// Runs a hook on a worker. The component must not be running.
     pub(super) fn hook(&self, cell: &Arc<Cell>, transition: Transition, deadline: Time) -> Outcome {
         // A stop has closed the gate already; its hook runs in what is, for everybody else, `stopped`.
-        let may = |state| if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) };
+        let may = |state| {
+            if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) }
+        };
         match cell.enter_idle(may) {
             Ok(inside) => inside.hand_over(),
             Err(why) => return Outcome::NotDone(closed(why, cell.name, transition.as_str())),
@@ -144,7 +146,8 @@ impl Inner {
         let cancelled = Arc::new(AtomicBool::new(false));
         let (reply, replied) = self.clock.channel(1);
         let in_activity = cell.state() == RunState::Running;
-        let mut begun = Begun { cell: cell.clone(), in_activity, stage: stage.clone(), cancelled: cancelled.clone(), replied };
+        let mut begun =
+            Begun { cell: cell.clone(), in_activity, stage: stage.clone(), cancelled: cancelled.clone(), replied };
         if let Some(caller) = registry.entry(slot).caller(operation) {
             drop(registry);
             begun.in_activity = false;

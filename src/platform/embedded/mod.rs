@@ -18,13 +18,11 @@ mod registry;
 mod steps;
 mod workers;
 
-use super::{
-    EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared,
-};
+use super::{EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
 use crate::limits;
 use crate::model::{
-    Activity as Spec, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot, Step, Transition,
-    TypeName,
+    Activity as Spec, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot, Step,
+    Transition, TypeName,
 };
 use crate::runtime::{ActivityStatus, Kind, Libraries, Notice, Notices, guard};
 use crate::time::{Clock, Time, lock};
@@ -145,11 +143,7 @@ impl Platform for EmbeddedPlatform {
         Ok(lock(&self.inner.registry).snapshot())
     }
 
-    fn observe_component(
-        &self,
-        component: ComponentName,
-        _: Time,
-    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
+    fn observe_component(&self, component: ComponentName, _: Time) -> Result<Option<ComponentSnapshot>, ObserveError> {
         let registry = lock(&self.inner.registry);
         Ok(registry.find(component).ok().map(|slot| registry.component(slot)))
     }

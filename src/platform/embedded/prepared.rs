@@ -67,9 +67,7 @@ impl Prepared for Resolved {
             return Outcome::NotDone(Cause::Refused("the component is not there any more".to_owned()));
         }
         match act {
-            Act::Property(index, prepared) => {
-                outcome(registry.set_property(*slot, *index, value.unwrap_or(prepared)))
-            }
+            Act::Property(index, prepared) => outcome(registry.set_property(*slot, *index, value.unwrap_or(prepared))),
             Act::Port(index, prepared) => {
                 outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), inner.clock.now()))
             }

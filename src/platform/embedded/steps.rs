@@ -63,29 +63,15 @@ impl Inner {
         }
     }
 
-    fn connect(
-        &self,
-        from: crate::model::MemberRef,
-        to: crate::model::MemberRef,
-        policy: Policy,
-    ) -> Result<(), Cause> {
+    fn connect(&self, from: crate::model::MemberRef, to: crate::model::MemberRef, policy: Policy) -> Result<(), Cause> {
         lock(&self.registry).connect(from, to, policy)
     }
 
-    fn create(
-        &self,
-        name: ComponentName,
-        ty: TypeName,
-        asked: Option<Ident>,
-        values: &[Value],
-    ) -> Result<(), Cause> {
-        let kind =
-            self.kinds.get(&ty).ok_or_else(|| Cause::Refused(format!("no library here makes a `{ty}`")))?;
+    fn create(&self, name: ComponentName, ty: TypeName, asked: Option<Ident>, values: &[Value]) -> Result<(), Cause> {
+        let kind = self.kinds.get(&ty).ok_or_else(|| Cause::Refused(format!("no library here makes a `{ty}`")))?;
         let crew = asked.unwrap_or(self.default_activity);
-        let spec = *self
-            .activities
-            .get(&crew)
-            .ok_or_else(|| Cause::Refused(format!("there is no activity `{crew}`")))?;
+        let spec =
+            *self.activities.get(&crew).ok_or_else(|| Cause::Refused(format!("there is no activity `{crew}`")))?;
         check_values(&kind.ty, values)?;
         let wake = {
             let mut registry = lock(&self.registry);

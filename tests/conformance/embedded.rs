@@ -1,0 +1,153 @@
+//! The embedded platform, to be tested.
+
+use crate::bed::{Bed, Made, Trouble};
+use davit::model::{EventName, Transition, Tunable};
+use davit::platform::embedded::EmbeddedPlatform;
+use davit::record;
+use davit::runtime::{
+    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Libraries, Library, Out, Prop,
+};
+use davit::time::Clock;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
+pub struct EmbeddedBed;
+
+/// What tests ask of components that they cannot reach: by the clock, of which every test has its own.
+struct Wish {
+    clock: Clock,
+    trouble: Vec<(&'static str, Trouble)>,
+    raise: Vec<(String, String)>,
+}
+
+static WISHES: Mutex<Vec<Wish>> = Mutex::new(Vec::new());
+
+fn with_wish<R>(clock: &Clock, f: impl FnOnce(&mut Wish) -> R) -> Option<R> {
+    WISHES.lock().unwrap().iter_mut().find(|wish| wish.clock.is(clock)).map(f)
+}
+
+record! {
+    /// Where something is.
+    #[derive(Default)]
+    struct Place {
+        x: f64,
+        y: f64,
+    }
+}
+
+#[allow(dead_code)]
+struct Plant {
+    inputs: (In<f64>, In<f64>, In<f64>, In<[f64; 3]>, In<i64>, In<f64>, In<EventName>),
+    outputs: (Out<f64>, Out<f64>, Out<[f64; 3]>),
+    said: EventOut,
+    gain: Prop<f64>,
+    gains: Prop<[f64; 3]>,
+    mode: Prop<i64>,
+    device: Prop<String>,
+    pose: Prop<Place>,
+}
+
+impl Component for Plant {
+    fn new(b: &mut Builder<Self>) -> Self {
+        b.describe("Has a member of every kind.");
+        b.no_effect().operation("nothing", |_, _, (): ()| Answer::Done(()));
+        b.no_effect().operation("scale", |_, _, (a, b): (f64, i64)| Answer::Done(a * b as f64));
+        Self {
+            inputs: (
+                b.unit("N").input("u"),
+                b.input("u_plain"),
+                b.unit("m").input("u_m"),
+                b.input("v"),
+                b.input("n"),
+                b.unit("N").buffered().input("q"),
+                b.event_input("heard"),
+            ),
+            outputs: (b.unit("N").output("y"), b.unit("N").output("y2"), b.output("w")),
+            said: b.event_output("said"),
+            gain: b.range(0.0..=10.0).property("gain", 1.0),
+            gains: b.range(0.0..=10.0).property("gains", [1.0; 3]),
+            mode: b.tunable(Tunable::Stopped).required_property("mode", 0),
+            device: b.tunable(Tunable::Unconfigured).property("device", "none".to_owned()),
+            pose: b.range(-1.0..=1.0).property("pose", Place::default()),
+        }
+    }
+
+    fn update(&mut self, cx: &mut Context) {
+        let name = cx.name().to_string();
+        let asked = with_wish(cx.clock(), |wish| {
+            let at = wish.raise.iter().position(|(component, _)| *component == name)?;
+            Some(wish.raise.remove(at).1)
+        });
+        if let Some(event) = asked.flatten() {
+            self.said.raise(EventName::new(&event).unwrap());
+        }
+    }
+}
+
+struct Misbehaving;
+
+fn misbehave(cx: &Context, hook: &str) -> HookResult {
+    let trouble = with_wish(cx.clock(), |w| w.trouble.iter().find(|(h, _)| *h == hook).map(|(_, t)| *t)).flatten();
+    match trouble {
+        None => Ok(()),
+        Some(Trouble::Fail) => Err(Failure::from("on purpose")),
+        Some(Trouble::Panic) => panic!("on purpose"),
+        Some(Trouble::Hang(None)) => cx.clock().hang(),
+        Some(Trouble::Hang(Some(time))) => {
+            cx.clock().sleep(time);
+            Ok(())
+        }
+    }
+}
+
+impl Component for Misbehaving {
+    fn new(b: &mut Builder<Self>) -> Self {
+        b.describe("Does in its hooks what the test asks for.");
+        b.on_configure(|_, cx| misbehave(cx, Transition::Configure.as_str()));
+        b.on_start(|_, cx| misbehave(cx, Transition::Start.as_str()));
+        b.on_stop(|_, cx| misbehave(cx, Transition::Stop.as_str()));
+        b.on_cleanup(|_, cx| misbehave(cx, Transition::Cleanup.as_str()));
+        Self
+    }
+}
+
+pub fn libraries() -> Libraries {
+    Libraries::new().with(Library::new("bed").with::<Plant>("Plant").with::<Misbehaving>("Misbehaving"))
+}
+
+/// At the end of a test: those who hang are released, so that no thread outlives it.
+struct Release(Clock);
+
+impl Drop for Release {
+    fn drop(&mut self) {
+        self.0.shutdown();
+        WISHES.lock().unwrap().retain(|wish| !wish.clock.is(&self.0));
+    }
+}
+
+impl Bed for EmbeddedBed {
+    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
+        let clock = Clock::simulated();
+        let guard = clock.enter();
+        WISHES.lock().unwrap().push(Wish { clock: clock.clone(), trouble: trouble.to_vec(), raise: Vec::new() });
+        let platform = EmbeddedPlatform::new(&clock, &libraries(), &BTreeMap::new());
+        let asked = clock.clone();
+        Made {
+            platform: Arc::new(platform),
+            clock: clock.clone(),
+            raise: Box::new(move |component, event| {
+                with_wish(&asked, |wish| wish.raise.push((component.to_owned(), event.to_owned())));
+            }),
+            keep: vec![Box::new(Release(clock)), Box::new(guard)],
+        }
+    }
+}
+
+/// The suite's types are the same on every platform.
+#[test]
+fn the_types_are_those_of_the_suite() {
+    let here = libraries().catalogue();
+    for ty in crate::bed::types() {
+        assert_eq!(**here.get(ty.name).unwrap(), ty);
+    }
+}
