@@ -41,6 +41,7 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
         blamed: FxHashSet::default(),
     };
     let sorted = conflicts::sort(configuration, &mut b.findings);
+    b.blamed.extend(&sorted.disputed);
     lists::apply(&mut b, &configuration.pre, Stage::Pre, &sorted);
     b.stage = Stage::Changes;
     let from = b.steps.len();

@@ -48,6 +48,8 @@ pub(super) struct Sorted {
     pub(super) uses: Vec<Use>,
     pub(super) created: FxHashMap<ComponentName, usize>,
     pub(super) destroyed: FxHashMap<ComponentName, usize>,
+    /// Components of which two different creates stand there.
+    pub(super) disputed: Vec<ComponentName>,
 }
 
 pub(super) fn clash(first: &Change, second: &Change) -> Finding {
@@ -62,8 +64,12 @@ pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -
     let changes = &configuration.changes;
     let mut seen: FxHashMap<Subject, u32> = FxHashMap::default();
     seen.reserve(changes.len());
-    let mut sorted =
-        Sorted { uses: vec![Use::Yes; changes.len()], created: FxHashMap::default(), destroyed: FxHashMap::default() };
+    let mut sorted = Sorted {
+        uses: vec![Use::Yes; changes.len()],
+        created: FxHashMap::default(),
+        destroyed: FxHashMap::default(),
+        disputed: Vec::new(),
+    };
     let mut writes = false;
     for (i, change) in changes.iter().enumerate() {
         match seen.entry(Subject::of(&change.kind)) {
@@ -83,7 +89,12 @@ pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -
                 } else if matches!(change.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. }) {
                     Use::Rival(first)
                 } else {
+                    // Neither is planned: what follows from the one or the other would depend on the written order.
                     findings.push(clash(&changes[first], change));
+                    sorted.uses[first] = Use::No;
+                    if let ChangeKind::Create { component, .. } = &change.kind {
+                        sorted.disputed.push(*component);
+                    }
                     Use::No
                 };
             }

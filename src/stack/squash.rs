@@ -27,11 +27,14 @@ fn pair(frames: &[Arc<Frame>], active: &BTreeSet<FrameId>) -> Option<usize> {
     let pairs =
         || frames.windows(2).enumerate().filter(|(_, w)| free(&w[0]) && free(&w[1])).map(|(i, w)| (i, &w[0], &w[1]));
     // Below a floor nothing can be undone anyway.
-    pairs()
+    // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
+    let older = || pairs().filter(|(i, _, _)| i + 2 < frames.len());
+    older()
         .find(|(_, _, upper)| upper.floor.is_some())
         // A group's frame is wanted when the group changes.
-        .or_else(|| pairs().find(|(_, a, b)| a.floor.is_none() && a.group.is_none() && b.group.is_none()))
-        .or_else(|| pairs().find(|(_, a, _)| a.floor.is_none()))
+        .or_else(|| older().find(|(_, a, b)| a.floor.is_none() && a.group.is_none() && b.group.is_none()))
+        .or_else(|| older().find(|(_, a, _)| a.floor.is_none()))
+        .or_else(|| older().next())
         .or_else(|| pairs().next())
         .map(|(i, _, _)| i)
 }

@@ -1,0 +1,241 @@
+//! Laws of stacks: n pushes and n pops, pop_to, selective undo, net, squash.
+
+use crate::generate::{self, ConfigGene, TypeGene, context, read};
+use crate::plain::Plain;
+use crate::plans::{every_order, operator, show};
+use crate::settings;
+use davit::model::{Catalogue, Snapshot, Step};
+use davit::plan::footprint::{Saved, Slot};
+use davit::plan::{PlannedStep, Refusal};
+use davit::stack::{FrameId, Request, Stack, Transaction, transaction};
+use davit::system::{System, step};
+use proptest::prelude::*;
+use std::sync::Arc;
+
+/// A system with its stack.
+#[derive(Debug, Clone)]
+pub struct Both {
+    pub system: System,
+    pub stack: Stack,
+    pub types: Arc<Catalogue>,
+}
+
+impl Both {
+    pub fn new(types: Arc<Catalogue>, bound: usize) -> Self {
+        Self { system: System::new(types.clone()), stack: Stack::new(bound), types }
+    }
+
+    pub fn ask(&self, requests: &[Request<'_>]) -> Result<Transaction, Refusal> {
+        transaction(&self.system, &self.stack, requests, &context())
+    }
+
+    pub fn execute(&mut self, transaction: Transaction) -> Vec<FrameId> {
+        for s in &transaction.steps {
+            step::apply(&s.step, &mut self.system)
+                .unwrap_or_else(|v| panic!("{}: {v:?} in {:?}", s.step, show(&transaction.steps)));
+        }
+        self.stack.commit(transaction)
+    }
+
+    pub fn make(&mut self, requests: &[Request<'_>]) -> Result<Vec<FrameId>, Refusal> {
+        let transaction = self.ask(requests)?;
+        Ok(self.execute(transaction))
+    }
+
+    /// Pushes what is accepted of `genes`, without groups, and answers the system before each.
+    fn grow(&mut self, genes: &[ConfigGene]) -> Vec<Snapshot> {
+        let mut before = Vec::new();
+        for gene in genes {
+            let mut conf = read(gene, &self.system);
+            conf.group = None;
+            let now = self.system.snapshot();
+            if self.make(&[operator(&conf)]).is_ok() {
+                before.push(now);
+            }
+        }
+        before
+    }
+}
+
+/// What a frame did, as plain writes: its steps, and the demands that were true already (a write counts as one).
+pub fn record(steps: &[PlannedStep], saved: &[davit::plan::SavedValue]) -> Vec<Step> {
+    let kept = saved.iter().filter(|s| !s.step).filter_map(|s| match (s.slot, &s.value) {
+        (Slot::Property(property), Saved::Property(value)) => {
+            Some(Step::PropertySet { property, value: value.clone() })
+        }
+        (Slot::Port(port), Saved::Port(value)) => Some(Step::PortWrite { port, value: value.clone() }),
+        _ => None,
+    });
+    // What a demand found was there before the steps of its stage; property and port writes of one frame are of
+    // different slots, and a demand needs the run state that the list brought about, so it stands where it was made.
+    let mut list: Vec<Step> = Vec::new();
+    let mut kept: Vec<(u32, Step)> = saved.iter().filter(|s| !s.step).map(|s| s.at).zip(kept).collect();
+    kept.sort_by_key(|(at, _)| *at);
+    let mut kept = kept.into_iter().peekable();
+    for s in steps {
+        while let Some((_, write)) = kept.next_if(|(at, _)| *at <= s.id) {
+            list.push(write);
+        }
+        list.push(s.step.clone());
+    }
+    list.extend(kept.map(|(_, write)| write));
+    list
+}
+
+pub fn world(n: std::ops::Range<usize>) -> impl Strategy<Value = (Vec<TypeGene>, Vec<ConfigGene>)> {
+    (generate::types(), generate::configs(n))
+}
+
+proptest! {
+    #![proptest_config(settings())]
+
+    /// n pushes then n pops is the identity, one by one or down to any depth at once, in every permitted order.
+    #[test]
+    fn stack((types, genes) in world(1..7), to in any::<prop::sample::Index>(), seed in any::<u64>()) {
+        let mut both = Both::new(generate::catalogue(&types, false), 64);
+        let before = both.grow(&genes);
+        let mut jump = both.clone();
+        let depth = to.index(before.len() + 1);
+        let top = Plain::new(jump.system.snapshot(), &jump.types);
+        let down = jump.ask(&[Request::UndoTo(depth)]).unwrap();
+        let reached = every_order(&top, &down.steps, seed);
+        jump.execute(down);
+        prop_assert_eq!(&jump.system.snapshot(), &reached.is);
+        prop_assert_eq!(jump.stack.len(), depth);
+        if depth < before.len() {
+            prop_assert_eq!(&reached.is, &before[depth]);
+        }
+        for earlier in before.iter().rev() {
+            both.make(&[Request::UndoTop]).unwrap();
+            prop_assert_eq!(&both.system.snapshot(), earlier);
+        }
+        prop_assert!(both.stack.is_empty() && both.ask(&[Request::UndoTop]).is_err());
+    }
+
+    /// Popping a frame from the middle gives the system of the other frames' steps, or is refused; and the rest of the
+    /// stack can still be popped.
+    #[test]
+    fn selective_undo((types, genes) in world(2..7), pick in any::<prop::sample::Index>()) {
+        let mut both = Both::new(generate::catalogue(&types, false), 64);
+        both.grow(&genes);
+        if both.stack.is_empty() {
+            return Ok(());
+        }
+        let records: Vec<Vec<Step>> = both.stack.frames().iter().map(|f| record(f.steps(), &f.saved)).collect();
+        let at = pick.index(records.len());
+        let id = both.stack.frames()[at].id;
+        let before = both.system.snapshot();
+        let frames = both.stack.len();
+        match both.make(&[Request::Undo(id)]) {
+            Err(refusal) => {
+                prop_assert!(at + 1 < frames, "the top can always be popped: {:?}", refusal);
+                prop_assert_eq!(both.system.snapshot(), before);
+                prop_assert_eq!(both.stack.len(), frames);
+            }
+            Ok(_) => {
+                let mut plain = Plain::new(Snapshot::default(), &both.types);
+                let others = records.iter().enumerate().filter(|(i, _)| *i != at).flat_map(|(_, r)| r);
+                for step in others.clone() {
+                    prop_assert!(plain.try_make(step), "{} cannot be replayed: {:?}", step, others.map(ToString::to_string).collect::<Vec<_>>());
+                }
+                prop_assert_eq!(&both.system.snapshot(), &plain.is);
+                // What is left pops as if the frame had never been.
+                while !both.stack.is_empty() {
+                    both.make(&[Request::UndoTop]).unwrap();
+                    let mut plain = Plain::new(Snapshot::default(), &both.types);
+                    let left = records.iter().enumerate().filter(|(i, _)| *i != at).take(both.stack.len());
+                    for step in left.flat_map(|(_, r)| r) {
+                        prop_assert!(plain.try_make(step));
+                    }
+                    prop_assert_eq!(&both.system.snapshot(), &plain.is);
+                }
+            }
+        }
+    }
+
+    /// An undo and a push as one transaction end in the same system, and in the same stack, as one after the other; with
+    /// no more steps, and no write of what is there.
+    #[test]
+    fn net((types, genes) in world(2..7), pick in any::<prop::sample::Index>(), seed in any::<u64>()) {
+        let mut one = Both::new(generate::catalogue(&types, false), 64);
+        let (last, first) = genes.split_last().unwrap();
+        one.grow(first);
+        if one.stack.is_empty() {
+            return Ok(());
+        }
+        let id = one.stack.frames()[pick.index(one.stack.len())].id;
+        let mut two = one.clone();
+        let start = Plain::new(one.system.snapshot(), &one.types);
+        let Ok(undo) = two.ask(&[Request::Undo(id)]) else { return Ok(()) };
+        let mut steps = undo.steps.len();
+        two.execute(undo);
+        let mut conf = read(last, &two.system);
+        conf.group = None;
+        let push = two.ask(&[operator(&conf)]);
+        let net = one.ask(&[Request::Undo(id), operator(&conf)]);
+        prop_assert_eq!(push.is_ok(), net.is_ok());
+        let (Ok(push), Ok(net)) = (push, net) else { return Ok(()) };
+        steps += push.steps.len();
+        prop_assert!(net.steps.len() <= steps);
+        let mut seen = std::collections::BTreeSet::new();
+        for s in &net.steps {
+            if let Step::PropertySet { property, .. } = &s.step {
+                let created = net.steps.iter().any(|o| matches!(o.step, Step::Create { component, .. } if component == property.component));
+                prop_assert!(created || seen.insert(*property), "written twice: {:?}", show(&net.steps));
+            }
+        }
+        let reached = every_order(&start, &net.steps, seed);
+        one.execute(net);
+        two.execute(push);
+        prop_assert_eq!(&reached.is, &two.system.snapshot());
+        while !two.stack.is_empty() {
+            prop_assert_eq!(one.system.snapshot(), two.system.snapshot());
+            one.make(&[Request::UndoTop]).unwrap();
+            two.make(&[Request::UndoTop]).unwrap();
+        }
+        prop_assert!(one.stack.is_empty() && one.system.is_empty());
+    }
+
+    /// A squashed frame undoes to the same system as its parts: a stack of 2 and one of 64 part ways in nothing that can be
+    /// seen.
+    #[test]
+    fn squash((types, genes) in world(3..9), bound in 2usize..4, keep in any::<u8>()) {
+        let catalogue = generate::catalogue(&types, false);
+        let mut small = Both::new(catalogue.clone(), bound);
+        let mut large = Both::new(catalogue, 64);
+        let mut before = Vec::new();
+        for (i, gene) in genes.iter().enumerate() {
+            let mut conf = read(gene, &large.system);
+            conf.group = None;
+            let now = large.system.snapshot();
+            let active = i < 2 && keep & (1 << i) != 0;
+            let request = [match operator(&conf) {
+                Request::Push { configuration, requester, at, .. } => Request::Push { configuration, requester, at, active },
+                other => other,
+            }];
+            let Ok(pushed) = small.make(&request) else {
+                // Refused as such, or nothing could be squashed.
+                continue;
+            };
+            large.make(&request).unwrap();
+            before.push((pushed[0], now));
+            prop_assert!(small.stack.len() <= bound);
+            prop_assert_eq!(small.system.snapshot(), large.system.snapshot());
+        }
+        prop_assert!(before.iter().zip(0..2).all(|((id, _), i)| keep & (1 << i) == 0 || i > 0 || small.stack.frame(*id).is_none_or(|f| !f.is_squashed())));
+        while !small.stack.is_empty() {
+            let frame = small.stack.top().unwrap().clone();
+            prop_assert!(frame.floor.is_none());
+            small.make(&[Request::UndoTop]).unwrap_or_else(|r| panic!("{r:?} {frame:?}"));
+            let parts = frames_below(&small, &before);
+            large.make(&[Request::UndoTo(parts)]).unwrap();
+            prop_assert_eq!(small.system.snapshot(), large.system.snapshot());
+        }
+        prop_assert!(small.system.is_empty());
+    }
+}
+
+/// How many of the pushed frames the small stack still stands for: those up to its top.
+fn frames_below(small: &Both, pushed: &[(FrameId, Snapshot)]) -> usize {
+    small.stack.top().map_or(0, |top| pushed.iter().position(|(id, _)| *id == top.id).unwrap() + 1)
+}
