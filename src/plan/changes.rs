@@ -345,8 +345,11 @@ fn connect(
             _ => false,
         });
         if let Some(other) = other {
-            b.findings.push(clash(other, change));
             found.retain(|v| !matches!(v, Violation::DataAlone { .. }));
+            // A connection that is wrong by itself competes with nothing.
+            if found.is_empty() {
+                b.findings.push(clash(other, change));
+            }
             b.refuse(&what, found, change.origin);
             return;
         }
