@@ -1,4 +1,5 @@
 //! The youBot reference application, measured in simulated time.
 
 mod coupling;
+mod files;
 mod golden;

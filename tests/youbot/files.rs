@@ -1,0 +1,123 @@
+//! The deployment files: the paper's configurations as they stand, and the series that brings the robot up and down.
+
+use davit::lang::{LoadOptions, load};
+use davit::libraries::builtin;
+use davit::model::{Catalogue, ConfigId, Deployment};
+use davit::plan::{Context, plan};
+use davit::system::System;
+use davit::system::step::apply;
+use std::path::Path;
+use std::sync::Arc;
+
+const PAPER: &str = r#"ConfiguratorConf {
+   disable_copying = Configuration{
+       port_write("Cart_Impedance.ext_ref_mode", false)
+   },
+   
+   enable_copying = Configuration {
+       port_write("Cart_Impedance.ext_ref_mode", true)
+   },
+
+   eight_DOF = Configuration {
+      property_set("Dynamics.force_gain", {0.1, 0.1, 0.1})
+   },
+
+   five_DOF = Configuration {
+      property_set("Dynamics.force_gain", {0, 0, 0})
+   },
+}
+"#;
+
+const UP: &[&str] = &[
+    "create_core",
+    "create_link",
+    "create_monitors",
+    "connect_all",
+    "load_properties",
+    "start_driver",
+    "calibrate",
+    "unfold",
+    "start_control",
+    "take_over",
+];
+const DOWN: &[&str] =
+    &["base_stop", "hold", "park", "stop_control", "stop_all", "cleanup_all", "disconnect_all", "destroy_all"];
+const DEPLOYMENTS: &[&str] = &["youbot_arm", "youbot_arm_scoped", "generic_arm"];
+
+pub fn deployment(name: &str) -> (Deployment, Arc<Catalogue>) {
+    let path = format!("deployments/{name}.yaml");
+    let loaded = load(Path::new(&path), &LoadOptions::default());
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{path}: {:?}", loaded.findings));
+    let mut catalogue = builtin().select(&deployment.libraries).expect("built in").catalogue();
+    for ty in &deployment.types {
+        catalogue.insert(ty.clone());
+    }
+    (deployment, Arc::new(catalogue))
+}
+
+fn go(system: &mut System, deployment: &Deployment, ids: &[&str]) {
+    let context = Context { activities: deployment.activities.keys().copied().collect() };
+    for id in ids {
+        let configuration = deployment.configuration(ConfigId::new(id).unwrap()).unwrap_or_else(|| panic!("no {id}"));
+        let plan = plan(system, configuration, &context).unwrap_or_else(|r| panic!("{id}: {:?}", r.findings));
+        assert!(plan.irreversible().is_none(), "{id}: {:?}", plan.irreversible());
+        for step in &plan.steps {
+            apply(&step.step, system).unwrap_or_else(|v| panic!("{id}: {}: {v:?}", step.step));
+        }
+    }
+}
+
+#[test]
+fn listing_2_stands_as_in_the_paper() {
+    let file = std::fs::read_to_string("configs/youbot/coupling.lua").unwrap();
+    let text: String = file.lines().filter(|l| !l.starts_with("--")).map(|l| format!("{l}\n")).collect();
+    assert_eq!(text, PAPER);
+}
+
+#[test]
+fn every_series_goes_up_and_comes_down_to_nothing() {
+    for name in DEPLOYMENTS {
+        let (deployment, catalogue) = deployment(name);
+        let mut system = System::new(catalogue);
+        go(&mut system, &deployment, UP);
+        let up = system.snapshot();
+        assert!(up.components.values().all(|c| c.state == davit::model::RunState::Running), "{name}");
+        // What happens while it is up, also twice, takes nothing from the way down.
+        let switches: &[&str] =
+            &["five_DOF", "enable_copying", "eight_DOF", "safe_hold", "disable_copying", "restart_controller"];
+        go(&mut system, &deployment, switches);
+        go(&mut system, &deployment, switches);
+        go(&mut system, &deployment, DOWN);
+        assert!(system.is_empty(), "{name}: {:?}", system.snapshot());
+    }
+}
+
+/// The hypothesis of the paper: one coordinator, unchanged, over two platforms.
+#[test]
+fn the_same_coordinator_over_another_platform() {
+    let (youbot, _) = deployment("youbot_arm");
+    let (generic, catalogue) = deployment("generic_arm");
+    let text = |name: &str| {
+        let yaml = std::fs::read_to_string(format!("deployments/{name}.yaml")).unwrap();
+        yaml.lines().find(|l| l.starts_with("coordinator:")).expect("a coordinator").to_owned()
+    };
+    assert_eq!(text("youbot_arm"), text("generic_arm"));
+    assert_ne!(youbot.platform, generic.platform);
+    let of_the_youbot = builtin().catalogue();
+    for configuration in &generic.configurations {
+        assert!(youbot.configuration(configuration.id).is_some(), "{}", configuration.id);
+    }
+    assert!(catalogue.iter().all(|ty| of_the_youbot.get(ty.name).is_none()));
+    // And the coordinator names neither a component nor a type of either platform.
+    let coordinator = std::fs::read_to_string("configs/youbot/coordinator.lua").unwrap();
+    let code: String = coordinator.lines().map(|l| l.split("--").next().unwrap_or_default()).collect();
+    for (deployment, catalogue) in [(&youbot, of_the_youbot), (&generic, (*catalogue).clone())] {
+        let mut system = System::new(Arc::new(catalogue));
+        go(&mut system, deployment, &UP[..3]);
+        for name in system.snapshot().components.keys() {
+            let name = name.to_string();
+            let named = code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
+            assert!(!named, "the coordinator names `{name}`");
+        }
+    }
+}
