@@ -91,7 +91,7 @@ pub struct Drift {
 
 /// How a broken system is recovered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
+pub enum Recovery {
     /// To the system before the interrupted application.
     Back,
     /// The system as it is becomes the one that should be; the stack is discarded. For when a person has decided that
@@ -103,7 +103,7 @@ pub enum Direction {
 pub(super) enum Command {
     View { system: bool, reply: Sender<Arc<View>> },
     Drift { reply: Sender<Drift> },
-    Recover { direction: Direction, reply: Sender<Result<(), Arc<Residual>>> },
+    Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
     TakeDown { forced: bool, deadline: Time, reply: Sender<TakenDown> },
     DiscardStack,
     Stop,

@@ -28,7 +28,7 @@ mod transaction;
 mod work;
 
 pub use crate::stack::Requester;
-pub use control::{Busy, Direction, Drift, FrameView, TakenDown, View};
+pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use log::{Entry, Log, Progress, ProgressSink, StepEnd, StepName, What};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
@@ -192,7 +192,7 @@ impl ConfiguratorHandle {
     }
 
     /// Recovers a broken system; the error is what remains. None: no answer by `deadline`.
-    pub fn recover(&self, direction: Direction, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
+    pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
         self.ask(deadline, |reply| Command::Recover { direction, reply })
     }
 

@@ -1,6 +1,6 @@
 //! Taking everything down, comparing with the platform, and recovering.
 
-use super::control::{Command, Direction, Drift, TakenDown};
+use super::control::{Command, Drift, Recovery, TakenDown};
 use super::engine::{Broken, Engine};
 use super::exec::Run;
 use super::frames::Op;
@@ -61,11 +61,11 @@ impl Engine {
     }
 
     /// Recovers a broken system.
-    fn recover(&mut self, direction: Direction) -> Result<(), Arc<Residual>> {
+    fn recover(&mut self, direction: Recovery) -> Result<(), Arc<Residual>> {
         let Some(broken) = self.broken.take() else { return Ok(()) };
         match direction {
-            Direction::Back => self.recover_back(broken),
-            Direction::Accept => {
+            Recovery::Back => self.recover_back(broken),
+            Recovery::Accept => {
                 let mut between = Interruption::closed();
                 match self.look(&mut between) {
                     Some(seen) if self.adopt(&seen).is_ok() => {

@@ -90,7 +90,8 @@ impl Shared {
             Due::Raised { event, component } => self.emit(PlatformEvent::Raised { event, component, at }),
             Due::Returned(component) => {
                 // The effect of a hung step never reached the world: what the late call did is taken back by that.
-                if self.lock().quarantine.remove(&component).is_some() {
+                let was_there = self.lock().quarantine.remove(&component).is_some();
+                if was_there {
                     self.emit(PlatformEvent::Returned { component, at });
                 }
             }
@@ -229,12 +230,10 @@ impl Simulated {
 
     /// `component` fails by itself: it is faulted. Answers whether there is such a component.
     pub fn fault(&self, component: ComponentName, reason: &str) -> bool {
-        let found = match self.shared.lock().world.components.get_mut(&component) {
-            Some(it) => {
-                it.state = RunState::Faulted;
-                true
-            }
-            None => false,
+        let found = {
+            let mut state = self.shared.lock();
+            let it = state.world.components.get_mut(&component);
+            it.map(|it| it.state = RunState::Faulted).is_some()
         };
         if found {
             let at = self.shared.clock.now();
@@ -283,7 +282,7 @@ impl Simulated {
         match fault.or(slow) {
             None => {
                 self.shared.clock.sleep_until(now + delay);
-                let outcome = Self::now(&mut self.shared.lock(), step);
+                let outcome = self.let_happen(step);
                 if matches!(outcome, Outcome::Done(_)) {
                     self.react(step);
                 }
@@ -303,7 +302,7 @@ impl Simulated {
             }
             Some(Fault::FalseNotDone) => {
                 self.shared.clock.sleep_until(now + delay);
-                match Self::now(&mut self.shared.lock(), step) {
+                match self.let_happen(step) {
                     Outcome::Done(_) => Outcome::NotDone(Cause::Failed("a false answer was injected".to_owned())),
                     other => other,
                 }
@@ -311,7 +310,7 @@ impl Simulated {
             Some(fault @ (Fault::LostAnswer | Fault::LostRequest)) => {
                 self.shared.clock.sleep_until(now + delay);
                 if fault == Fault::LostAnswer
-                    && let Outcome::Done(_) = Self::now(&mut self.shared.lock(), step)
+                    && let Outcome::Done(_) = self.let_happen(step)
                 {
                     self.react(step);
                 }
@@ -320,6 +319,12 @@ impl Simulated {
             }
             Some(Fault::Hang { returns }) => self.hang(step, returns, deadline),
         }
+    }
+
+    /// [`Self::now`] with the lock held for just that: a temporary guard would live as long as a `match` on the outcome.
+    fn let_happen(&self, step: &Step) -> Outcome {
+        let mut state = self.shared.lock();
+        Self::now(&mut state, step)
     }
 
     fn now(state: &mut State, step: &Step) -> Outcome {
@@ -338,7 +343,8 @@ impl Simulated {
     fn panic(&self, step: &Step) -> Outcome {
         let component = step.component();
         let reason = "a panic was injected";
-        if let Err(why) = self.shared.lock().world.check(step) {
+        let refused = self.shared.lock().world.check(step);
+        if let Err(why) = refused {
             return Outcome::NotDone(Cause::Refused(why));
         }
         self.fault(component, reason);

@@ -1,0 +1,8 @@
+//! The configurator against design §6, on the simulated platform and in simulated time.
+
+mod atomicity;
+mod rig;
+mod safe;
+mod survival;
+mod table;
+mod teardown;
