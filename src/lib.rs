@@ -17,6 +17,7 @@ pub mod runtime;
 pub mod session;
 pub mod statechart;
 
+pub mod app;
 pub mod plan;
 pub mod stack;
 pub mod system;

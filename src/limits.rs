@@ -133,3 +133,18 @@ pub const ACTIVITY_REQUESTS: usize = 64;
 
 /// How long taking down the embedded runtime waits for each thread of it; one that hangs is left behind.
 pub const RUNTIME_END: Duration = Duration::from_secs(1);
+/// Blocking platform calls one session makes at the same time: enough to configure the components of a robot side by
+/// side, few enough that a platform that answers nothing costs a handful of threads.
+pub const SESSION_WORKERS: usize = 8;
+
+/// How long a look at the configurator or the platform may take: they answer between two steps.
+pub const VIEW: Duration = Duration::from_secs(5);
+
+/// Steps remembered with an answer in the log; a deployment of thousands of components need not stay in memory.
+pub const STEPS_LOGGED: usize = 256;
+
+/// Bytes of memory of one script.
+pub const SCRIPT_MEMORY: usize = 256 << 20;
+
+/// Instructions of one script: hours of stories, and a few seconds of an endless loop.
+pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;

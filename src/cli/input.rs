@@ -3,13 +3,11 @@
 
 use super::exit::Exit;
 use super::{Context, Failure};
-use crate::check::{self, Report};
+use crate::app::{self, Checked, Read, Refused};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
-use crate::model::codes::{CLI_BAD_SET, DEPLOY_UNKNOWN_LIBRARY};
-use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, Deployment, Finding, Findings, Statechart};
-use crate::runtime::Libraries;
+use crate::model::codes::CLI_BAD_SET;
+use crate::model::{Findings, Statechart};
 use std::path::{Path, PathBuf};
 
 /// The file a command works on, and its parameters.
@@ -19,6 +17,7 @@ pub struct Input {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
     pub parameters: Parameters,
 }
 
@@ -28,41 +27,6 @@ pub struct Parameters {
     /// Give a parameter another value than `with:` does.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-}
-
-/// A deployment that was read, with all that it may use. Nothing is checked yet.
-#[derive(Debug)]
-pub struct Read {
-    /// The deployment.
-    pub deployment: Deployment,
-    /// The component types of its libraries and those it declares.
-    pub catalogue: Catalogue,
-    /// The libraries it names.
-    pub libraries: Libraries,
-    /// Its texts.
-    pub sources: SourceMap,
-    /// What reading found; no errors among them.
-    pub findings: Findings,
-}
-
-/// A deployment in which nothing was found that refuses it.
-#[derive(Debug)]
-pub struct Checked {
-    /// The deployment.
-    pub deployment: check::Checked<Deployment>,
-    /// The component types it may use.
-    pub catalogue: Catalogue,
-    /// The libraries it names.
-    pub libraries: Libraries,
-    /// Its texts.
-    pub sources: SourceMap,
-}
-
-impl Checked {
-    /// The deployment.
-    pub fn deployment(&self) -> &Deployment {
-        &self.deployment
-    }
 }
 
 impl Parameters {
@@ -92,30 +56,7 @@ impl Input {
     /// # Errors
     /// What is wrong with its texts, or a library that this program does not have.
     pub fn read(&self, context: &Context) -> Result<Read, Failure> {
-        let loaded = lang::load(&self.file, &self.parameters.options()?);
-        let mut findings = loaded.findings;
-        let Some(deployment) = loaded.deployment else {
-            let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
-            return Err(Failure { exit, findings, sources: loaded.sources, ..Failure::default() });
-        };
-        let libraries = match context.libraries.select(&deployment.libraries) {
-            Ok(libraries) => libraries,
-            Err(name) => {
-                let known: Vec<String> = context.libraries.iter().map(|l| l.name().to_string()).collect();
-                findings.push(
-                    Finding::error(DEPLOY_UNKNOWN_LIBRARY, format!("this program has no component library `{name}`"))
-                        .at(deployment.key_origin("libraries"))
-                        .path("libraries")
-                        .help(did_you_mean(name.as_str(), "libraries", known.iter().map(String::as_str))),
-                );
-                return Err(Failure { exit: Exit::No, findings, sources: loaded.sources, ..Failure::default() });
-            }
-        };
-        let mut catalogue = libraries.catalogue();
-        for ty in &deployment.types {
-            catalogue.insert(ty.clone());
-        }
-        Ok(Read { deployment, catalogue, libraries, sources: loaded.sources, findings })
+        Ok(app::read(&self.file, &self.parameters.options()?, &context.libraries)?)
     }
 
     /// Reads the deployment and checks it.
@@ -123,13 +64,14 @@ impl Input {
     /// # Errors
     /// What reading or checking found.
     pub fn check(&self, context: &Context) -> Result<Checked, Failure> {
-        let read = self.read(context)?;
-        let Report { checked, mut findings, .. } = check::run(&read.deployment, &read.catalogue);
-        let Some(deployment) = checked else {
-            findings.extend(read.findings);
-            return Err(Failure { exit: Exit::No, findings, sources: read.sources, ..Failure::default() });
-        };
-        Ok(Checked { deployment, catalogue: read.catalogue, libraries: read.libraries, sources: read.sources })
+        Ok(app::check(self.read(context)?)?)
+    }
+}
+
+impl From<Refused> for Failure {
+    fn from(refused: Refused) -> Self {
+        let exit = if refused.unreadable { Exit::Usage } else { Exit::No };
+        Self { exit, findings: refused.findings, sources: refused.sources, ..Self::default() }
     }
 }
 

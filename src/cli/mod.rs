@@ -7,14 +7,19 @@
 
 mod check;
 mod completions;
+mod deploy;
+mod detach;
 pub mod exit;
 mod explain;
 pub mod input;
 mod log;
 pub mod output;
+mod progress;
 mod remote;
 mod request;
+mod run;
 mod shutdown;
+mod signals;
 mod sim;
 mod stack;
 mod status;
@@ -62,6 +67,8 @@ commands! {
     Check = check::Args,
     Types = types::Args,
     Sim = sim::Args,
+    Deploy = deploy::Args,
+    Run = run::Args,
     Shutdown = shutdown::Args,
     Status = status::Args,
     Stack = stack::Args,

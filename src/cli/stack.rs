@@ -5,16 +5,13 @@ use super::output::{Style, Table};
 use super::remote::{ASK, ask};
 use super::status::text;
 use super::{Answer, Context, Run};
-use serde_json::{Value as Json, json};
+use serde_json::json;
 
 /// Show the applied configurations that can be undone, newest first.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     name: Option<String>,
-    /// Show the steps of every frame.
-    #[arg(long)]
-    steps: bool,
     /// Print JSON (newest last).
     #[arg(long)]
     json: bool,
@@ -34,27 +31,17 @@ impl Run for Args {
         }
         let mut table = Table::new(0);
         for (i, frame) in frames.iter().enumerate().rev() {
-            let steps = frame["steps"].as_array().map_or(0, Vec::len);
+            let parts = frame["parts"].as_u64().unwrap_or(1);
             table.row([
                 out.paint(Style::Dim, i + 1),
                 out.paint(Style::Name, text(&frame["configuration"])),
-                format!("{steps} step{}", if steps == 1 { "" } else { "s" }),
                 format!("by {}", text(&frame["by"])),
                 format!("at {:.3} s", frame["at"].as_f64().unwrap_or_default()),
-                frame["group"].as_str().map(|g| format!("group {g}")).unwrap_or_default(),
-                frame["floor"].as_str().map(|f| out.paint(Style::Care, format!("floor: {f}"))).unwrap_or_default(),
+                if parts > 1 { format!("{parts} squashed into one") } else { String::new() },
+                if frame["floor"] == true { out.paint(Style::Care, "floor: undo stops here") } else { String::new() },
             ]);
         }
-        if !self.steps {
-            out.text(table.to_string());
-            return Ok(Exit::Done);
-        }
-        for (row, frame) in table.to_string().lines().zip(frames.iter().rev()) {
-            out.line(row);
-            for step in frame["steps"].as_array().into_iter().flatten().filter_map(Json::as_str) {
-                out.line(format!("     {step}"));
-            }
-        }
+        out.text(table.to_string());
         Ok(Exit::Done)
     }
 }

@@ -192,6 +192,9 @@ codes! {
         "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
          or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \
          arguments, or declare the effect as `none` or `irreversible`.";
+    DEPLOY_UNKNOWN_PLATFORM = "deploy::unknown_platform", "there is no such platform",
+        "The key `platform` names where the components live, and this program has no platform of that name. `embedded` \
+         runs components of the libraries in this process; `simulated` runs any declared type without components.";
     // ---- configurations and plans ----------------------------------------------------------------------------------
     CONF_KEYED_ENTRIES = "conf::keyed_entries", "two keyed entries in a state list have no order",
         "A state list is applied in its order, but the named entries of a Lua table have none: with two or more keys, \
@@ -498,6 +501,20 @@ codes! {
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";
+    CLI_NAME_TAKEN = "cli::name_taken", "a deployment of that name is already running",
+        "Every running deployment has a control socket of its own name, and one of this name answers already. Take the \
+         other one down (`davit shutdown NAME`), or give this one another `name` in its file.";
+    CLI_SYSTEM = "cli::system", "the operating system refused",
+        "Something the command needs from the operating system (a socket, a thread, a signal, a process) was refused; \
+         the message is the system's own. Usually a directory that cannot be written, or a limit on threads or open \
+         files.";
+    SCRIPT_SYNTAX = "script::syntax", "the script does not parse",
+        "The script given to `davit run` is not a Lua 5.4 program; the message says in which line Lua gave up. Mend it \
+         there; nothing was deployed.";
+    SCRIPT_FAILED = "script::failed", "the script failed",
+        "A function of the script raised an error: an assertion that does not hold, a wait whose time is over, a name \
+         that does not exist, a deployment that did not come up. The deployment was taken down before the command \
+         ended. The functions a script may call are described in docs/scripts.md.";
     CLI_NOT_RUNNING = "cli::not_running", "there is no such running deployment",
         "The command talks to a running deployment through its control socket, and none of that name (or none at all) \
          answers. Start one with `davit deploy FILE`. Sockets are looked for in $XDG_RUNTIME_DIR/davit: a deployment \

@@ -129,6 +129,13 @@ impl ComponentName {
     }
 }
 
+/// Every plain name is a component name without a prefix.
+impl From<Ident> for ComponentName {
+    fn from(name: Ident) -> Self {
+        Self(name.0)
+    }
+}
+
 impl ConfigId {
     /// The subsystem's path before the last `/`, empty at the top.
     pub fn prefix(&self) -> &'static str {

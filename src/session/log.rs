@@ -187,14 +187,10 @@ pub struct FrameView {
     pub by: String,
     /// When it was applied, in seconds.
     pub at: f64,
-    /// Its group, if it has one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub group: Option<String>,
-    /// Whether undo stops here, and why.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub floor: Option<String>,
-    /// Its steps, in words.
-    pub steps: Vec<String>,
+    /// How many applied configurations it stands for: more than one once the oldest were squashed.
+    pub parts: usize,
+    /// Whether undo stops here.
+    pub floor: bool,
 }
 
 /// A deployment at one moment: what `status --json` prints.

@@ -1,6 +1,30 @@
-//! One deployment alive.
+//! One deployment alive: monitors and operators → coordinator → configurator → status, through bounded queues.
+//!
+//! The coordinator and the configurator know nothing of each other; here names raised by the one become requests to the
+//! other, and its answers become events. The thread that calls [`Session::bring_up`], [`Session::serve`] and
+//! [`Session::take_down`] drives the deployment's life; everybody else only leaves requests and commands.
 
 pub mod client;
+pub mod hub;
+mod life;
+pub mod log;
 pub mod place;
 pub mod rpc;
+pub mod service;
 pub mod socket;
+mod wiring;
+
+pub use hub::{Hub, Observer};
+pub use life::{Ended, NotUp};
+pub use log::{Happening, Phase, StatusView};
+pub use wiring::{Session, Setup};
+
+/// What may be asked of whoever drives a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// Take it down, without the coordinator if `force`.
+    Shutdown {
+        /// Without the coordinator.
+        force: bool,
+    },
+}

@@ -26,6 +26,9 @@ pub trait Service: Send + Sync + 'static {
     fn call(&self, method: &str, params: &Json) -> Result<Json, RpcError>;
 }
 
+/// Sends a notification (method, parameters) to all subscribers; never waits.
+pub type Notifier = Arc<dyn Fn(&str, &Json) + Send + Sync>;
+
 /// Lines on their way to the subscribers.
 #[derive(Default)]
 struct Subscribers {
@@ -115,7 +118,7 @@ impl ControlSocket {
     }
 
     /// A function that sends notifications, for other threads.
-    pub fn notifier(&self) -> Arc<dyn Fn(&str, &Json) + Send + Sync> {
+    pub fn notifier(&self) -> Notifier {
         let subscribers = self.subscribers.clone();
         Arc::new(move |method, params| subscribers.send(&rpc::notification(method, params)))
     }

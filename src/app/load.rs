@@ -1,0 +1,106 @@
+//! From files to a checked deployment.
+
+use super::PLATFORMS;
+use crate::check::{self, Report};
+use crate::diagnostics::SourceMap;
+use crate::lang::{self, LoadOptions};
+use crate::model::codes::{DEPLOY_UNKNOWN_LIBRARY, DEPLOY_UNKNOWN_PLATFORM};
+use crate::model::finding::did_you_mean;
+use crate::model::{Catalogue, Deployment, Finding, Findings};
+use crate::runtime::Libraries;
+use std::path::Path;
+
+/// A deployment that was read, with all that it may use. Nothing is checked yet.
+#[derive(Debug)]
+pub struct Read {
+    /// The deployment.
+    pub deployment: Deployment,
+    /// The component types of its libraries and those it declares.
+    pub catalogue: Catalogue,
+    /// The libraries it names.
+    pub libraries: Libraries,
+    /// Its texts.
+    pub sources: SourceMap,
+    /// What reading found; no errors among them.
+    pub findings: Findings,
+}
+
+/// A deployment in which nothing was found that refuses it.
+#[derive(Debug)]
+pub struct Checked {
+    /// The deployment.
+    pub deployment: check::Checked<Deployment>,
+    /// The component types it may use.
+    pub catalogue: Catalogue,
+    /// The libraries it names.
+    pub libraries: Libraries,
+    /// Its texts.
+    pub sources: SourceMap,
+    /// Warnings and what else reading and checking found.
+    pub findings: Findings,
+}
+
+/// Why a deployment is refused.
+#[derive(Debug)]
+pub struct Refused {
+    /// What was found.
+    pub findings: Findings,
+    /// The texts it is about.
+    pub sources: SourceMap,
+    /// Whether a text could not be read or parsed at all, rather than being judged.
+    pub unreadable: bool,
+}
+
+/// Reads a deployment with all the files it names.
+///
+/// # Errors
+/// [`Refused`] with what is wrong in its texts, or a library or platform that this program does not have.
+pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result<Read, Refused> {
+    let loaded = lang::load(path, options);
+    let mut findings = loaded.findings;
+    let Some(deployment) = loaded.deployment else {
+        return Err(Refused { findings, sources: loaded.sources, unreadable: loaded.unreadable });
+    };
+    let libraries = match libraries.select(&deployment.libraries) {
+        Ok(libraries) => libraries,
+        Err(name) => {
+            let known: Vec<&str> = libraries.iter().map(|l| l.name().as_str()).collect();
+            findings.push(
+                Finding::error(DEPLOY_UNKNOWN_LIBRARY, format!("this program has no component library `{name}`"))
+                    .at(deployment.key_origin("libraries"))
+                    .path("libraries")
+                    .help(did_you_mean(name.as_str(), "libraries", known)),
+            );
+            return Err(Refused { findings, sources: loaded.sources, unreadable: false });
+        }
+    };
+    let platform = deployment.platform.as_str();
+    if !PLATFORMS.contains(&platform) {
+        findings.push(
+            Finding::error(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{platform}`"))
+                .at(deployment.key_origin("platform"))
+                .path("platform")
+                .help(did_you_mean(platform, "platforms", PLATFORMS.iter().copied())),
+        );
+        return Err(Refused { findings, sources: loaded.sources, unreadable: false });
+    }
+    let mut catalogue = libraries.catalogue();
+    for ty in &deployment.types {
+        catalogue.insert(ty.clone());
+    }
+    Ok(Read { deployment, catalogue, libraries, sources: loaded.sources, findings })
+}
+
+/// Checks a deployment that was read.
+///
+/// # Errors
+/// [`Refused`] with everything that reading and checking found.
+pub fn check(read: Read) -> Result<Checked, Refused> {
+    let Read { deployment, catalogue, libraries, sources, findings: before } = read;
+    let Report { checked, mut findings, .. } = check::run(&deployment, &catalogue);
+    findings.extend(before);
+    match checked {
+        Some(deployment) => Ok(Checked { deployment, catalogue, libraries, sources, findings }),
+        None => Err(Refused { findings, sources, unreadable: false }),
+    }
+}

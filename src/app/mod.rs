@@ -1,0 +1,9 @@
+//! The composition root: load, check, build with component libraries, start; scripts. What the command line calls, and
+//! what a program that embeds Davit calls.
+
+mod load;
+pub mod script;
+mod start;
+
+pub use load::{Checked, Read, Refused, check, read};
+pub use start::{PLATFORMS, StartError, start, start_on};

@@ -1,0 +1,405 @@
+//! Scripts: a bring-up, what is done with it, and what must be true meanwhile, as a Lua program (`davit run`).
+//!
+//! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
+//! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
+
+mod sandbox;
+mod values;
+
+use super::{Refused, StartError};
+use crate::lang::LoadOptions;
+use crate::model::finding::did_you_mean;
+use crate::model::{Ask, ComponentName, ConfigId, EventName, MemberRef};
+use crate::runtime::Libraries;
+use crate::session::{Ended, Hub, NotUp, Observer, Session};
+use crate::time::{Clock, Time};
+use mlua::{Lua, Table, Value as LuaValue};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What a script runs on.
+pub struct Options {
+    /// The clock; the calling thread is made a participant.
+    pub clock: Clock,
+    /// Component libraries.
+    pub libraries: Libraries,
+    /// Parameters for the deployments it loads (`--set`).
+    pub load: LoadOptions,
+    /// Hears everything that happens.
+    pub observer: Option<Observer>,
+    /// Where `say` goes.
+    pub say: Box<dyn Fn(&str)>,
+}
+
+/// How a script ended.
+#[derive(Debug)]
+pub struct ScriptEnd {
+    /// What went wrong, if something did.
+    pub failure: Option<ScriptFailure>,
+    /// How its deployment ended, if it had one.
+    pub ended: Option<Ended>,
+}
+
+/// Why a script failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ScriptFailure {
+    /// The file cannot be read.
+    #[error("cannot read {path}")]
+    Read {
+        /// The script.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It does not parse, or it raised an error; the text names file and line.
+    #[error("{message}")]
+    Lua {
+        /// What happened.
+        message: String,
+        /// Whether it is the text that is wrong.
+        syntax: bool,
+    },
+    /// A deployment it loads is refused.
+    #[error("{path} is refused")]
+    Refused {
+        /// The deployment.
+        path: PathBuf,
+        /// With its findings.
+        refused: Box<Refused>,
+    },
+}
+
+struct Host {
+    options: Options,
+    folder: PathBuf,
+    session: Option<Arc<Session>>,
+    /// Answers and events after this one are news for `wait_answer`.
+    mark: u64,
+    refused: Option<(PathBuf, Box<Refused>)>,
+    ended: Option<Ended>,
+}
+
+type Shared = Rc<RefCell<Host>>;
+
+/// Runs the script at `path`.
+pub fn run(path: &Path, options: Options) -> ScriptEnd {
+    let text = match std::fs::read(path) {
+        Ok(text) => text,
+        Err(source) => {
+            return ScriptEnd { failure: Some(ScriptFailure::Read { path: path.to_owned(), source }), ended: None };
+        }
+    };
+    let clock = options.clock.clone();
+    let _participant = clock.enter();
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let host = Rc::new(RefCell::new(Host { options, folder, session: None, mark: 0, refused: None, ended: None }));
+    let failure = execute(path, &text, &host).err();
+    let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
+    if let Some(session) = host.session.take() {
+        host.ended = Some(session.take_down(false));
+    }
+    let failure = match (host.refused.take(), failure) {
+        (Some((path, refused)), _) => Some(ScriptFailure::Refused { path, refused }),
+        (None, failure) => failure,
+    };
+    ScriptEnd { failure, ended: host.ended }
+}
+
+fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure> {
+    let failed = |error: mlua::Error| ScriptFailure::Lua {
+        syntax: matches!(error, mlua::Error::SyntaxError { .. }),
+        message: sandbox::message(&error),
+    };
+    let lua = sandbox::state().map_err(failed)?;
+    install(&lua, host).map_err(failed)?;
+    let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
+    chunk.set_mode(mlua::chunk::ChunkMode::Text).exec().map_err(failed)
+}
+
+/// Every function a script may call, for the help of an unknown one and for the documentation's test.
+pub const FUNCTIONS: &[&str] = &[
+    "deploy",
+    "raise",
+    "apply",
+    "undo",
+    "wait",
+    "wait_state",
+    "wait_answer",
+    "assert_running",
+    "assert_state",
+    "state",
+    "property",
+    "port",
+    "system",
+    "stack",
+    "active",
+    "now",
+    "say",
+    "shutdown",
+];
+
+fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
+    let globals = lua.globals();
+    macro_rules! function {
+        ($name:literal, $types:ty, |$h:ident, $lua:ident, $args:pat_param| $body:expr) => {{
+            let host = host.clone();
+            globals.set(
+                $name,
+                lua.create_function(move |$lua, $args: $types| {
+                    let $h = &host;
+                    $body
+                })?,
+            )?;
+        }};
+    }
+    function!("deploy", String, |h, _lua, file| deploy(h, &file));
+    function!("raise", String, |h, _lua, event| raise(h, &event));
+    function!("apply", String, |h, _lua, id| request(h, Some(&id), Ask::Apply));
+    function!("undo", Option<String>, |h, _lua, id| request(h, id.as_deref(), Ask::UndoOf));
+    function!("wait", f64, |h, _lua, seconds| {
+        let (clock, until) = (clock(h), deadline(h, seconds)?);
+        clock.sleep_until(until);
+        Ok(())
+    });
+    function!("wait_state", (String, f64), |h, _lua, (state, seconds)| wait_state(h, &state, seconds));
+    function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| wait_answer(h, &event, seconds));
+    function!("assert_running", String, |h, _lua, name| assert_state(h, &name, "running"));
+    function!("assert_state", (String, String), |h, _lua, (name, state)| assert_state(h, &name, &state));
+    function!("state", String, |h, _lua, name| Ok(component_state(h, &name)?.map(|s| s.to_string())));
+    function!("property", String, |h, lua, name| property(h, lua, &name));
+    function!("port", String, |h, lua, name| port(h, lua, &name));
+    function!("system", (), |h, lua, ()| values::to_lua(
+        lua,
+        &serde_json::to_value(session(h)?.system()).expect("plain data")
+    ));
+    function!("stack", (), |h, lua, ()| values::to_lua(
+        lua,
+        &serde_json::to_value(session(h)?.status().stack).expect("plain data")
+    ));
+    function!("active", (), |h, lua, ()| lua.create_sequence_from(session(h)?.hub().active()));
+    function!("now", (), |h, _lua, ()| Ok(clock(h).now().as_secs_f64()));
+    function!("say", String, |h, _lua, text| {
+        (h.borrow().options.say)(&text);
+        Ok(())
+    });
+    function!("shutdown", Option<Table>, |h, _lua, options| {
+        let force = options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))?;
+        let session = session(h)?;
+        let ended = session.take_down(force);
+        let mut host = h.borrow_mut();
+        host.session = None;
+        let clean = ended.is_clean();
+        let left = ended.left.join(", ");
+        host.ended = Some(ended);
+        if clean { Ok(()) } else { Err(error(format!("the shutdown left something behind: {left}"))) }
+    });
+    // A name that is no function of ours is a typo: say so where it stands, instead of "a nil value".
+    let meta = lua.create_table()?;
+    meta.set(
+        "__index",
+        lua.create_function(|_, (_, name): (Table, String)| -> mlua::Result<LuaValue> {
+            Err(error(format!(
+                "`{name}` is not defined: {}",
+                did_you_mean(&name, "functions", FUNCTIONS.iter().copied())
+            )))
+        })?,
+    )?;
+    globals.set_metatable(Some(meta))
+}
+
+fn error(message: impl Into<String>) -> mlua::Error {
+    mlua::Error::runtime(message.into())
+}
+
+fn clock(host: &Shared) -> Clock {
+    host.borrow().options.clock.clone()
+}
+
+fn session(host: &Shared) -> mlua::Result<Arc<Session>> {
+    host.borrow().session.clone().ok_or_else(|| error("nothing is deployed: call deploy(\"FILE\") first"))
+}
+
+fn deadline(host: &Shared, seconds: f64) -> mlua::Result<Time> {
+    if !seconds.is_finite() || !(0.0..=1e6).contains(&seconds) {
+        return Err(error(format!("{seconds} is not a number of seconds from 0 to 1000000")));
+    }
+    Ok(clock(host).now() + Duration::from_secs_f64(seconds))
+}
+
+fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
+    if host.borrow().session.is_some() {
+        return Err(error("a deployment is already up: call shutdown() before the next deploy"));
+    }
+    let (path, checked) = {
+        let host = host.borrow();
+        let path = host.folder.join(file);
+        let checked = super::read(&path, &host.options.load, &host.options.libraries).and_then(super::check);
+        (path, checked)
+    };
+    let checked = checked.map_err(|refused| {
+        host.borrow_mut().refused = Some((path, Box::new(refused)));
+        error(format!("{file} is refused"))
+    })?;
+    let clock = clock(host);
+    let session = super::start(&checked, &clock).map_err(|e: StartError| error(e.to_string()))?;
+    if let Some(observer) = &host.borrow().options.observer {
+        session.hub().observe(observer.clone());
+    }
+    match session.bring_up() {
+        Ok(()) => {
+            let mut host = host.borrow_mut();
+            host.mark = 0;
+            host.session = Some(session);
+            Ok(())
+        }
+        Err(NotUp { why, reasons, ended, .. }) => {
+            let mut text = format!("{file} did not come up: {why}");
+            for reason in reasons.iter().chain(&ended.left) {
+                text.push_str("\n  ");
+                text.push_str(reason);
+            }
+            host.borrow_mut().ended = Some(ended);
+            Err(error(text))
+        }
+    }
+}
+
+fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
+    let session = session(host)?;
+    let known = session.events();
+    let event = EventName::new(name).ok().filter(|e| known.contains(e)).ok_or_else(|| {
+        let help = did_you_mean(name, "events", known.iter().map(EventName::as_str));
+        error(format!("the coordinator knows no event `{name}`: {help}"))
+    })?;
+    host.borrow_mut().mark = session.hub().heard();
+    session.raise(event, "script");
+    Ok(())
+}
+
+fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::Result<()> {
+    let session = session(host)?;
+    let ask = match id {
+        None => Ask::Undo,
+        Some(id) => {
+            let known = session.configurations();
+            ask(known.iter().find(|k| k.as_str() == id).copied().ok_or_else(|| {
+                let help = did_you_mean(id, "configurations", known.iter().map(ConfigId::as_str));
+                error(format!("there is no configuration `{id}`: {help}"))
+            })?)
+        }
+    };
+    host.borrow_mut().mark = session.hub().heard();
+    session.request(ask, "operator");
+    Ok(())
+}
+
+/// Waits until `look` finds something; tells what was there instead when the time is over.
+fn wait_until<T>(
+    host: &Shared,
+    seconds: f64,
+    look: impl Fn(&Session) -> Option<T>,
+    what: impl Fn(&Hub) -> String,
+) -> mlua::Result<T> {
+    let (session, clock, deadline) = (session(host)?, clock(host), deadline(host, seconds)?);
+    loop {
+        if let Some(found) = look(&session) {
+            return Ok(found);
+        }
+        if clock.now() >= deadline {
+            return Err(error(what(session.hub())));
+        }
+        session.hub().changed.wait(deadline);
+    }
+}
+
+fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
+    let mark = session(host)?.hub().heard();
+    if !session(host)?.knows_state(state) {
+        return Err(error(format!("the coordinator has no state `{state}`")));
+    }
+    wait_until(
+        host,
+        seconds,
+        |s| s.in_state(state).then_some(()),
+        |hub| {
+            let active = hub.active();
+            let at = active.last().map_or("no state", String::as_str);
+            format!("not in `{state}` after {seconds} s: the coordinator is in `{at}`")
+        },
+    )?;
+    let mut host = host.borrow_mut();
+    host.mark = host.mark.min(mark);
+    Ok(())
+}
+
+fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
+    let mark = host.borrow().mark;
+    let number = wait_until(
+        host,
+        seconds,
+        |s| s.hub().heard_since(event, mark),
+        |hub| {
+            let waiting = hub.outstanding();
+            let waiting =
+                if waiting.is_empty() { String::new() } else { format!("; still waiting for {}", waiting.join(", ")) };
+            format!("`{event}` was not heard in {seconds} s{waiting}")
+        },
+    )?;
+    host.borrow_mut().mark = number;
+    Ok(())
+}
+
+fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<crate::model::RunState>> {
+    let system = session(host)?.system();
+    let state = ComponentName::new(name).ok().and_then(|n| system.components.get(&n)).map(|c| c.state);
+    Ok(state)
+}
+
+fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Result<()> {
+    match component_state(host, name)? {
+        Some(state) if state.as_str() == wanted => Ok(()),
+        Some(state) => Err(error(format!("`{name}` is {state}, not {wanted}"))),
+        None => {
+            let system = session(host)?.system();
+            let help = did_you_mean(name, "components", system.components.keys().map(ComponentName::as_str));
+            Err(error(format!("there is no component `{name}`: {help}")))
+        }
+    }
+}
+
+fn member(text: &str) -> mlua::Result<MemberRef> {
+    MemberRef::new(text).map_err(|e| error(e.to_string()))
+}
+
+fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+    let name = member(text)?;
+    let system = session(host)?.system();
+    let Some(component) = system.components.get(&name.component) else {
+        let help =
+            did_you_mean(name.component.as_str(), "components", system.components.keys().map(ComponentName::as_str));
+        return Err(error(format!("there is no component `{}`: {help}", name.component)));
+    };
+    match component.properties.get(&name.member) {
+        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
+        None => {
+            let known = component.properties.keys().map(crate::model::Ident::as_str);
+            Err(error(format!(
+                "`{}` has no property `{}`: {}",
+                name.component,
+                name.member,
+                did_you_mean(name.member.as_str(), "properties", known)
+            )))
+        }
+    }
+}
+
+/// The value written on an in-port by a configuration; nil when never written.
+fn port(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+    match session(host)?.system().ports.get(&member(text)?) {
+        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
+        None => Ok(LuaValue::Nil),
+    }
+}

@@ -1,0 +1,60 @@
+//! From a checked deployment to one that is alive.
+
+use super::Checked;
+use crate::model::finding::did_you_mean;
+//EMB use crate::platform::embedded::EmbeddedPlatform;
+use crate::platform::Platform;
+use crate::platform::simulated::{self, Simulated};
+use crate::session::{Session, Setup};
+use crate::statechart;
+use crate::time::Clock;
+use std::sync::Arc;
+
+/// Why a checked deployment could not be started.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StartError {
+    /// This program has no such platform.
+    #[error("there is no platform `{name}`: {help}")]
+    UnknownPlatform {
+        /// The name.
+        name: String,
+        /// What was likely meant.
+        help: String,
+    },
+}
+
+/// The platforms of this program.
+pub const PLATFORMS: &[&str] = &["embedded", "simulated"];
+
+/// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
+///
+/// # Errors
+/// When the deployment names a platform that this program does not have.
+pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
+    let deployment = &checked.deployment;
+    let platform: Arc<dyn Platform> = match deployment.platform.as_str() {
+        //EMB "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
+        "simulated" => {
+            Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), simulated::Options::default()))
+        }
+        other => {
+            return Err(StartError::UnknownPlatform {
+                name: other.to_owned(),
+                help: did_you_mean(other, "platforms", PLATFORMS.iter().copied()),
+            });
+        }
+    };
+    Ok(start_on(checked, platform, clock))
+}
+
+/// The same, on a platform of the caller's.
+pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -> Arc<Session> {
+    let (chart, _) = statechart::compile(&checked.deployment.coordinator);
+    Session::start(Setup {
+        deployment: Arc::new((*checked.deployment).clone()),
+        chart: Arc::new(chart.expect("a checked deployment has a coordinator that compiles")),
+        catalogue: checked.catalogue.clone(),
+        platform,
+        clock: clock.clone(),
+    })
+}

@@ -1,0 +1,211 @@
+//! `davit deploy`
+
+use super::detach;
+use super::exit::Exit;
+use super::input::Input;
+use super::output::{Output, Style};
+use super::progress::Progress;
+use super::signals::Watch;
+use super::{Answer, Context, Failure, Run};
+use crate::app::{self, Checked, StartError};
+use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM};
+use crate::session::service::SessionService;
+use crate::session::socket::{ControlSocket, SocketError};
+use crate::session::{Command, Ended, NotUp, Session};
+use crate::time::Clock;
+use serde_json::json;
+use std::sync::Arc;
+
+/// Bring a deployment up and stay in the foreground; Ctrl-C shuts it down in order.
+///
+/// Everything is checked first. While it comes up, Ctrl-C rolls back; once up, it shuts down through the coordinator. A
+/// second Ctrl-C ends at once and asks the components nothing more. A bring-up that fails is rolled back and exits 1; with
+/// a component left over whose call never returned, 3.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: Input,
+    /// Return once it is up, and leave it running in the background.
+    #[arg(long)]
+    detach: bool,
+    /// Which clock it runs on. In simulated time a run is the same every time, and may be slowed or sped up with
+    /// `--pace`.
+    #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
+    clock: ClockKind,
+    /// Simulated seconds in one real second; 0: as fast as the machine.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = super::remote::seconds)]
+    pace: f64,
+    /// Print every event of the story as one JSON object a line.
+    #[arg(long)]
+    json: bool,
+    /// Set by `--detach` for the process in the background.
+    #[arg(long, hide = true)]
+    in_background: bool,
+}
+
+/// A clock, as asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum ClockKind {
+    /// Real time.
+    #[default]
+    Real,
+    /// Simulated time: deterministic.
+    Simulated,
+}
+
+impl ClockKind {
+    /// The clock; `pace` is how many simulated seconds pass in a real one, 0 for as fast as the machine.
+    pub fn make(self, pace: f64) -> Clock {
+        match self {
+            Self::Real => Clock::real(),
+            Self::Simulated if pace > 0.0 => Clock::simulated_paced(pace),
+            Self::Simulated => Clock::simulated(),
+        }
+    }
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        if self.detach {
+            return detach::run(context);
+        }
+        let checked = self.input.check(context)?;
+        let progress = Progress::new(context.out, self.json);
+        let clock = self.clock.make(self.pace);
+        let exit = foreground(context, &checked, &clock, &progress, self.in_background)?;
+        clock.shutdown();
+        Ok(exit)
+    }
+}
+
+fn foreground(
+    context: &Context,
+    checked: &Checked,
+    clock: &Clock,
+    progress: &Progress,
+    in_background: bool,
+) -> Result<Exit, Failure> {
+    let _participant = clock.enter();
+    let name = checked.deployment.name;
+    let session = app::start(checked, clock).map_err(|error| match error {
+        StartError::UnknownPlatform { name, help } => {
+            Failure::no(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
+        }
+    })?;
+    let socket = open(&session)?;
+    let watch = watch(&session, &socket, progress, in_background)?;
+    session.hub().observe(progress.observer());
+    {
+        let notify = socket.notifier();
+        session.hub().observe(Arc::new(move |at, what| {
+            let entry = crate::session::log::Entry { at: at.as_secs_f64(), what: what.clone() };
+            notify("log", &json!(entry));
+        }));
+    }
+    let exit = match session.bring_up() {
+        Err(not_up) => {
+            progress.finish();
+            tell_not_up(&context.out, progress, name.as_str(), &not_up)
+        }
+        Ok(()) => {
+            tell_up(&context.out, progress, &session);
+            if in_background {
+                detach::tell_up();
+                progress.silence();
+            }
+            let Command::Shutdown { force } = session.serve();
+            let ended = session.take_down(force);
+            progress.finish();
+            tell_ended(&context.out, progress, name.as_str(), &ended);
+            if ended.is_clean() { Exit::Done } else { Exit::Broken }
+        }
+    };
+    drop(watch);
+    drop(socket);
+    Ok(exit)
+}
+
+fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
+    let name = session.deployment().name;
+    let service = Arc::new(SessionService::new(Arc::downgrade(session)));
+    ControlSocket::open(name.as_str(), service).map_err(|error| match error {
+        SocketError::Taken(name) => Failure::no(
+            CLI_NAME_TAKEN,
+            format!("a deployment named `{name}` is already running"),
+            format!("`davit shutdown {name}` takes it down; or give this one another `name`"),
+        ),
+        SocketError::Io { path, source } => Failure::usage(
+            CLI_SYSTEM,
+            format!("cannot listen on {}: {source}", path.display()),
+            "set XDG_RUNTIME_DIR to a directory of yours that can be written",
+        ),
+    })
+}
+
+fn watch(
+    session: &Arc<Session>,
+    socket: &ControlSocket,
+    progress: &Progress,
+    in_background: bool,
+) -> Result<Watch, Failure> {
+    let first = {
+        let (session, progress) = (Arc::downgrade(session), progress.clone());
+        move || {
+            progress.line("taking it down; Ctrl-C again ends at once and asks the components nothing more");
+            if let Some(session) = session.upgrade() {
+                session.command(Command::Shutdown { force: false });
+            }
+        }
+    };
+    let second = {
+        let (path, progress) = (socket.path().to_owned(), progress.clone());
+        move || {
+            progress.finish();
+            let _ = std::fs::remove_file(path);
+        }
+    };
+    Watch::start(in_background, first, second).map_err(|error| {
+        Failure::usage(
+            CLI_SYSTEM,
+            format!("signals cannot be watched: {error}"),
+            "try again; the system is short of threads",
+        )
+    })
+}
+
+fn tell_up(out: &Output, progress: &Progress, session: &Session) {
+    let status = session.status();
+    progress.line(format!(
+        "{} {} after {:.3} s: {} components, {} connections, {} frames on the stack",
+        out.paint(Style::Bold, &status.name),
+        out.paint(Style::Good, "up"),
+        status.at,
+        status.system.components.len(),
+        status.system.connections.len(),
+        status.stack.len(),
+    ));
+    progress.line(out.paint(Style::Dim, "Ctrl-C shuts it down in order"));
+}
+
+fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp) -> Exit {
+    progress.line(format!("{} {}: {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "not up"), not_up.why));
+    for reason in &not_up.reasons {
+        progress.line(format!("  {reason}"));
+    }
+    tell_ended(out, progress, name, &not_up.ended);
+    if not_up.ended.is_clean() { Exit::No } else { Exit::Broken }
+}
+
+fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
+    for note in &ended.forced {
+        progress.line(format!("  {}  {note}", out.paint(Style::Care, "forced")));
+    }
+    for note in &ended.left {
+        progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
+    }
+    if ended.is_clean() {
+        progress.line(format!("{} {}, nothing is left", out.paint(Style::Bold, name), out.paint(Style::Good, "down")));
+    } else {
+        progress.line(format!("{} {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "broken")));
+    }
+}

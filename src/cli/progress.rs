@@ -1,0 +1,104 @@
+//! Live progress of a deployment: a line for every answer, and on a terminal a line below that tells what is under way.
+
+use super::log::{count, duration};
+use super::output::{Output, Style};
+use crate::session::{Happening, Observer, Phase};
+use crate::time::Time;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How a deployment's story is told.
+#[derive(Clone)]
+pub struct Progress {
+    out: Output,
+    bar: ProgressBar,
+    quiet: Arc<AtomicBool>,
+    json: bool,
+}
+
+impl Progress {
+    /// Tells it on stdout: as one JSON object a line if `json`, else as text.
+    pub fn new(out: Output, json: bool) -> Self {
+        let bar = if std::io::stdout().is_terminal() && !json {
+            ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout())
+        } else {
+            ProgressBar::hidden()
+        };
+        bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
+        Self { out, bar, quiet: Arc::new(AtomicBool::new(false)), json }
+    }
+
+    /// What to give to the session.
+    pub fn observer(&self) -> Observer {
+        let this = self.clone();
+        Arc::new(move |at, what| this.tell(at, what))
+    }
+
+    /// A line of the story.
+    pub fn line(&self, line: impl std::fmt::Display) {
+        if self.quiet.load(Ordering::Relaxed) || self.json {
+            return;
+        }
+        let out = self.out;
+        self.bar.suspend(|| out.line(line));
+    }
+
+    /// From now on nothing is told but by [`Progress::line`].
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    /// From now on nothing is told at all (whoever listened is gone).
+    pub fn silence(&self) {
+        self.finish();
+        self.quiet.store(true, Ordering::Relaxed);
+    }
+
+    fn tell(&self, at: Time, what: &Happening) {
+        if self.quiet.load(Ordering::Relaxed) {
+            return;
+        }
+        if self.json {
+            self.out.json_line(&crate::session::log::Entry { at: at.as_secs_f64(), what: what.clone() });
+            return;
+        }
+        let out = &self.out;
+        let time = out.paint(Style::Dim, format!("{:>9.3} s", at.as_secs_f64()));
+        match what {
+            Happening::Requested { ask, by, .. } => {
+                self.bar.enable_steady_tick(std::time::Duration::from_millis(100));
+                self.bar.set_message(format!("{ask} (asked by {by})"));
+            }
+            Happening::Answered(answer) => {
+                self.bar.set_message(String::new());
+                let (mark, style) = if answer.ok { ("ok", Style::Good) } else { ("no", Style::Bad) };
+                self.line(format!(
+                    "{time}  {}  {:<28} {:>9}  {:>9}",
+                    out.paint(style, mark),
+                    answer.answer,
+                    count(answer.steps.len(), "step"),
+                    duration(answer.took_us),
+                ));
+                for reason in &answer.reasons {
+                    self.line(format!("                 {reason}"));
+                }
+            }
+            Happening::State { active } => {
+                let leaf = active.last().map_or("(inactive)", String::as_str);
+                self.line(format!("{time}  {}  {}", out.paint(Style::Dim, "in"), out.paint(Style::Name, leaf)));
+            }
+            Happening::Emitted { event } => self.line(format!("{time}  {}  {event}", out.paint(Style::Dim, "!!"))),
+            Happening::Fault { component, reason } => {
+                self.line(format!("{time}  {}  {component}: {reason}", out.paint(Style::Bad, "fault")));
+            }
+            Happening::Returned { component } => self.line(format!("{time}  {component} returned and was cleaned up")),
+            Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
+            Happening::Phase { phase: Phase::Broken } => {
+                self.line(format!("{time}  {}", out.paint(Style::Bad, "broken")));
+            }
+            Happening::Phase { .. } | Happening::Event { .. } | Happening::Stale { .. } => {}
+        }
+    }
+}

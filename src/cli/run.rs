@@ -1,0 +1,90 @@
+//! `davit run`
+
+use super::deploy::ClockKind;
+use super::exit::Exit;
+use super::input::Parameters;
+use super::output::Style;
+use super::progress::Progress;
+use super::{Answer, Context, Failure, Run};
+use crate::app::script::{self, Options, ScriptFailure};
+use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX, TEXT_NO_FILE};
+use std::path::PathBuf;
+
+/// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
+///
+/// Whatever the script does or fails to do, the deployment it brought up is taken down before the command ends. The
+/// functions a script may call are described in docs/scripts.md.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The script.
+    script: PathBuf,
+    /// Which clock it runs on; simulated time passes as fast as the machine, and the same way every time.
+    #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
+    clock: ClockKind,
+    #[command(flatten)]
+    parameters: Parameters,
+    /// Tell only what the script says, and failures.
+    #[arg(long, short)]
+    quiet: bool,
+    /// Print every event of the story as one JSON object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let progress = Progress::new(context.out, self.json);
+        let clock = self.clock.make(0.0);
+        let say = {
+            let progress = progress.clone();
+            let out = context.out;
+            Box::new(move |text: &str| progress.line(out.paint(Style::Bold, text)))
+        };
+        let end = script::run(
+            &self.script,
+            Options {
+                clock: clock.clone(),
+                libraries: context.libraries.clone(),
+                load: self.parameters.options()?,
+                observer: (!self.quiet).then(|| progress.observer()),
+                say,
+            },
+        );
+        clock.shutdown();
+        progress.finish();
+        let left = end.ended.as_ref().is_some_and(|ended| !ended.is_clean());
+        if let Some(ended) = &end.ended {
+            for note in &ended.forced {
+                progress.line(format!("{}  {note}", context.out.paint(Style::Care, "forced")));
+            }
+            for note in &ended.left {
+                progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
+            }
+        }
+        let Some(failure) = end.failure else {
+            return Ok(if left { Exit::Broken } else { Exit::Done });
+        };
+        let mut failure = tell(failure);
+        if left {
+            failure.exit = Exit::Broken;
+        }
+        Err(failure)
+    }
+}
+
+fn tell(failure: ScriptFailure) -> Failure {
+    match failure {
+        ScriptFailure::Read { path, source } => Failure::usage(
+            TEXT_NO_FILE,
+            format!("cannot read {}: {source}", path.display()),
+            "give the path of a script; examples/youbot_story.lua is one",
+        ),
+        ScriptFailure::Lua { message, syntax: true } => {
+            Failure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")
+        }
+        ScriptFailure::Lua { message, syntax: false } => {
+            Failure::no(SCRIPT_FAILED, message, "what happened before is told above; `--json` tells it to a program")
+        }
+        ScriptFailure::Refused { refused, .. } => (*refused).into(),
+    }
+}

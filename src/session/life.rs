@@ -1,0 +1,185 @@
+//! The life of a deployment: brought up, served, taken down (design §6, "Bringing up and taking down").
+
+use super::log::{Happening, Phase};
+use super::{Command, Session};
+use crate::model::Snapshot;
+use crate::time::Time;
+use serde::Serialize;
+
+/// How a deployment ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ended {
+    /// `down`, or `broken` when something is left.
+    pub phase: Phase,
+    /// What had to be forced, one line each.
+    pub forced: Vec<String>,
+    /// What is left, one line each.
+    pub left: Vec<String>,
+}
+
+impl Ended {
+    /// Whether nothing is left.
+    pub fn is_clean(&self) -> bool {
+        self.left.is_empty()
+    }
+}
+
+/// Why a deployment did not come up; what was done of it is undone, as far as `ended` says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotUp {
+    /// One sentence.
+    pub why: String,
+    /// What led to it, one line each.
+    pub reasons: Vec<String>,
+    /// Whether somebody asked for the end.
+    pub interrupted: bool,
+    /// How the deployment ended.
+    pub ended: Ended,
+}
+
+impl Session {
+    /// Raises the deployment's event and waits until it is *up*: the named state is active and every request raised so
+    /// far has been answered.
+    ///
+    /// # Errors
+    /// [`NotUp`] when a state listed under `deploy.failed` became active, when it took too long, or when a command to
+    /// shut down came; then everything has been rolled back.
+    pub fn bring_up(&self) -> Result<(), NotUp> {
+        let hub = self.hub();
+        let bring_up = &self.deployment().deploy;
+        let deadline = self.clock().now() + bring_up.within;
+        let began = hub.heard();
+        hub.set_phase(Phase::Deploying);
+        self.raise(bring_up.event, "deployment");
+        let why = loop {
+            if let Some(Command::Shutdown { .. }) = self.pending_command() {
+                break (format!("interrupted while deploying `{}`", self.deployment().name), true);
+            }
+            if let Some(state) = self.failed_state() {
+                break (format!("the coordinator is in `{state}`"), false);
+            }
+            if self.is_up() {
+                hub.set_phase(Phase::Up);
+                return Ok(());
+            }
+            if self.clock().now() >= deadline {
+                let waiting = hub.outstanding();
+                let active = hub.active();
+                let at = active.last().map_or("no state", String::as_str);
+                break (
+                    format!(
+                        "not up after {} s: the coordinator is in `{at}`{}",
+                        bring_up.within.as_secs_f64(),
+                        if waiting.is_empty() {
+                            String::new()
+                        } else {
+                            format!(", waiting for {}", waiting.join(", "))
+                        }
+                    ),
+                    false,
+                );
+            }
+            hub.changed.wait(deadline);
+        };
+        let reasons = self.failures_since(began);
+        let ended = self.roll_back();
+        Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })
+    }
+
+    /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides.
+    pub fn serve(&self) -> Command {
+        loop {
+            if let Some(command) = self.pending_command() {
+                return command;
+            }
+            self.refresh_phase();
+            self.hub().changed.wait(Time::NEVER);
+        }
+    }
+
+    /// Takes the deployment down: through its coordinator, and by force if that takes too long, leaves something, or if
+    /// `force` is asked for. Discards the stack.
+    pub fn take_down(&self, force: bool) -> Ended {
+        let hub = self.hub();
+        let take_down = &self.deployment().shutdown;
+        hub.set_phase(Phase::ShuttingDown);
+        let mut why = None;
+        if force {
+            why = Some("as asked for".to_owned());
+        } else {
+            let deadline = self.clock().now() + take_down.within;
+            self.raise(take_down.event, "deployment");
+            loop {
+                if self.is_down() {
+                    break;
+                }
+                // Asked for again, this time by force: no use in waiting.
+                if let Some(Command::Shutdown { force: true }) = self.pending_command() {
+                    why = Some("as asked for".to_owned());
+                    break;
+                }
+                if self.clock().now() >= deadline {
+                    why = Some(format!("not `{}` after {} s", take_down.down, take_down.within.as_secs_f64()));
+                    break;
+                }
+                hub.changed.wait(deadline);
+            }
+        }
+        if why.is_none() && !self.is_empty() {
+            why = Some(format!("`{}` was reached with components left", take_down.down));
+        }
+        let ended = match why {
+            None => self.finish(Vec::new()),
+            Some(why) => {
+                let note = format!("shutdown was forced: {why}");
+                hub.note(Happening::Forced { note: note.clone() });
+                self.detach_coordinator();
+                let mut forced = vec![note];
+                forced.extend(self.force_down());
+                self.finish(forced)
+            }
+        };
+        self.set_ended(&ended);
+        ended
+    }
+
+    /// A bring-up that failed: the coordinator is detached, so that there are never two commanders; every frame is
+    /// popped, and what could not be popped is removed.
+    fn roll_back(&self) -> Ended {
+        self.hub().set_phase(Phase::ShuttingDown);
+        self.detach_coordinator();
+        let forced = self.unwind();
+        let ended = self.finish(forced);
+        self.set_ended(&ended);
+        ended
+    }
+
+    fn finish(&self, forced: Vec<String>) -> Ended {
+        self.detach_coordinator();
+        let left = self.left_over();
+        self.stop_threads();
+        let phase = if left.is_empty() { Phase::Down } else { Phase::Broken };
+        self.hub().set_phase(phase);
+        Ended { phase, forced, left }
+    }
+}
+
+/// What is left of a system, one line each.
+pub(super) fn leftovers(system: &Snapshot, quarantined: &[String]) -> Vec<String> {
+    let mut left: Vec<String> = system
+        .components
+        .iter()
+        .map(|(name, component)| {
+            let hung = quarantined.iter().any(|q| q == name.as_str());
+            format!("{name} ({}){}", component.state, if hung { ": quarantined, a call has not returned" } else { "" })
+        })
+        .collect();
+    left.extend(
+        quarantined
+            .iter()
+            .filter(|q| system.components.keys().all(|name| name.as_str() != q.as_str()))
+            .map(|q| format!("{q}: quarantined, a call has not returned")),
+    );
+    left.extend(system.connections.keys().map(|(from, to)| format!("connection {from} -> {to}")));
+    left
+}

@@ -1,0 +1,132 @@
+//! The methods of the control socket (`docs/control-socket.md`).
+
+use super::hub::Hub;
+use super::log::Answered;
+use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, optional, param};
+use super::socket::Service;
+use super::{Command, Session};
+use crate::model::finding::did_you_mean;
+use crate::model::{Ask, ConfigId, EventName};
+use serde_json::{Value as Json, json};
+use std::sync::Weak;
+use std::time::Duration;
+
+/// Answers the calls of a session's control socket. Holds the session weakly: the socket does not keep it alive.
+pub struct SessionService {
+    session: Weak<Session>,
+}
+
+/// The methods, for the help of an unknown one.
+const METHODS: &[&str] = &["status", "stack", "log", "event", "apply", "undo", "commit", "shutdown", "subscribe"];
+
+impl SessionService {
+    /// The service of `session`.
+    pub fn new(session: Weak<Session>) -> Self {
+        Self { session }
+    }
+}
+
+fn within(params: &Json) -> Result<Duration, RpcError> {
+    let seconds: f64 = optional(params, "within_s")?.unwrap_or(10.0);
+    if seconds.is_finite() && (0.0..=1e6).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(RpcError::new(INVALID_PARAMS, "`within_s` is a number of seconds from 0 to 1000000"))
+    }
+}
+
+fn refused(message: String, help: String) -> RpcError {
+    RpcError { code: REFUSED, message, data: json!({ "help": help }) }
+}
+
+fn view(value: &impl serde::Serialize) -> Json {
+    serde_json::to_value(value).expect("views are plain data")
+}
+
+impl Service for SessionService {
+    fn call(&self, method: &str, params: &Json) -> Result<Json, RpcError> {
+        let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
+        match method {
+            "status" => Ok(view(&session.status())),
+            "stack" => Ok(view(&session.status().stack)),
+            "log" => Ok(view(&session.hub().log(optional(params, "last")?.unwrap_or(usize::MAX)))),
+            "event" => event(&session, params),
+            "apply" => {
+                let name: String = param(params, "configuration")?;
+                request(&session, Ask::Apply(configuration(&session, &name)?), params)
+            }
+            "undo" => {
+                let ask = match (optional::<String>(params, "configuration")?, optional::<usize>(params, "to")?) {
+                    (Some(_), Some(_)) => {
+                        return Err(RpcError::new(INVALID_PARAMS, "give `configuration` or `to`, not both"));
+                    }
+                    (Some(name), None) => Ask::UndoOf(configuration(&session, &name)?),
+                    (None, Some(to)) => Ask::UndoTo(to),
+                    (None, None) => Ask::Undo,
+                };
+                request(&session, ask, params)
+            }
+            "commit" => request(&session, Ask::Commit, params),
+            "shutdown" => {
+                let force = optional(params, "force")?.unwrap_or(false);
+                let wait = optional(params, "wait")?.unwrap_or(false);
+                session.command(Command::Shutdown { force });
+                if !wait {
+                    return Ok(json!({ "phase": "shutting_down" }));
+                }
+                session
+                    .hub()
+                    .wait_outside(Duration::from_secs(1_000_000), |_| session.ended())
+                    .map(|ended| view(&ended))
+                    .ok_or_else(|| RpcError::new(TIMED_OUT, "it is not down yet"))
+            }
+            _ => Err(RpcError {
+                code: METHOD_NOT_FOUND,
+                message: format!("there is no method `{method}`"),
+                data: json!({ "help": did_you_mean(method, "methods", METHODS.iter().copied()) }),
+            }),
+        }
+    }
+}
+
+fn configuration(session: &Session, name: &str) -> Result<ConfigId, RpcError> {
+    let known = session.configurations();
+    known.iter().find(|id| id.as_str() == name).copied().ok_or_else(|| {
+        refused(
+            format!("there is no configuration `{name}`"),
+            did_you_mean(name, "configurations", known.iter().map(ConfigId::as_str)),
+        )
+    })
+}
+
+fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
+    let name: String = param(params, "event")?;
+    let wait_for: Option<String> = optional(params, "wait_for")?;
+    let within = within(params)?;
+    let known = session.events();
+    let event = EventName::new(&name).ok().filter(|e| known.contains(e)).ok_or_else(|| {
+        refused(
+            format!("the coordinator knows no event `{name}`"),
+            did_you_mean(&name, "events", known.iter().map(EventName::as_str)),
+        )
+    })?;
+    let since = session.hub().heard();
+    session.raise(event, "operator");
+    let Some(wait_for) = wait_for else { return Ok(json!({ "accepted": true })) };
+    let heard = |hub: &Hub| hub.heard_since(&wait_for, since);
+    match session.hub().wait_outside(within, heard) {
+        Some(_) => Ok(json!({ "accepted": true, "heard": wait_for })),
+        None => Err(RpcError::new(TIMED_OUT, format!("`{wait_for}` was not heard in time"))),
+    }
+}
+
+fn request(session: &Session, ask: Ask, params: &Json) -> Result<Json, RpcError> {
+    let wait: bool = optional(params, "wait")?.unwrap_or(false);
+    let within = within(params)?;
+    let request = session.request(ask, "operator");
+    if !wait {
+        return Ok(json!({ "request": request }));
+    }
+    let answer: Option<Answered> = session.hub().wait_outside(within, |hub| hub.answer(request));
+    answer.map(|a| view(&a)).ok_or_else(|| RpcError::new(TIMED_OUT, format!("`{ask}` was not answered in time")))
+}
