@@ -36,7 +36,7 @@ impl Component for LowPass {
     fn update(&mut self, cx: &mut Context) {
         let Some(u) = self.u.get() else { return };
         let tau = self.time_constant.get();
-        let dt = cx.period().map_or(0.0, |p| p.as_secs_f64());
+        let dt = cx.dt();
         let y = self.state.map_or(u, |y| y + (u - y) * (1.0 - (-dt / tau).exp()));
         self.state = Some(y);
         self.y.write(y);
@@ -45,5 +45,5 @@ impl Component for LowPass {
 
 fn main() -> std::process::ExitCode {
     let mine = Library::new("mine").with::<LowPass>("LowPass");
-    davit::cli::main(libraries::built_in().with(mine))
+    davit::cli::main(libraries::builtin().with(mine))
 }

@@ -2,7 +2,7 @@
 
 use super::Checked;
 use crate::model::finding::did_you_mean;
-//EMB use crate::platform::embedded::EmbeddedPlatform;
+use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::Platform;
 use crate::platform::simulated::{self, Simulated};
 use crate::session::{Session, Setup};
@@ -33,7 +33,7 @@ pub const PLATFORMS: &[&str] = &["embedded", "simulated"];
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
     let deployment = &checked.deployment;
     let platform: Arc<dyn Platform> = match deployment.platform.as_str() {
-        //EMB "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
+        "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
         "simulated" => {
             Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), simulated::Options::default()))
         }
