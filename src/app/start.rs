@@ -2,8 +2,8 @@
 
 use super::Checked;
 use crate::model::finding::did_you_mean;
-use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::Platform;
+use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Simulated};
 use crate::session::{Session, Setup};
 use crate::statechart;
