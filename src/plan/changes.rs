@@ -214,13 +214,31 @@ fn create(
     }
 }
 
-/// The change that a rival change competes with, when the value it demands is another one.
+/// The change that a rival change competes with, unless that one is wrong by itself.
 fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
     let configuration = b.configuration;
-    match usage {
-        Use::Rival(first) => Some(&configuration.changes[first]),
-        Use::Yes | Use::No => None,
-    }
+    let Use::Rival(first) = usage else { return None };
+    let first = &configuration.changes[first];
+    let what = match &first.kind {
+        ChangeKind::PropertySet { property, value } => {
+            Step::PropertySet { property: *property, value: fit_set(b, *property, value) }
+        }
+        ChangeKind::PortWrite { port, value } => {
+            Step::PortWrite { port: *port, value: Some(fit_write(b, *port, value)) }
+        }
+        _ => return Some(first),
+    };
+    step::precondition(&what, b.view).is_empty().then_some(first)
+}
+
+fn fit_set(b: &Builder<'_, '_, '_>, property: MemberRef, value: &Value) -> Value {
+    let declared = b.view.component(property.component).and_then(|n| n.property(property.member));
+    declared.and_then(|(_, p)| p.fit(value.clone()).ok()).unwrap_or_else(|| value.clone())
+}
+
+fn fit_write(b: &Builder<'_, '_, '_>, port: MemberRef, value: &Value) -> Value {
+    let declared = b.view.component(port.component).and_then(|n| n.port(port.member));
+    declared.and_then(|(_, p)| value.clone().fit(&p.ty).ok()).unwrap_or_else(|| value.clone())
 }
 
 fn set(
@@ -234,38 +252,30 @@ fn set(
 ) {
     let mut after = After::new();
     w.created(property.component, &mut after);
-    let declared = b.view.component(property.component).and_then(|n| n.property(property.member));
-    let fitted = declared.and_then(|(_, p)| p.fit(value.clone()).ok()).unwrap_or_else(|| value.clone());
+    let fitted = fit_set(b, property, value);
     let what = Step::PropertySet { property, value: fitted.clone() };
     let present = b.view.component(property.component).and_then(|n| n.value(property.member));
     let fulfilled = present == Some(&fitted);
-    if let Some(first) = rival(b, sorted.uses[index]) {
+    let create = sorted.created.get(&property.component).map(|i| &b.configuration.changes[*i]);
+    let initial = create.filter(|c| match &c.kind {
+        ChangeKind::Create { properties, .. } => properties.contains_key(&property.member) && present.is_some(),
+        _ => false,
+    });
+    let rival = rival(b, sorted.uses[index]);
+    if fulfilled || rival.is_some() || initial.is_some() {
         let found = step::precondition(&what, b.view);
         if !found.is_empty() {
             b.refuse(&what, found, change.origin);
-        } else if !fulfilled {
-            b.findings.push(clash(first, change));
+            return;
         }
-        return;
     }
-    let create = sorted.created.get(&property.component).map(|i| &b.configuration.changes[*i]);
-    if let Some(create) = create
-        && let ChangeKind::Create { properties, .. } = &create.kind
-        && properties.contains_key(&property.member)
-        && !fulfilled
-        && present.is_some()
-    {
-        b.findings.push(clash(create, change));
-        return;
-    }
-    let found = if fulfilled { step::precondition(&what, b.view) } else { Vec::new() };
-    if !found.is_empty() {
-        b.refuse(&what, found, change.origin);
-    } else if fulfilled {
+    if fulfilled {
         // A demand that is true already. On a component that is created here, the create is the write.
-        if create.is_none() {
+        if create.is_none() && rival.is_none() {
             b.write_property(property, Saved::Property(fitted), false);
         }
+    } else if let Some(other) = initial.or(rival) {
+        b.findings.push(clash(other, change));
     } else {
         b.step(what, None, change.origin, &after);
     }
@@ -275,8 +285,7 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, value: &Value,
     let mut after = After::new();
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
-    let declared = b.view.component(port.component).and_then(|n| n.port(port.member));
-    let fitted = declared.and_then(|(_, p)| value.clone().fit(&p.ty).ok()).unwrap_or_else(|| value.clone());
+    let fitted = fit_write(b, port, value);
     let fulfilled = matches!(step::written(port, b.view), Some(Some(present)) if present == fitted);
     let what = Step::PortWrite { port, value: Some(fitted.clone()) };
     if let Some(first) = rival(b, usage) {

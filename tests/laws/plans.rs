@@ -195,6 +195,10 @@ proptest! {
                     let mut codes: Vec<_> = r.findings.iter().map(|f| f.code).collect();
                     codes.sort();
                     codes.dedup();
+                    // Which clash is told beside a change that is wrong by itself depends on which is met first.
+                    if codes.len() > 1 {
+                        codes.retain(|c| *c != davit::model::codes::CLASH);
+                    }
                     codes
                 };
                 prop_assert_eq!(codes(&a), codes(&b), "{:?}\n{:?}", a, b);
