@@ -148,3 +148,13 @@ pub const SCRIPT_MEMORY: usize = 256 << 20;
 
 /// Instructions of one script: hours of stories, and a few seconds of an endless loop.
 pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;
+/// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
+/// twenty milliseconds of work.
+pub const CHECK_TRANSITIONS: usize = 20_000;
+
+/// Requests that `check` lets wait at once: while so many wait, it follows no further events from outside. What goes
+/// wrong when requests queue up goes wrong with two of them.
+pub const CHECK_WAITING: usize = 2;
+
+/// Frames of one configuration that `check` follows: a third one means that going round adds one each time.
+pub const CHECK_FRAMES: usize = 3;

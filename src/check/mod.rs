@@ -5,10 +5,18 @@
 
 mod configurations;
 mod coordinator;
+mod drive;
+mod explore;
+mod reactions;
 mod types;
 mod universe;
+mod world;
 
-use crate::model::{Catalogue, Deployment, Findings, finding};
+use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
+use crate::model::{Catalogue, Deployment, Finding, Findings, finding};
+use crate::statechart::{Chart, NodeId};
+use crate::system::View;
+pub use drive::{Drive, Happening, Until, drive};
 use serde::Serialize;
 use std::ops::Deref;
 
@@ -61,15 +69,97 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
     findings.extend(configurations::check(deployment, catalogue, &universe));
     let (chart, problems) = crate::statechart::compile(&deployment.coordinator);
     findings.extend(problems);
+    let mut explored = Explored::default();
+    let mut trace = Vec::new();
     if let Some(chart) = &chart {
         findings.extend(coordinator::check(deployment, chart));
+        // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
+        if !finding::has_errors(&findings) {
+            let mut product = drive::product(deployment, chart, catalogue);
+            let mut traced = ways(deployment, chart, &mut product);
+            let down: Vec<NodeId> = chart.find(&deployment.shutdown.down).into_iter().collect();
+            let exploration = explore::explore(&mut product, &down);
+            explored = exploration.explored;
+            traced.extend(exploration.findings);
+            traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
+            for (finding, way) in traced {
+                if findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
+                    continue;
+                }
+                if trace.is_empty() {
+                    trace = way;
+                }
+                findings.push(finding);
+            }
+        }
     }
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     let sound = chart.is_some() && !finding::has_errors(&findings);
-    Report {
-        checked: sound.then(|| Checked(deployment.clone())),
-        findings,
-        explored: Explored::default(),
-        trace: Vec::new(),
+    Report { checked: sound.then(|| Checked(deployment.clone())), findings, explored, trace }
+}
+
+/// Bring-up and shutdown must work when everything goes well.
+fn ways(deployment: &Deployment, chart: &Chart, product: &mut explore::Product<'_>) -> Vec<(Finding, Vec<String>)> {
+    let Some((rise, fall)) = drive::ways(product) else { return Vec::new() };
+    let mut found = Vec::new();
+    let tell = |product: &explore::Product<'_>, way: &drive::Way| -> Vec<String> {
+        std::iter::once(format!("start → {}", chart.fqn(way.from.leaf)))
+            .chain(way.moves.iter().map(|(by, to)| product.tell(by, to)))
+            .collect()
+    };
+    let stops = |way: &drive::Way, code, key: &str, goal: &str, what: &str| {
+        let at = chart.fqn(way.end().leaf).to_string();
+        let mut finding = match &way.refused {
+            Some((ask, reasons)) => {
+                let why = reasons.first().map_or("", |f| f.message.as_str());
+                let mut finding =
+                    Finding::error(code, format!("{what} stops at `{at}`: `{ask}` is refused, because {why}"));
+                for reason in reasons.iter().filter(|r| r.origin.is_some()).take(4) {
+                    finding = finding.also(reason.origin, reason.message.clone());
+                }
+                finding
+            }
+            None => Finding::error(code, format!("{what} stops at `{at}` and never reaches `{goal}`"))
+                .also(chart.origin(way.end().leaf), "stops here, even if every request succeeds"),
+        };
+        if let Some(help) = way.refused.as_ref().and_then(|(_, r)| r.first()).and_then(|f| f.help.clone()) {
+            finding = finding.help(help);
+        } else {
+            finding = finding.help("look at the trace: which event does the coordinator wait for at its end?");
+        }
+        finding.at(deployment.key_origin(key)).path(key)
+    };
+    if !rise.reached {
+        found.push((
+            stops(&rise, DEPLOY_NEVER_UP, "deploy.up", &deployment.deploy.up, "the bring-up"),
+            tell(product, &rise),
+        ));
     }
+    if let Some(fall) = fall {
+        let way = tell(product, &fall);
+        if fall.reached {
+            let mut left = Vec::new();
+            let world = product.worlds.get(fall.end().world);
+            world.system.for_each_component(&mut |node| left.push(node.name.to_string()));
+            left.sort();
+            if !left.is_empty() {
+                let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
+                left.truncate(6);
+                let message = format!("the shutdown leaves {}{more} behind", left.join(", "));
+                let finding = Finding::error(DEPLOY_LEFTOVERS, message)
+                    .at(deployment.key_origin("shutdown.down"))
+                    .path("shutdown.down")
+                    .help(
+                        "let the coordinator undo what it applied, or apply a configuration that destroys what is left",
+                    );
+                found.push((finding, way));
+            }
+        } else {
+            found.push((
+                stops(&fall, DEPLOY_NEVER_DOWN, "shutdown.down", &deployment.shutdown.down, "the shutdown"),
+                way,
+            ));
+        }
+    }
+    found
 }

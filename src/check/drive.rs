@@ -1,0 +1,251 @@
+//! Bring-up and shutdown with every request answered *ok*: what `plan --bringup` and `--shutdown` show, and the least that
+//! must work.
+//!
+//! Where nothing is waited for but events of components or operators, the shortest series of events is taken that leads
+//! to the goal.
+
+use super::coordinator;
+use super::explore::{Move, Product, State};
+use super::reactions::Reactions;
+use super::world::{self, Applied, World, Worlds};
+use crate::limits;
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Snapshot};
+use crate::plan::PlannedStep;
+use crate::stack::Stack;
+use crate::statechart::{Chart, EventId, NodeId};
+use crate::system::System;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// One thing that happens on the way.
+#[derive(Debug, Clone)]
+pub enum Happening {
+    /// An event comes from outside, or time passes.
+    Event {
+        /// The event.
+        event: String,
+        /// The state the coordinator is in then.
+        state: String,
+    },
+    /// Requests made together are carried out.
+    Applied {
+        /// The requests, as they were raised.
+        asks: Vec<Ask>,
+        /// What is done.
+        steps: Vec<PlannedStep>,
+        /// The system after it.
+        result: Snapshot,
+        /// The state the coordinator is in then.
+        state: String,
+    },
+}
+
+/// A bring-up or a shutdown with every request answered *ok*.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// What happens, in order.
+    pub happenings: Vec<Happening>,
+    /// Whether it arrives.
+    pub reached: bool,
+    /// The state it ends in.
+    pub state: String,
+    /// The system it ends with.
+    pub system: Snapshot,
+    /// Frames that are left.
+    pub frames: Vec<ConfigId>,
+    /// Why a request on the way was refused, if one was; the way ends there.
+    pub refused: Option<(Ask, Findings)>,
+}
+
+/// How far to drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Until {
+    /// From nothing to *up*.
+    Up,
+    /// From *up* to *down*; what happens before *up* is left out.
+    Down,
+}
+
+/// Configurations whose frames the coordinator may undo; none: any (it pops the top).
+pub(super) fn undone(deployment: &Deployment, chart: &Chart) -> Option<FxHashSet<ConfigId>> {
+    let mut ids: FxHashSet<ConfigId> =
+        deployment.configurations.iter().filter(|c| c.group.is_some()).map(|c| c.id).collect();
+    for site in chart.raises() {
+        match coordinator::ask_of(deployment, site.name) {
+            Some(Ask::Undo | Ask::UndoTo(_)) => return None,
+            Some(Ask::UndoOf(id)) => _ = ids.insert(id),
+            _ => {}
+        }
+    }
+    Some(ids)
+}
+
+/// The product of a deployment's coordinator and configurator, where nothing has happened yet.
+pub(super) fn product<'a>(deployment: &'a Deployment, chart: &'a Chart, catalogue: &Catalogue) -> Product<'a> {
+    let outside = coordinator::outside_events(deployment, chart);
+    Product {
+        deployment,
+        chart,
+        reactions: Reactions::new(deployment, chart, &outside),
+        worlds: Worlds::new(deployment, catalogue, undone(deployment, chart)),
+    }
+}
+
+/// A way: states with the moves that lead to them.
+pub(super) struct Way {
+    pub(super) from: State,
+    pub(super) moves: Vec<(Move, State)>,
+    pub(super) reached: bool,
+    pub(super) refused: Option<(Ask, Findings)>,
+}
+
+impl Way {
+    /// The state at the end.
+    pub(super) fn end(&self) -> &State {
+        self.moves.last().map_or(&self.from, |(_, state)| state)
+    }
+}
+
+/// The shortest way from `from` to a state inside `goal` with no request waiting, every request answered *ok*, that
+/// begins with `first` and has `never` nowhere. When there is none, the way to where it stops.
+pub(super) fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventName, goal: NodeId) -> Way {
+    let first = product.chart.event(first);
+    let never = product.chart.event(never);
+    let begin = product.event(&from, first);
+    let mut states = vec![(begin.clone(), None::<(usize, Move)>)];
+    let mut index: FxHashMap<State, usize> = std::iter::once((begin, 0)).collect();
+    let mut queue: VecDeque<usize> = std::iter::once(0).collect();
+    let mut refused: Option<(usize, Ask, Findings)> = None;
+    let mut last = 0;
+    let mut reached = None;
+    while let Some(at) = queue.pop_front() {
+        let state = states[at].0.clone();
+        if state.waiting.is_empty() && product.chart.is_inside(state.leaf, goal) {
+            reached = Some(at);
+            break;
+        }
+        if states.len() > limits::CHECK_TRANSITIONS {
+            break;
+        }
+        last = at;
+        let mut next: Vec<(Move, State)> = Vec::new();
+        if let Some(unit) = state.waiting.first() {
+            let asks = unit.asks.clone();
+            match product.head(&state) {
+                Applied::Done { world, .. } => {
+                    next.push((Move::Answer { asks, ok: true }, product.answer(&state, true, world)));
+                }
+                Applied::Refused { which, findings } => {
+                    refused.get_or_insert((at, asks[which.min(asks.len() - 1)], findings.to_vec()));
+                }
+                Applied::TooDeep(_) => {}
+            }
+        } else {
+            let offers: Vec<EventId> =
+                product.reactions.offers(state.leaf).iter().copied().filter(|e| *e != never).collect();
+            for event in offers {
+                next.push((Move::Event(event), product.event(&state, event)));
+            }
+        }
+        for (by, state) in next {
+            if !index.contains_key(&state) {
+                index.insert(state.clone(), states.len());
+                queue.push_back(states.len());
+                states.push((state, Some((at, by))));
+            }
+        }
+    }
+    let mut at = reached.or(refused.as_ref().map(|(at, ..)| *at)).unwrap_or(last);
+    let mut moves = Vec::new();
+    while let Some((before, by)) = states[at].1.clone() {
+        moves.push((by, states[at].0.clone()));
+        at = before;
+    }
+    moves.push((Move::Event(first), states[0].0.clone()));
+    moves.reverse();
+    let refused = if reached.is_some() { None } else { refused.map(|(_, ask, findings)| (ask, findings)) };
+    Way { from, moves, reached: reached.is_some(), refused }
+}
+
+/// The ways up and, when that arrives, down. None when the coordinator cannot be entered or a state is not there.
+pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
+    let deployment = product.deployment;
+    let up = product.chart.find(&deployment.deploy.up).ok()?;
+    let down = product.chart.find(&deployment.shutdown.down).ok()?;
+    let mut start = product.start()?;
+    // What the coordinator asks for by itself, before anybody wants it up.
+    while !start.waiting.is_empty() {
+        let Applied::Done { world, .. } = product.head(&start) else { break };
+        start = product.answer(&start, true, world);
+    }
+    let rise = way(product, start, deployment.deploy.event, deployment.shutdown.event, up);
+    if !rise.reached {
+        return Some((rise, None));
+    }
+    let top = rise.end().clone();
+    let fall = way(product, top, deployment.shutdown.event, deployment.deploy.event, down);
+    Some((rise, Some(fall)))
+}
+
+/// Drives a deployment that was checked, on the planner's picture of the system.
+///
+/// None when the coordinator cannot be entered, or a state that the deployment names is not there.
+pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Option<Drive> {
+    let chart = crate::statechart::compile(&deployment.coordinator).0?;
+    let mut product = product(deployment, &chart, catalogue);
+    let (rise, fall) = ways(&mut product)?;
+    let mut world =
+        World { system: System::new(Arc::new(catalogue.clone())), stack: Stack::new(deployment.limits.stack) };
+    let mut refused = None;
+    let mut happenings = replay(deployment, &chart, &rise, &mut world, &mut refused);
+    let mut end = &rise;
+    if let (Until::Down, Some(fall)) = (until, &fall) {
+        happenings = replay(deployment, &chart, fall, &mut world, &mut refused);
+        end = fall;
+    }
+    let reached = end.reached && (until == Until::Up || fall.is_some());
+    Some(Drive {
+        happenings,
+        reached,
+        state: chart.fqn(end.end().leaf).to_string(),
+        system: world.system.snapshot(),
+        frames: world.stack.frames().iter().map(|f| f.configuration).collect(),
+        refused: refused.or_else(|| end.refused.clone()),
+    })
+}
+
+/// The same way with real values: worlds that `Worlds` takes for one may differ in them.
+fn replay(
+    deployment: &Deployment,
+    chart: &Chart,
+    way: &Way,
+    world: &mut World,
+    refused: &mut Option<(Ask, Findings)>,
+) -> Vec<Happening> {
+    let context = world::context(deployment);
+    let requester = world::requester(deployment);
+    let mut happenings = Vec::new();
+    for (by, state) in &way.moves {
+        let place = chart.fqn(state.leaf).to_string();
+        match by {
+            Move::Event(event) => happenings.push(Happening::Event { event: chart.event_text(*event), state: place }),
+            Move::Answer { asks, .. } => match world::apply(deployment, &context, requester, world, asks) {
+                Ok(change) => {
+                    *world = change.world;
+                    happenings.push(Happening::Applied {
+                        asks: asks.to_vec(),
+                        steps: change.steps,
+                        result: world.system.snapshot(),
+                        state: place,
+                    });
+                }
+                Err(refusal) => {
+                    *refused = Some((asks[0], refusal.findings));
+                    return happenings;
+                }
+            },
+        }
+    }
+    happenings
+}

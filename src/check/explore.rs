@@ -1,0 +1,433 @@
+//! The product of coordinator, system, stack and waiting requests, followed through every order of events and answers.
+//!
+//! A state is the coordinator's leaf, a world and the requests that wait. From each, the first waiting request is
+//! answered *ok* and *failed*, and every event that is heard comes. What can be reached with every request answered *ok*
+//! is followed first, the shortest way first; then what failures lead to. So a finding's trace is short, and has a failure
+//! in it only where it needs one.
+
+use super::Explored;
+use super::coordinator::{bad_answers, place};
+use super::reactions::{Asked, Reaction, Reactions};
+use super::world::{Applied, WorldId, Worlds};
+use crate::limits;
+use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK};
+use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
+use crate::statechart::{Chart, EventId, NodeId, RaiseSite, When};
+use crate::system::View;
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
+use std::collections::VecDeque;
+
+/// Requests that are answered together, and who hears the answers (none: left since).
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Unit {
+    /// What is asked.
+    pub asks: SmallVec<[Ask; 2]>,
+    /// Who hears each answer.
+    pub owners: SmallVec<[Option<NodeId>; 2]>,
+}
+
+/// A state of the product.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct State {
+    /// The coordinator's leaf.
+    pub leaf: NodeId,
+    /// System and stack.
+    pub world: WorldId,
+    /// Requests that wait, the oldest first.
+    pub waiting: SmallVec<[Unit; 2]>,
+}
+
+/// What leads from one state to the next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Move {
+    /// An event comes.
+    Event(EventId),
+    /// The first waiting requests are answered.
+    Answer {
+        /// What was asked.
+        asks: SmallVec<[Ask; 2]>,
+        /// How it ended.
+        ok: bool,
+    },
+}
+
+/// The moves of the product.
+pub struct Product<'a> {
+    /// The deployment.
+    pub deployment: &'a Deployment,
+    /// Its coordinator.
+    pub chart: &'a Chart,
+    /// What the coordinator does.
+    pub reactions: Reactions<'a>,
+    /// What the configurator does.
+    pub worlds: Worlds<'a>,
+}
+
+/// A refused or too deep request, found while moving.
+#[derive(Debug, Clone)]
+pub enum Trouble {
+    /// The request is refused.
+    Refused(Ask, std::rc::Rc<Findings>),
+    /// Going round adds frames.
+    TooDeep(ConfigId),
+}
+
+impl Product<'_> {
+    /// The state after the first entry; none when the coordinator cannot be entered.
+    pub fn start(&mut self) -> Option<State> {
+        let entered = self.reactions.enter()?;
+        let mut state = State { leaf: entered.leaf, world: 0, waiting: SmallVec::new() };
+        self.follow(&mut state, &entered);
+        Some(state)
+    }
+
+    /// Brings a reaction into a state: answers that nobody hears any more, and new requests.
+    fn follow(&self, state: &mut State, reaction: &Reaction) {
+        state.leaf = reaction.leaf;
+        for unit in &mut state.waiting {
+            for owner in &mut unit.owners {
+                if owner.is_some_and(|o| reaction.left.contains(&o)) {
+                    *owner = None;
+                }
+            }
+        }
+        for unit in self.units(&reaction.asked) {
+            let safe = unit.asks.iter().any(|ask| match ask {
+                Ask::Apply(id) => self.deployment.configuration(*id).is_some_and(|c| c.safe),
+                _ => false,
+            });
+            if safe { state.waiting.insert(0, unit) } else { state.waiting.push(unit) }
+        }
+    }
+
+    /// Requests of one step as the configurator takes them: an undo and a push together are one transaction, else each
+    /// stands by itself.
+    fn units(&self, asked: &[Asked]) -> Vec<Unit> {
+        let pushes = asked.iter().any(|a| matches!(a.ask, Ask::Apply(_)));
+        let undoes = asked.iter().any(|a| !matches!(a.ask, Ask::Apply(_)));
+        let unit = |asked: &[Asked]| Unit {
+            asks: asked.iter().map(|a| a.ask).collect(),
+            owners: asked.iter().map(|a| a.owner).collect(),
+        };
+        if pushes && undoes { vec![unit(asked)] } else { asked.iter().map(|a| unit(std::slice::from_ref(a))).collect() }
+    }
+
+    /// The state after an event.
+    pub fn event(&mut self, state: &State, event: EventId) -> State {
+        let mut next = state.clone();
+        let reaction = self.reactions.react(state.leaf, event);
+        self.follow(&mut next, &reaction);
+        next
+    }
+
+    /// What the first waiting requests do in the state's world.
+    pub fn head(&mut self, state: &State) -> Applied {
+        self.worlds.apply(state.world, &state.waiting[0].asks)
+    }
+
+    /// The state after the first waiting requests were answered and the world has become `world`.
+    pub fn answer(&mut self, state: &State, ok: bool, world: WorldId) -> State {
+        let mut next = State { world, ..state.clone() };
+        let mut unit = next.waiting.remove(0);
+        for i in 0..unit.asks.len() {
+            let Some(_) = unit.owners[i] else { continue };
+            let answer = self.chart.event(answer(unit.asks[i], ok));
+            let reaction = self.reactions.react(next.leaf, answer);
+            for owner in &mut unit.owners {
+                if owner.is_some_and(|o| reaction.left.contains(&o)) {
+                    *owner = None;
+                }
+            }
+            self.follow(&mut next, &reaction);
+        }
+        next
+    }
+
+    /// Whether `leaf` is inside one of `states`.
+    pub fn inside(&self, leaf: NodeId, states: &[NodeId]) -> bool {
+        states.iter().any(|s| self.chart.is_inside(leaf, *s))
+    }
+
+    /// A move in words.
+    pub fn tell(&self, by: &Move, to: &State) -> String {
+        let what = match by {
+            Move::Event(event) => self.chart.event_text(*event),
+            Move::Answer { asks, ok } => {
+                let events: Vec<String> = asks.iter().map(|a| answer(*a, *ok).to_string()).collect();
+                events.join(", ")
+            }
+        };
+        format!("{what} → {}", self.chart.fqn(to.leaf))
+    }
+}
+
+/// The event that answers `ask`.
+pub fn answer(ask: Ask, ok: bool) -> EventName {
+    match (ask, ok) {
+        (Ask::Apply(_), true) => Verdict::Ok.event(ask),
+        (_, true) => Verdict::Undone.event(ask),
+        (_, false) => bad_answers(ask)[0],
+    }
+}
+
+/// What was found, with the way there.
+pub struct Exploration {
+    /// Findings; each with a trace of its own.
+    pub findings: Vec<(Finding, Vec<String>)>,
+    /// How far it went.
+    pub explored: Explored,
+}
+
+struct Search<'p, 'a> {
+    product: &'p mut Product<'a>,
+    states: Vec<State>,
+    index: FxHashMap<State, u32>,
+    /// How each state was first reached: from where, by what.
+    from: Vec<Option<(u32, Move)>>,
+    /// Whether the way to each has a failure in it, and whether it was followed further.
+    with_failure: Vec<bool>,
+    followed: Vec<bool>,
+    edges: Vec<(u32, u32)>,
+    /// To be followed: reached without a failure, and with one.
+    clean: VecDeque<u32>,
+    failed: VecDeque<u32>,
+    troubles: Vec<(u32, Trouble)>,
+    cut: bool,
+}
+
+/// Follows everything, within the budget.
+pub fn explore(product: &mut Product<'_>, down: &[NodeId]) -> Exploration {
+    let mut search = Search {
+        product,
+        states: Vec::new(),
+        index: FxHashMap::default(),
+        from: Vec::new(),
+        with_failure: Vec::new(),
+        followed: Vec::new(),
+        edges: Vec::new(),
+        clean: VecDeque::new(),
+        failed: VecDeque::new(),
+        troubles: Vec::new(),
+        cut: false,
+    };
+    search.run();
+    search.judge(down)
+}
+
+impl Search<'_, '_> {
+    fn run(&mut self) {
+        let Some(start) = self.product.start() else { return };
+        self.reach(start, None, false);
+        while let Some(at) = self.clean.pop_front().or_else(|| self.failed.pop_front()) {
+            if self.edges.len() >= limits::CHECK_TRANSITIONS {
+                self.cut = true;
+                return;
+            }
+            self.expand(at);
+        }
+    }
+
+    fn reach(&mut self, state: State, from: Option<(u32, Move)>, failed: bool) {
+        let next = u32::try_from(self.states.len()).unwrap_or(u32::MAX);
+        let id = *self.index.entry(state).or_insert_with_key(|state| {
+            self.states.push(state.clone());
+            next
+        });
+        let source = from.as_ref().map(|(at, _)| *at);
+        if id == next {
+            self.from.push(from);
+            self.with_failure.push(failed);
+            self.followed.push(false);
+            if failed { self.failed.push_back(id) } else { self.clean.push_back(id) }
+        }
+        if let Some(source) = source {
+            self.edges.push((source, id));
+        }
+    }
+
+    fn expand(&mut self, at: u32) {
+        let state = self.states[at as usize].clone();
+        self.followed[at as usize] = true;
+        if let Some(head) = state.waiting.first() {
+            let asks = head.asks.clone();
+            let (ok, fails) = match self.product.head(&state) {
+                Applied::Done { world, may_fail } => (Some(world), may_fail),
+                Applied::Refused { which, findings } => {
+                    self.troubles.push((at, Trouble::Refused(asks[which.min(asks.len() - 1)], findings)));
+                    (None, true)
+                }
+                Applied::TooDeep(id) => {
+                    self.troubles.push((at, Trouble::TooDeep(id)));
+                    (None, false)
+                }
+            };
+            if let Some(world) = ok {
+                let next = self.product.answer(&state, true, world);
+                self.reach(
+                    next,
+                    Some((at, Move::Answer { asks: asks.clone(), ok: true })),
+                    self.with_failure[at as usize],
+                );
+            }
+            if fails {
+                let next = self.product.answer(&state, false, state.world);
+                self.reach(next, Some((at, Move::Answer { asks, ok: false })), true);
+            }
+        }
+        if state.waiting.len() < limits::CHECK_WAITING {
+            for event in self.product.reactions.offers(state.leaf).iter() {
+                let next = self.product.event(&state, *event);
+                self.reach(next, Some((at, Move::Event(*event))), self.with_failure[at as usize]);
+            }
+        }
+    }
+
+    fn trace(&self, at: u32) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut at = at;
+        while let Some((before, by)) = &self.from[at as usize] {
+            lines.push(self.product.tell(by, &self.states[at as usize]));
+            at = *before;
+        }
+        lines.push(format!("start → {}", self.product.chart.fqn(self.states[at as usize].leaf)));
+        lines.reverse();
+        lines
+    }
+
+    fn judge(self, down: &[NodeId]) -> Exploration {
+        let mut findings: Vec<(Finding, Vec<String>)> = Vec::new();
+        let mut said: FxHashSet<(Ask, String)> = FxHashSet::default();
+        let mut deep: FxHashSet<ConfigId> = FxHashSet::default();
+        for (at, trouble) in &self.troubles {
+            match trouble {
+                Trouble::Refused(ask, reasons) => {
+                    let first = reasons.first().map_or_else(String::new, |f| f.message.clone());
+                    if said.insert((*ask, first)) {
+                        findings.push((self.refused(*at, *ask, reasons), self.trace(*at)));
+                    }
+                }
+                Trouble::TooDeep(id) => {
+                    if deep.insert(*id) {
+                        let origin = self.product.deployment.configuration(*id).map(|c| c.origin).unwrap_or_default();
+                        let message = format!("going round applies `{id}` again and again without undoing it");
+                        let finding = Finding::warning(COORD_STACK_GROWS, message).at(origin).help(format!(
+                            "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
+                        ));
+                        findings.push((finding, self.trace(*at)));
+                    }
+                }
+            }
+        }
+        self.ways_down(down, &mut findings);
+        findings.extend(self.product.worlds.warnings.iter().cloned().map(|f| (f, Vec::new())));
+        let explored = Explored { states: self.states.len(), transitions: self.edges.len(), complete: !self.cut };
+        Exploration { findings, explored }
+    }
+
+    fn refused(&self, at: u32, ask: Ask, reasons: &Findings) -> Finding {
+        let state = &self.states[at as usize];
+        let chart = self.product.chart;
+        let owner = state.waiting.first().and_then(|u| u.asks.iter().position(|a| *a == ask).and_then(|i| u.owners[i]));
+        let site = self.site(ask, owner);
+        let message =
+            format!("`{ask}` is refused when it is asked for: {}", reasons.first().map_or("", |f| &f.message));
+        let mut finding = if self.with_failure[at as usize] {
+            Finding::warning(COORD_REQUEST_REFUSED, message)
+        } else {
+            Finding::error(COORD_REQUEST_REFUSED, message)
+        };
+        if let Some(site) = site {
+            finding = finding.at(site.origin).labelled("asked for here").path(place(chart, site.when));
+        }
+        for reason in reasons.iter().take(3) {
+            if reason.origin.is_some() {
+                finding = finding.also(reason.origin, reason.message.clone());
+            }
+        }
+        let help = reasons.first().and_then(|f| f.help.clone());
+        finding.help(help.unwrap_or_else(|| "ask for it where it fits the system".to_owned()))
+    }
+
+    /// The place that made a request, as far as it can be told.
+    fn site(&self, ask: Ask, owner: Option<NodeId>) -> Option<&RaiseSite> {
+        let name = ask.to_string();
+        let sites = || self.product.chart.raises().iter().filter(|s| s.name.as_str() == name);
+        sites().find(|s| matches!(s.when, When::Entry(n) if Some(n) == owner)).or_else(|| sites().next())
+    }
+
+    /// Where nothing leads on, where no way leads down, and ways down that leave something behind.
+    fn ways_down(&self, down: &[NodeId], findings: &mut Vec<(Finding, Vec<String>)>) {
+        let product = &*self.product;
+        let is_down = |s: &State| s.waiting.is_empty() && product.inside(s.leaf, down);
+        let mut out = vec![false; self.states.len()];
+        self.edges.iter().for_each(|(a, _)| out[*a as usize] = true);
+        let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
+        let mut leaves: FxHashSet<NodeId> = FxHashSet::default();
+        for (at, state) in self.states.iter().enumerate() {
+            let id = u32::try_from(at).unwrap_or(u32::MAX);
+            if !out[at] && self.followed[at] && !is_down(state) && !troubled.contains(&id) && leaves.insert(state.leaf)
+            {
+                let fqn = product.chart.fqn(state.leaf);
+                let finding = Finding::warning(COORD_STUCK, format!("nothing leads on from `{fqn}`"))
+                    .at(product.chart.origin(state.leaf))
+                    .path(format!("coordinator.{fqn}"))
+                    .help(format!("add a transition from it, at least on `{}`", product.deployment.shutdown.event));
+                findings.push((finding, self.trace(id)));
+            }
+        }
+        if let Some((at, left)) = self.states.iter().enumerate().find_map(|(at, state)| {
+            let left = is_down(state).then(|| self.components(state)).filter(|l| !l.is_empty())?;
+            Some((u32::try_from(at).ok()?, left))
+        }) {
+            let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
+            let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
+            let finding =
+                Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
+                    .at(product.deployment.key_origin("shutdown.down"))
+                    .path("shutdown.down")
+                    .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
+            findings.push((finding, self.trace(at)));
+        }
+        // Backwards from everything that is down; what is not met has no way. Only what was followed to the end counts.
+        if self.cut {
+            return;
+        }
+        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
+        self.edges.iter().for_each(|(a, b)| before[*b as usize].push(*a));
+        let mut reaches: Vec<bool> = self.states.iter().map(&is_down).collect();
+        let mut next: Vec<usize> = (0..self.states.len()).filter(|i| reaches[*i]).collect();
+        next.extend(troubled.iter().map(|at| *at as usize));
+        while let Some(at) = next.pop() {
+            for b in &before[at] {
+                if !std::mem::replace(&mut reaches[*b as usize], true) {
+                    next.push(*b as usize);
+                }
+            }
+        }
+        let lost = (0..self.states.len()).find(|at| {
+            let id = u32::try_from(*at).unwrap_or(u32::MAX);
+            !reaches[*at] && !troubled.contains(&id) && !leaves.contains(&self.states[*at].leaf)
+        });
+        if let Some(at) = lost.filter(|_| leaves.is_empty() || !reaches[0]) {
+            let leaf = self.states[at].leaf;
+            let fqn = product.chart.fqn(leaf);
+            let finding = Finding::warning(
+                COORD_NO_WAY_DOWN,
+                format!("from `{fqn}` no way leads to `{}`", product.deployment.shutdown.down),
+            )
+            .at(product.chart.origin(leaf))
+            .path(format!("coordinator.{fqn}"))
+            .also(product.deployment.key_origin("shutdown.down"), "the state that means down")
+            .help("add transitions that lead down from there");
+            findings.push((finding, self.trace(u32::try_from(at).unwrap_or(0))));
+        }
+    }
+
+    fn components(&self, state: &State) -> Vec<ComponentName> {
+        let mut names = Vec::new();
+        self.product.worlds.get(state.world).system.for_each_component(&mut |node| names.push(node.name));
+        names.sort_unstable();
+        names
+    }
+}

@@ -1,0 +1,251 @@
+//! The configurator's half of the product: system and stack, as requests change them.
+//!
+//! Two worlds are one when they cannot be told apart by what may be requested in them: the same components in the same
+//! run states with the same connections (no precondition looks at a value), and the same frames that the coordinator may
+//! undo, each blocked by the same kind of frames above it. Frames that nobody ever undoes count only by what they block.
+//! Each world is planned in with the real planner and the real stack, once per request.
+
+use crate::model::{
+    Ask, Catalogue, ComponentName, ConfigId, Deployment, Findings, MemberRef, Policy, RunState, TypeName,
+};
+use crate::plan::footprint::{Index, Slot};
+use crate::plan::{Context, PlannedStep, Refusal};
+use crate::stack::{Frame, Request, Requester, Stack, transaction};
+use crate::system::{System, View, step};
+use crate::time::Time;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// The number of a world.
+pub type WorldId = u32;
+
+/// A world.
+pub struct World {
+    /// The system.
+    pub system: System,
+    /// The frames in force.
+    pub stack: Stack,
+}
+
+/// What a request did.
+#[derive(Debug, Clone)]
+pub enum Applied {
+    /// It is answered *ok* or *undone* in this world; `may_fail`: or it fails, and the world stays.
+    Done {
+        /// The world after it.
+        world: WorldId,
+        /// Whether there is a step that can fail.
+        may_fail: bool,
+    },
+    /// It is refused, and the world stays.
+    Refused {
+        /// Which of the requests made together.
+        which: usize,
+        /// Why.
+        findings: Rc<Findings>,
+    },
+    /// It would leave more frames of one configuration than are followed.
+    TooDeep(ConfigId),
+}
+
+#[derive(PartialEq, Eq, Hash)]
+struct Key {
+    components: Vec<(ComponentName, TypeName, RunState)>,
+    links: Vec<(MemberRef, MemberRef)>,
+    frames: Vec<(ConfigId, bool)>,
+}
+
+/// All worlds that were met.
+pub struct Worlds<'a> {
+    deployment: &'a Deployment,
+    context: Context,
+    requester: Requester,
+    /// Configurations whose frames the coordinator may undo; none: all of them.
+    undone: Option<FxHashSet<ConfigId>>,
+    worlds: Vec<World>,
+    keys: FxHashMap<Key, WorldId>,
+    done: FxHashMap<(WorldId, Vec<Ask>), Applied>,
+    /// Warnings of plans, each configuration's once.
+    pub warnings: Findings,
+    warned: FxHashSet<ConfigId>,
+    /// By address of the two frames, which are kept alive here.
+    blocks: FxHashMap<(usize, usize), (bool, Arc<Frame>, Arc<Frame>)>,
+}
+
+/// The context in which a deployment's configurations are planned.
+pub fn context(deployment: &Deployment) -> Context {
+    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>() }
+}
+
+/// How a deployment's coordinator is called in frames.
+///
+/// # Panics
+/// Never: a deployment's name is a component name without prefix.
+pub fn requester(deployment: &Deployment) -> Requester {
+    Requester::Coordinator(ComponentName::new(deployment.name.as_str()).expect("a plain name"))
+}
+
+impl<'a> Worlds<'a> {
+    /// The empty world has the number 0.
+    pub fn new(deployment: &'a Deployment, catalogue: &Catalogue, undone: Option<FxHashSet<ConfigId>>) -> Self {
+        let mut worlds = Self {
+            deployment,
+            context: context(deployment),
+            requester: requester(deployment),
+            undone,
+            worlds: Vec::new(),
+            keys: FxHashMap::default(),
+            done: FxHashMap::default(),
+            warnings: Vec::new(),
+            warned: FxHashSet::default(),
+            blocks: FxHashMap::default(),
+        };
+        let system = System::new(Arc::new(catalogue.clone()));
+        worlds.intern(World { system, stack: Stack::new(deployment.limits.stack) });
+        worlds
+    }
+
+    /// The world of that number.
+    pub fn get(&self, id: WorldId) -> &World {
+        &self.worlds[id as usize]
+    }
+
+    /// How many worlds were met.
+    pub fn len(&self) -> usize {
+        self.worlds.len()
+    }
+
+    /// What `asks`, made together, do in a world.
+    pub fn apply(&mut self, id: WorldId, asks: &[Ask]) -> Applied {
+        if let Some(known) = self.done.get(&(id, asks.to_vec())) {
+            return known.clone();
+        }
+        let applied = match apply(self.deployment, &self.context, self.requester, self.get(id), asks) {
+            Err(refusal) => Applied::Refused { which: refusal.request, findings: Rc::new(refusal.findings) },
+            Ok(Change { world, steps, warnings, pushed }) => {
+                for id in pushed {
+                    if self.warned.insert(id) {
+                        self.warnings.extend(
+                            warnings.iter().filter(|w| w.path.contains(id.as_str()) || w.path.is_empty()).cloned(),
+                        );
+                    }
+                }
+                match self.too_deep(&world) {
+                    Some(id) => Applied::TooDeep(id),
+                    None => Applied::Done { may_fail: !steps.is_empty(), world: self.intern(world) },
+                }
+            }
+        };
+        self.done.insert((id, asks.to_vec()), applied.clone());
+        applied
+    }
+
+    fn is_undone(&self, id: ConfigId) -> bool {
+        self.undone.as_ref().is_none_or(|undone| undone.contains(&id))
+    }
+
+    fn too_deep(&self, world: &World) -> Option<ConfigId> {
+        let mut counts: FxHashMap<ConfigId, usize> = FxHashMap::default();
+        world.stack.frames().iter().map(|f| f.configuration).find(|id| {
+            let count = counts.entry(*id).or_default();
+            *count += 1;
+            self.is_undone(*id) && *count > crate::limits::CHECK_FRAMES
+        })
+    }
+
+    fn intern(&mut self, world: World) -> WorldId {
+        let mut components = Vec::with_capacity(world.system.len());
+        world.system.for_each_component(&mut |node| components.push((node.name, node.ty.name, node.state)));
+        components.sort_unstable();
+        let mut links = Vec::new();
+        world.system.for_each_link(&mut |from, to, _: Policy| links.push((from, to)));
+        links.sort_unstable();
+        let frames = world.stack.frames();
+        let mut shape = Vec::new();
+        for (i, frame) in frames.iter().enumerate() {
+            if self.is_undone(frame.configuration) {
+                let blocked = frames[i + 1..]
+                    .iter()
+                    .any(|above| !self.is_undone(above.configuration) && self.blocked(frame, above));
+                shape.push((frame.configuration, blocked));
+            }
+        }
+        let key = Key { components, links, frames: shape };
+        if let Some(id) = self.keys.get(&key) {
+            return *id;
+        }
+        let id = WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX);
+        self.worlds.push(world);
+        self.keys.insert(key, id);
+        id
+    }
+
+    /// Whether `above` keeps `frame` from being undone (as the stack would say; values that are handed over do not).
+    fn blocked(&mut self, frame: &Arc<Frame>, above: &Arc<Frame>) -> bool {
+        let key = (Arc::as_ptr(frame) as usize, Arc::as_ptr(above) as usize);
+        if let Some(known) = self.blocks.get(&key) {
+            return known.0;
+        }
+        let over: FxHashSet<Slot> = above.saved.iter().map(|s| s.slot).collect();
+        let index = Index::new(&frame.footprint, |touch| touch.serves.is_none_or(|slot| !over.contains(&slot)));
+        let blocked = above.floor.is_some() || above.footprint.touches.iter().any(|touch| index.shares(touch));
+        self.blocks.insert(key, (blocked, frame.clone(), above.clone()));
+        blocked
+    }
+}
+
+/// What requests made together lead to.
+pub struct Change {
+    /// The world after them.
+    pub world: World,
+    /// The steps.
+    pub steps: Vec<PlannedStep>,
+    /// What the plans warn of.
+    pub warnings: Findings,
+    /// Configurations that were pushed.
+    pub pushed: Vec<ConfigId>,
+}
+
+/// What `asks`, made together by `requester`, do in `world`.
+///
+/// # Errors
+/// Why they are refused.
+pub fn apply(
+    deployment: &Deployment,
+    context: &Context,
+    requester: Requester,
+    world: &World,
+    asks: &[Ask],
+) -> Result<Change, Refusal> {
+    let mut requests = Vec::new();
+    let mut places = Vec::new();
+    let mut pushed = Vec::new();
+    for (i, ask) in asks.iter().enumerate() {
+        let request = match ask {
+            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| {
+                pushed.push(*id);
+                Request::Push { configuration, requester, at: Time::default(), active: false }
+            }),
+            Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Request::Undo(frame.id)),
+            Ask::Undo => Some(Request::UndoTop),
+            Ask::UndoTo(n) => Some(Request::UndoTo(*n)),
+            Ask::Commit => None,
+        };
+        // An undo of what is not there is answered *undone*.
+        if let Some(request) = request {
+            requests.push(request);
+            places.push(i);
+        }
+    }
+    let mut world = World { system: world.system.clone(), stack: world.stack.clone() };
+    let transaction = transaction(&world.system, &world.stack, &requests, context)
+        .map_err(|refusal| Refusal { request: places.get(refusal.request).copied().unwrap_or(0), ..refusal })?;
+    for planned in &transaction.steps {
+        step::effect(&planned.step, &mut world.system);
+    }
+    let (steps, warnings) = (transaction.steps.clone(), transaction.warnings.clone());
+    world.stack.commit(transaction);
+    Ok(Change { world, steps, warnings, pushed })
+}
