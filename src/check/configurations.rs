@@ -11,15 +11,22 @@ use crate::model::codes::{
 };
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Call, Catalogue, Change, ChangeKind, Code, ComponentName, ComponentType, Configuration, Deployment, Direction,
-    Finding, Findings, Ident, MemberRef, Origin, Policy, PortType, RunState, StateEntry, Target, TypeName, Value,
+    Call, Catalogue, Change, ChangeKind, Code, ComponentName, ComponentType, ConfigId, Configuration, Deployment,
+    Direction, Finding, Findings, Ident, MemberRef, Origin, Policy, PortType, RunState, StateEntry, Target, TypeName,
+    Value,
 };
 use std::collections::BTreeMap;
 
 /// What is wrong with each configuration by itself.
 pub fn check(deployment: &Deployment, catalogue: &Catalogue, universe: &Universe) -> Findings {
+    let all: Vec<ConfigId> = deployment.configurations.iter().map(|c| c.id).collect();
+    some(deployment, catalogue, universe, &all)
+}
+
+/// What is wrong with these configurations by themselves.
+pub fn some(deployment: &Deployment, catalogue: &Catalogue, universe: &Universe, ids: &[ConfigId]) -> Findings {
     let mut check = Check { deployment, catalogue, universe, path: String::new(), findings: Vec::new() };
-    for configuration in &deployment.configurations {
+    for configuration in deployment.configurations.iter().filter(|c| ids.contains(&c.id)) {
         check.configuration(configuration);
     }
     check.findings

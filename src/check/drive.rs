@@ -89,6 +89,7 @@ pub(super) fn product<'a>(deployment: &'a Deployment, chart: &'a Chart, catalogu
         chart,
         reactions: Reactions::new(deployment, chart, &outside),
         worlds: Worlds::new(deployment, catalogue, undone(deployment, chart)),
+        down: chart.find(&deployment.shutdown.down).ok(),
     }
 }
 

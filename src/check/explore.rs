@@ -8,7 +8,7 @@
 use super::Explored;
 use super::coordinator::{bad_answers, place};
 use super::reactions::{Asked, Reaction, Reactions};
-use super::world::{Applied, WorldId, Worlds};
+use super::world::{Applied, EMPTY, WorldId, Worlds};
 use crate::limits;
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK};
 use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
@@ -62,6 +62,8 @@ pub struct Product<'a> {
     pub reactions: Reactions<'a>,
     /// What the configurator does.
     pub worlds: Worlds<'a>,
+    /// The state that means down; none when there is no such state.
+    pub down: Option<NodeId>,
 }
 
 /// A refused or too deep request, found while moving.
@@ -118,7 +120,20 @@ impl Product<'_> {
         let mut next = state.clone();
         let reaction = self.reactions.react(state.leaf, event);
         self.follow(&mut next, &reaction);
+        self.settle(&mut next);
         next
+    }
+
+    /// Down with an empty system, the stack is discarded (design §6).
+    fn settle(&self, state: &mut State) {
+        if self.is_down(state) && self.worlds.get(state.world).system.is_empty() {
+            state.world = EMPTY;
+        }
+    }
+
+    /// Whether a state is down, with nothing left to be answered.
+    pub fn is_down(&self, state: &State) -> bool {
+        state.waiting.is_empty() && self.down.is_some_and(|down| self.chart.is_inside(state.leaf, down))
     }
 
     /// What the first waiting requests do in the state's world.
@@ -141,12 +156,8 @@ impl Product<'_> {
             }
             self.follow(&mut next, &reaction);
         }
+        self.settle(&mut next);
         next
-    }
-
-    /// Whether `leaf` is inside one of `states`.
-    pub fn inside(&self, leaf: NodeId, states: &[NodeId]) -> bool {
-        states.iter().any(|s| self.chart.is_inside(leaf, *s))
     }
 
     /// A move in words.
@@ -197,7 +208,7 @@ struct Search<'p, 'a> {
 }
 
 /// Follows everything, within the budget.
-pub fn explore(product: &mut Product<'_>, down: &[NodeId]) -> Exploration {
+pub fn explore(product: &mut Product<'_>) -> Exploration {
     let mut search = Search {
         product,
         states: Vec::new(),
@@ -212,7 +223,7 @@ pub fn explore(product: &mut Product<'_>, down: &[NodeId]) -> Exploration {
         cut: false,
     };
     search.run();
-    search.judge(down)
+    search.judge()
 }
 
 impl Search<'_, '_> {
@@ -295,7 +306,7 @@ impl Search<'_, '_> {
         lines
     }
 
-    fn judge(self, down: &[NodeId]) -> Exploration {
+    fn judge(self) -> Exploration {
         let mut findings: Vec<(Finding, Vec<String>)> = Vec::new();
         let mut said: FxHashSet<(Ask, String)> = FxHashSet::default();
         let mut deep: FxHashSet<ConfigId> = FxHashSet::default();
@@ -319,7 +330,7 @@ impl Search<'_, '_> {
                 }
             }
         }
-        self.ways_down(down, &mut findings);
+        self.ways_down(&mut findings);
         findings.extend(self.product.worlds.warnings.iter().cloned().map(|f| (f, Vec::new())));
         let explored = Explored { states: self.states.len(), transitions: self.edges.len(), complete: !self.cut };
         Exploration { findings, explored }
@@ -357,9 +368,9 @@ impl Search<'_, '_> {
     }
 
     /// Where nothing leads on, where no way leads down, and ways down that leave something behind.
-    fn ways_down(&self, down: &[NodeId], findings: &mut Vec<(Finding, Vec<String>)>) {
+    fn ways_down(&self, findings: &mut Vec<(Finding, Vec<String>)>) {
         let product = &*self.product;
-        let is_down = |s: &State| s.waiting.is_empty() && product.inside(s.leaf, down);
+        let is_down = |s: &State| product.is_down(s);
         let mut out = vec![false; self.states.len()];
         self.edges.iter().for_each(|(a, _)| out[*a as usize] = true);
         let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
@@ -409,7 +420,7 @@ impl Search<'_, '_> {
             let id = u32::try_from(*at).unwrap_or(u32::MAX);
             !reaches[*at] && !troubled.contains(&id) && !leaves.contains(&self.states[*at].leaf)
         });
-        if let Some(at) = lost.filter(|_| leaves.is_empty() || !reaches[0]) {
+        if let Some(at) = lost {
             let leaf = self.states[at].leaf;
             let fqn = product.chart.fqn(leaf);
             let finding = Finding::warning(

@@ -13,8 +13,8 @@ mod universe;
 mod world;
 
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
-use crate::model::{Catalogue, Deployment, Finding, Findings, finding};
-use crate::statechart::{Chart, NodeId};
+use crate::model::{Catalogue, ConfigId, Deployment, Finding, Findings, finding};
+use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
 use serde::Serialize;
@@ -77,8 +77,7 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
         if !finding::has_errors(&findings) {
             let mut product = drive::product(deployment, chart, catalogue);
             let mut traced = ways(deployment, chart, &mut product);
-            let down: Vec<NodeId> = chart.find(&deployment.shutdown.down).into_iter().collect();
-            let exploration = explore::explore(&mut product, &down);
+            let exploration = explore::explore(&mut product);
             explored = exploration.explored;
             traced.extend(exploration.findings);
             traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
@@ -96,6 +95,12 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     let sound = chart.is_some() && !finding::has_errors(&findings);
     Report { checked: sound.then(|| Checked(deployment.clone())), findings, explored, trace }
+}
+
+/// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
+pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
+    let universe = universe::Universe::new(deployment, catalogue);
+    configurations::some(deployment, catalogue, &universe, ids)
 }
 
 /// Bring-up and shutdown must work when everything goes well.

@@ -21,6 +21,9 @@ use std::sync::Arc;
 /// The number of a world.
 pub type WorldId = u32;
 
+/// The world in which nothing was applied.
+pub const EMPTY: WorldId = 0;
+
 /// A world.
 pub struct World {
     /// The system.
@@ -110,11 +113,6 @@ impl<'a> Worlds<'a> {
     /// The world of that number.
     pub fn get(&self, id: WorldId) -> &World {
         &self.worlds[id as usize]
-    }
-
-    /// How many worlds were met.
-    pub fn len(&self) -> usize {
-        self.worlds.len()
     }
 
     /// What `asks`, made together, do in a world.

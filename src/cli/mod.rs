@@ -7,13 +7,17 @@
 
 mod check;
 mod completions;
+mod convert;
 mod deploy;
 mod detach;
 pub mod exit;
 mod explain;
+mod graph;
 pub mod input;
 mod log;
 pub mod output;
+mod plan;
+mod plan_view;
 mod progress;
 mod remote;
 mod request;
@@ -26,11 +30,13 @@ mod status;
 mod types;
 
 use crate::diagnostics::{SourceMap, to_json};
+use crate::model::codes::CLI_UNWRITABLE;
 use crate::model::{Code, Finding, Findings};
 use crate::runtime::Libraries;
 use clap::Parser;
 use exit::Exit;
 use output::{Color, Output};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Brings component-based robot systems up, switches them while they run, undoes what it did, and takes them down again.
@@ -65,7 +71,10 @@ macro_rules! commands {
 
 commands! {
     Check = check::Args,
+    Plan = plan::Args,
+    Graph = graph::Args,
     Types = types::Args,
+    Convert = convert::Args,
     Sim = sim::Args,
     Deploy = deploy::Args,
     Run = run::Args,
@@ -137,6 +146,24 @@ impl Failure {
         self.json = json;
         self
     }
+}
+
+/// Text to a file, or to stdout when there is none.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_output(context: &Context, file: Option<&Path>, text: &str) -> Result<(), Failure> {
+    let Some(file) = file else {
+        context.out.text(text);
+        return Ok(());
+    };
+    std::fs::write(file, text).map_err(|error| {
+        Failure::usage(
+            CLI_UNWRITABLE,
+            format!("{}: {error}", file.display()),
+            "name a file in a directory that exists and may be written, or leave `-o` out to print",
+        )
+    })
 }
 
 /// The whole command line, with the component libraries a program has: parses the arguments, runs the command, prints what it has to say.

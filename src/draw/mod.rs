@@ -8,12 +8,14 @@ mod dot;
 pub mod layout;
 mod mermaid;
 pub mod picture;
+mod plan;
 mod svg;
 mod text;
 
 pub use components::components;
 pub use coordinator::coordinator;
 pub use picture::Picture;
+pub use plan::plan;
 
 impl Picture {
     /// The picture as SVG.

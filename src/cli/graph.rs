@@ -1,0 +1,101 @@
+//! `davit graph`
+
+use super::exit::Exit;
+use super::input::{Input, Parameters, coordinator, is_deployment};
+use super::plan::{asked, drive, driven};
+use super::{Answer, Context, Failure, Run, write_output};
+use crate::check::Until;
+use crate::draw;
+use std::path::PathBuf;
+
+/// Draw a deployment: its components as they are when up, its coordinator, or its bring-up plan.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The deployment file (for a coordinator alone, its own file serves as well).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// For plans and components: configurations to apply one after the other, instead of bringing up.
+    #[arg(value_name = "ID")]
+    ids: Vec<String>,
+    /// What to draw.
+    #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
+    what: What,
+    /// The format.
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    format: Format,
+    /// Write to this file instead of printing.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: Parameters,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+enum What {
+    /// Components, ports and connections.
+    #[default]
+    Components,
+    /// The statechart.
+    Coordinator,
+    /// The steps and their order.
+    Plan,
+}
+
+/// How it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+enum Format {
+    /// A picture for browsers and documents.
+    #[default]
+    Svg,
+    /// Graphviz.
+    Dot,
+    /// Mermaid, as code hosts draw it.
+    Mermaid,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
+        let picture = if what == What::Coordinator {
+            let read = coordinator(&self.file, &self.parameters)?;
+            draw::coordinator(&format!("{}: coordinator", read.name), &read.chart, &[])
+        } else {
+            let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read(context)?;
+            let refused = |findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() };
+            let name = read.deployment.name;
+            match what {
+                What::Plan => {
+                    let plans = if self.ids.is_empty() { driven(&read, Until::Up) } else { asked(&read, &self.ids) };
+                    let plans: Vec<_> = plans
+                        .map_err(refused)?
+                        .into_iter()
+                        .map(|p| (p.asks.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "), p.steps))
+                        .collect();
+                    draw::plan(&format!("{name}: plan"), &plans)
+                }
+                _ => {
+                    let system = if self.ids.is_empty() {
+                        let (drive, arrived) = drive(&read, Until::Up).map_err(refused)?;
+                        if let Err(findings) = arrived {
+                            // The picture shows how far it comes, which helps to see why.
+                            context.out.findings(&findings, &read.sources);
+                        }
+                        drive.system
+                    } else {
+                        let planned = asked(&read, &self.ids).map_err(refused)?;
+                        planned.into_iter().last().map(|p| p.result).unwrap_or_default()
+                    };
+                    draw::components(&format!("{name}: components"), &system, &read.catalogue)
+                }
+            }
+        };
+        let text = match self.format {
+            Format::Svg => picture.svg(),
+            Format::Dot => picture.dot(),
+            Format::Mermaid => picture.mermaid(),
+        };
+        write_output(context, self.output.as_deref(), &text)?;
+        Ok(Exit::Done)
+    }
+}

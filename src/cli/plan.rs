@@ -1,0 +1,238 @@
+//! `davit plan`
+
+use super::exit::Exit;
+use super::input::Input;
+use super::output::{Output, Style, Table};
+use super::plan_view::{PlanView, SystemSteps};
+use super::{Answer, Context, Failure, Run};
+use crate::app::Read;
+use crate::check::{self, Drive, Happening, Until};
+use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
+use crate::model::finding::{did_you_mean, has_errors};
+use crate::model::{Ask, ConfigId, Finding, Findings, Snapshot};
+use crate::plan::PlannedStep;
+use crate::stack::{Request, Requester, Stack, transaction};
+use crate::system::{Reversibility, System, step};
+use crate::time::Time;
+use std::sync::Arc;
+
+/// Show what configurations mean: their steps, in which order, what runs in parallel, what can be undone and how.
+///
+/// The configurations are planned one after the other, beginning with nothing deployed; without names, all of them in
+/// the order they are written. `--bringup` and `--shutdown` drive the coordinator instead, with every request answered
+/// `ok`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: Input,
+    /// Configurations, in the order to be applied.
+    #[arg(value_name = "ID")]
+    ids: Vec<String>,
+    /// Drive the coordinator from nothing to up.
+    #[arg(long, conflicts_with_all = ["ids", "shutdown"])]
+    bringup: bool,
+    /// Drive the coordinator from up to down.
+    #[arg(long, conflicts_with = "ids")]
+    shutdown: bool,
+    /// Print JSON: one object for each configuration.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One planned application.
+pub struct Planned {
+    /// What was asked for.
+    pub asks: Vec<Ask>,
+    /// Events that come before it.
+    pub events: Vec<String>,
+    /// The coordinator's state after it, when it is driven.
+    pub state: Option<String>,
+    /// The steps.
+    pub steps: Vec<PlannedStep>,
+    /// The system after it.
+    pub result: Snapshot,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
+        let read = self.input.read(context)?;
+        let planned = if self.bringup || self.shutdown {
+            driven(&read, if self.bringup { Until::Up } else { Until::Down })
+        } else {
+            asked(&read, &self.ids)
+        };
+        let planned =
+            planned.map_err(|findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() })?;
+        if self.json {
+            context.out.json(&planned.iter().map(PlanView::new).collect::<Vec<_>>());
+        } else {
+            for one in &planned {
+                show(&context.out, one);
+            }
+            if let Some(last) = planned.last() {
+                summary(&context.out, last);
+            }
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// The configurations of these names, one after the other.
+///
+/// # Errors
+/// Unknown names, and everything for which one is refused.
+pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
+    let deployment = &read.deployment;
+    let mut ids = Vec::new();
+    let mut unknown = Vec::new();
+    for name in names {
+        match ConfigId::new(name).ok().filter(|id| deployment.configuration(*id).is_some()) {
+            Some(id) => ids.push(id),
+            None => {
+                let known = deployment.configurations.iter().map(|c| c.id.as_str());
+                unknown.push(
+                    Finding::error(CLI_UNKNOWN_CONFIGURATION, format!("there is no configuration `{name}`"))
+                        .help(did_you_mean(name, "configurations", known)),
+                );
+            }
+        }
+    }
+    if !unknown.is_empty() {
+        return Err(unknown);
+    }
+    if names.is_empty() {
+        ids = deployment.configurations.iter().map(|c| c.id).collect();
+    }
+    let wrong = check::configurations(deployment, &read.catalogue, &ids);
+    if has_errors(&wrong) {
+        return Err(wrong);
+    }
+    let context = crate::plan::Context { activities: deployment.activities.keys().copied().collect() };
+    let mut system = System::new(Arc::new(read.catalogue.clone()));
+    let mut stack = Stack::new(deployment.limits.stack);
+    let mut planned = Vec::new();
+    for id in ids {
+        let Some(configuration) = deployment.configuration(id) else { continue };
+        let request =
+            Request::Push { configuration, requester: Requester::Operator, at: Time::default(), active: false };
+        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
+        for planned in &transaction.steps {
+            step::effect(&planned.step, &mut system);
+        }
+        planned.push(Planned {
+            asks: vec![Ask::Apply(id)],
+            events: Vec::new(),
+            state: None,
+            steps: transaction.steps.clone(),
+            result: system.snapshot(),
+        });
+        stack.commit(transaction);
+    }
+    Ok(planned)
+}
+
+/// What the coordinator asks for on its way, every request answered *ok*.
+///
+/// # Errors
+/// Findings of the coordinator, and why it does not arrive.
+pub fn driven(read: &Read, until: Until) -> Result<Vec<Planned>, Findings> {
+    let (drive, arrived) = drive(read, until)?;
+    arrived?;
+    let mut events = Vec::new();
+    let mut planned = Vec::new();
+    for happening in drive.happenings {
+        match happening {
+            Happening::Event { event, .. } => events.push(event),
+            Happening::Applied { asks, steps, result, state } => {
+                planned.push(Planned { asks, events: std::mem::take(&mut events), state: Some(state), steps, result });
+            }
+        }
+    }
+    Ok(planned)
+}
+
+/// Drives the coordinator; with what is wrong when it does not arrive.
+///
+/// # Errors
+/// When it cannot be driven at all.
+pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>), Findings> {
+    let deployment = &read.deployment;
+    let Some(drive) = check::drive(deployment, &read.catalogue, until) else {
+        return Err(check::run(deployment, &read.catalogue).findings);
+    };
+    let (code, what, key, goal) = match until {
+        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.deploy.up),
+        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &deployment.shutdown.down),
+    };
+    let arrived = if let Some((ask, findings)) = &drive.refused {
+        let mut all = vec![
+            Finding::error(code, format!("{what} stops at `{}`: `{ask}` is refused", drive.state))
+                .at(deployment.key_origin(key))
+                .help("see the findings below for the reason"),
+        ];
+        all.extend(findings.iter().cloned());
+        Err(all)
+    } else if drive.reached {
+        Ok(())
+    } else {
+        Err(vec![
+            Finding::error(code, format!("{what} stops at `{}` and never reaches `{goal}`", drive.state))
+                .at(deployment.key_origin(key))
+                .help("`davit check` shows the way there"),
+        ])
+    };
+    Ok((drive, arrived))
+}
+
+fn show(out: &Output, planned: &Planned) {
+    let names: Vec<String> = planned.asks.iter().map(ToString::to_string).collect();
+    for event in &planned.events {
+        out.line(out.paint(Style::Dim, format!("-- {event}")));
+    }
+    let state = planned.state.as_ref().map_or_else(String::new, |s| out.paint(Style::Dim, format!("  → {s}")));
+    out.line(format!("{}{state}", out.paint(Style::Bold, names.join(", "))));
+    if planned.steps.is_empty() {
+        out.line("  nothing to do");
+    }
+    let mut table = Table::new(2);
+    for shown in SystemSteps::new(&planned.steps) {
+        let step = &planned.steps[shown.index];
+        let after = shown.after.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let style = match step.reversibility {
+            Reversibility::Exact => Style::Good,
+            Reversibility::Compensated => Style::Care,
+            Reversibility::Irreversible => Style::Bad,
+        };
+        let undo: Vec<String> = step.undo.steps().iter().map(ToString::to_string).collect();
+        table.row([
+            format!("{:>3}", step.id),
+            out.paint(Style::Dim, shown.stage),
+            step.step.to_string(),
+            out.paint(style, format!("{:?}", step.reversibility).to_lowercase()),
+            if undo.is_empty() { String::new() } else { out.paint(Style::Dim, format!("undo: {}", undo.join("; "))) },
+            match after.len() {
+                0 => String::new(),
+                n if n > 6 => out.paint(Style::Dim, format!("after {} … ({n})", after[..4].join(" "))),
+                _ => out.paint(Style::Dim, format!("after {}", after.join(" "))),
+            },
+        ]);
+    }
+    out.text(table.to_string());
+}
+
+fn summary(out: &Output, last: &Planned) {
+    let running = last.result.components.values().filter(|c| c.state == crate::model::RunState::Running).count();
+    out.line(format!(
+        "then: {} components, {running} of them running, {} connections, {} written ports",
+        last.result.components.len(),
+        last.result.connections.len(),
+        last.result.ports.len()
+    ));
+}

@@ -1,0 +1,179 @@
+//! Plans as other programs see them (design §16).
+
+use super::plan::Planned;
+use crate::model::{Ask, Snapshot, Step, Value};
+use crate::plan::{PlannedStep, Stage};
+use crate::system::{Reversibility, Undo};
+use serde::Serialize;
+use serde_json::{Map, Value as Json, json};
+
+/// An object of `plan --json`.
+#[derive(Serialize)]
+pub struct PlanView<'a> {
+    configuration: String,
+    requests: Vec<String>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    events: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    state: Option<&'a str>,
+    steps: Vec<Map<String, Json>>,
+    result: &'a Snapshot,
+}
+
+impl<'a> PlanView<'a> {
+    /// The view of one application.
+    pub fn new(planned: &'a Planned) -> Self {
+        // The configuration that is applied, else the one that is undone.
+        let applied = planned.asks.iter().find_map(|ask| match ask {
+            Ask::Apply(id) => Some(id.to_string()),
+            _ => None,
+        });
+        let undone = || {
+            planned.asks.iter().find_map(|ask| match ask {
+                Ask::UndoOf(id) => Some(id.to_string()),
+                _ => None,
+            })
+        };
+        Self {
+            configuration: applied.or_else(undone).unwrap_or_default(),
+            requests: planned.asks.iter().map(ToString::to_string).collect(),
+            events: &planned.events,
+            state: planned.state.as_deref(),
+            steps: SystemSteps::new(&planned.steps).map(|s| s.view(&planned.steps)).collect(),
+            result: &planned.result,
+        }
+    }
+}
+
+/// The steps of a plan with their order complete: `after` and `stage` together say all there is to say.
+///
+/// The planner also knows barriers inside a stage (a list of run states is worked off entry by entry). Here a step after
+/// such a barrier is after the last steps before it. Where a transaction undoes one configuration and applies another, the
+/// stages of both do not follow each other: then everything counts as changes.
+pub struct SystemSteps<'a> {
+    steps: &'a [PlannedStep],
+    next: usize,
+    before: Vec<u32>,
+    wave: Vec<u32>,
+    monotonic: bool,
+}
+
+/// One step of the list.
+pub struct Shown {
+    /// Its place in the list.
+    pub index: usize,
+    /// The stage it belongs to.
+    pub stage: &'static str,
+    /// Steps that must be done before.
+    pub after: Vec<u32>,
+}
+
+impl<'a> SystemSteps<'a> {
+    /// The steps of a plan or transaction.
+    pub fn new(steps: &'a [PlannedStep]) -> Self {
+        let monotonic = steps.windows(2).all(|pair| pair[0].stage <= pair[1].stage);
+        Self { steps, next: 0, before: Vec::new(), wave: Vec::new(), monotonic }
+    }
+}
+
+impl Iterator for SystemSteps<'_> {
+    type Item = Shown;
+
+    fn next(&mut self) -> Option<Shown> {
+        let index = self.next;
+        let step = self.steps.get(index)?;
+        self.next += 1;
+        if index > 0 && self.steps[index - 1].wave != step.wave {
+            // The last steps of the wave before: those that no other of it waits for.
+            let last = std::mem::take(&mut self.wave);
+            let waited: Vec<u32> =
+                self.steps.iter().filter(|s| last.contains(&s.id)).flat_map(|s| s.after.iter().copied()).collect();
+            self.before = last.into_iter().filter(|id| !waited.contains(id)).collect();
+        }
+        self.wave.push(step.id);
+        let mut after: Vec<u32> = step.after.to_vec();
+        if after.is_empty() {
+            after.clone_from(&self.before);
+        }
+        let stage = match step.stage {
+            _ if !self.monotonic => "changes",
+            Stage::Pre => "pre",
+            Stage::Changes => "changes",
+            Stage::Post => "post",
+        };
+        Some(Shown { index, stage, after })
+    }
+}
+
+impl Shown {
+    fn view(&self, steps: &[PlannedStep]) -> Map<String, Json> {
+        let step = &steps[self.index];
+        let mut view = Map::new();
+        view.insert("id".to_owned(), json!(step.id));
+        describe(&step.step, &mut view);
+        view.insert("after".to_owned(), json!(self.after));
+        view.insert("stage".to_owned(), json!(self.stage));
+        let reversibility = match step.reversibility {
+            Reversibility::Exact => "exact",
+            Reversibility::Compensated => "compensated",
+            Reversibility::Irreversible => "irreversible",
+        };
+        view.insert("reversibility".to_owned(), json!(reversibility));
+        view.insert("undo".to_owned(), undo(&step.undo));
+        view
+    }
+}
+
+fn undo(undo: &Undo) -> Json {
+    let one = |step: &Step| {
+        let mut view = Map::new();
+        describe(step, &mut view);
+        Json::Object(view)
+    };
+    match undo {
+        Undo::One(step) => one(step),
+        Undo::Many(steps) => json!({ "do": "steps", "steps": steps.iter().map(one).collect::<Vec<_>>() }),
+        Undo::Nothing => json!({ "do": "nothing" }),
+        Undo::Irreversible(reason) => json!({ "do": "impossible", "reason": reason }),
+    }
+}
+
+/// `do`, `target` and what else a step has.
+fn describe(step: &Step, view: &mut Map<String, Json>) {
+    let mut put = |key: &str, value: Json| _ = view.insert(key.to_owned(), value);
+    put("do", json!(step.verb()));
+    match step {
+        Step::State { component, .. } | Step::Destroy { component } => put("target", json!(component)),
+        Step::Create { component, ty, activity, properties } => {
+            put("target", json!(component));
+            put("type", json!(ty));
+            put("activity", json!(activity));
+            put("value", json!(properties));
+        }
+        Step::Connect { from, to, policy } => {
+            put("target", json!(to));
+            put("from", json!(from));
+            put("to", json!(to));
+            put("policy", json!(policy));
+        }
+        Step::Disconnect { from, to } => {
+            put("target", json!(to));
+            put("from", json!(from));
+            put("to", json!(to));
+        }
+        Step::PropertySet { property, value } => {
+            put("target", json!(property));
+            put("value", json!(value));
+        }
+        Step::PortWrite { port, value } => {
+            put("target", json!(port));
+            put("value", json!(value));
+        }
+        Step::Operation(call) => {
+            put("target", json!(call.operation));
+            let args: &[Value] = &call.args;
+            put("args", json!(args));
+            put("value", json!(args));
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Plans: one box a configuration, the stages as lanes in it, each step coloured by how far it can be undone.
+
+use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
+use super::text::short;
+use crate::plan::{PlannedStep, Stage};
+use crate::system::Reversibility;
+use std::collections::BTreeMap;
+
+/// What plans look like that are carried out one after the other, each with a heading.
+pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Picture {
+    let mut picture = Picture::new(Subject::Plan, Direction::Right, title);
+    let mut before: Option<usize> = None;
+    for (heading, steps) in plans {
+        let mut group = Node::new(format!("plan{}", picture.nodes.len()), heading);
+        group.shape = Shape::Group;
+        if steps.is_empty() {
+            group.lines.push("nothing to do".to_owned());
+        }
+        let group = picture.add(group);
+        if let Some(before) = before {
+            picture.edges.push(Edge::new(before, group));
+        }
+        before = Some(group);
+        lanes(&mut picture, group, steps);
+    }
+    picture.legend = vec![
+        (Tone::Good, "exact: its inverse restores what was".to_owned()),
+        (Tone::Care, "compensated: another call makes good for it".to_owned()),
+        (Tone::Bad, "irreversible".to_owned()),
+    ];
+    picture
+}
+
+fn lanes(picture: &mut Picture, group: usize, steps: &[PlannedStep]) {
+    let mut lanes: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut nodes: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut last: Option<usize> = None;
+    for step in steps {
+        // A lane for each barrier; lanes are named after the stage they belong to.
+        let lane = *lanes.entry(step.wave).or_insert_with(|| {
+            let mut lane = Node::new(format!("lane{}", picture.nodes.len()), stage(step.stage));
+            lane.shape = Shape::Group;
+            lane.parent = Some(group);
+            let lane = picture.add(lane);
+            if let Some(last) = last.replace(lane) {
+                picture.edges.push(Edge::new(last, lane));
+            }
+            lane
+        });
+        let mut node = Node::new(format!("step{}", picture.nodes.len()), short(&step.step.to_string(), 46));
+        node.parent = Some(lane);
+        node.tone = match step.reversibility {
+            Reversibility::Exact => Tone::Good,
+            Reversibility::Compensated => Tone::Care,
+            Reversibility::Irreversible => Tone::Bad,
+        };
+        let undo: Vec<String> = step.undo.steps().iter().map(ToString::to_string).collect();
+        if step.reversibility == Reversibility::Irreversible {
+            node.lines.push("cannot be undone".to_owned());
+        } else if !undo.is_empty() {
+            node.lines.push(short(&format!("undo: {}", undo.join("; ")), 54));
+        }
+        nodes.insert(step.id, picture.add(node));
+        for after in &step.after {
+            if let (Some(from), Some(to)) = (nodes.get(after), nodes.get(&step.id)) {
+                picture.edges.push(Edge::new(*from, *to));
+            }
+        }
+    }
+}
+
+fn stage(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Pre => "pre",
+        Stage::Changes => "changes",
+        Stage::Post => "post",
+    }
+}
