@@ -233,8 +233,7 @@ impl Activity {
             self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
             self.round(now, schedule, |cell| {
                 if let Some(inside) = cell.enter_running() {
-                    let dt = cell.elapsed(release, period.as_secs_f64());
-                    self.update(cell, inside, now, dt);
+                    self.update(cell, inside, now, release, period.as_secs_f64());
                 }
             });
             release = Time(release.0.saturating_add(step));
@@ -267,8 +266,7 @@ impl Activity {
                     if wake_at <= now {
                         cell.beat.wake_at.store(Time::NEVER.0, Ordering::Relaxed);
                     }
-                    let dt = cell.elapsed(now, 0.0);
-                    self.update(cell, inside, now, dt);
+                    self.update(cell, inside, now, now, 0.0);
                 }
             });
             if !any {
@@ -299,8 +297,8 @@ impl Activity {
     }
 
     #[inline]
-    fn update(&self, cell: &Arc<Cell>, mut inside: super::cell::Inside<'_>, now: Time, dt: f64) {
-        let fault = inside.update(&self.clock, now, dt).err();
+    fn update(&self, cell: &Arc<Cell>, mut inside: super::cell::Inside<'_>, now: Time, release: Time, first: f64) {
+        let fault = inside.update(&self.clock, now, release, first).err();
         self.leave(cell, inside, fault);
     }
 

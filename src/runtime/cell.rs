@@ -171,10 +171,10 @@ impl Cell {
             .map(|before| before & RUN != 0)
     }
 
-    /// Seconds since the last update, and notes this one. `first`: what the first one after a start has.
-    pub(crate) fn elapsed(&self, release: Time, first: f64) -> f64 {
+    /// Seconds since the last update, and notes this one; none: it is the first since the start.
+    pub(crate) fn elapsed(&self, release: Time) -> Option<f64> {
         let last = self.last.swap(release.0, Ordering::Relaxed);
-        if last == Time::NEVER.0 { first } else { release.since(Time(last)).as_secs_f64() }
+        (last != Time::NEVER.0).then(|| release.since(Time(last)).as_secs_f64())
     }
 
     /// Forgets the last update.
@@ -223,12 +223,13 @@ impl<'a> Inside<'a> {
         unsafe { (*self.cell.body.get()).take() }
     }
 
-    /// One update. Its fault, if it has one.
+    /// One update at a release. Its fault, if it has one. `first`: seconds that count as passed before the first one.
     #[inline]
-    pub(crate) fn update(&mut self, clock: &Clock, now: Time, dt: f64) -> Result<(), String> {
+    pub(crate) fn update(&mut self, clock: &Clock, now: Time, release: Time, first: f64) -> Result<(), String> {
         let cell = self.cell;
         cell.beat.set_now(now);
-        let mut cx = Context::new(clock, &cell.beat, dt);
+        let elapsed = cell.elapsed(release);
+        let mut cx = Context::new(clock, &cell.beat, elapsed.unwrap_or(first), elapsed.is_none());
         let Some(body) = self.body() else { return Ok(()) };
         guard::call(|| body.update(&mut cx))?;
         match cx.fault.take() {
@@ -241,7 +242,7 @@ impl<'a> Inside<'a> {
     pub(crate) fn hook(&mut self, clock: &Clock, transition: Transition) -> Result<HookResult, String> {
         let cell = self.cell;
         cell.beat.set_now(clock.now());
-        let mut cx = Context::new(clock, &cell.beat, 0.0);
+        let mut cx = Context::new(clock, &cell.beat, 0.0, false);
         let Some(body) = self.body() else { return Ok(Ok(())) };
         let result = guard::call(|| body.hook(transition, &mut cx))?;
         match cx.fault.take() {
@@ -254,7 +255,7 @@ impl<'a> Inside<'a> {
     pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Call) -> Result<(), String> {
         let cell = self.cell;
         cell.beat.set_now(clock.now());
-        let mut cx = Context::new(clock, &cell.beat, 0.0);
+        let mut cx = Context::new(clock, &cell.beat, 0.0, false);
         let reply = call.reply.clone();
         cx.call = Some(call);
         let Some(body) = self.body() else {

@@ -209,13 +209,14 @@ pub struct Context<'a> {
     clock: &'a Clock,
     beat: &'a Arc<Beat>,
     dt: f64,
+    first: bool,
     pub(crate) fault: Option<String>,
     pub(crate) call: Option<Call>,
 }
 
 impl<'a> Context<'a> {
-    pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>, dt: f64) -> Self {
-        Self { clock, beat, dt, fault: None, call: None }
+    pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>, dt: f64, first: bool) -> Self {
+        Self { clock, beat, dt, first, fault: None, call: None }
     }
 
     /// The moment this call stands for: the same in all of one update, and the time stamp of what it writes.
@@ -228,6 +229,11 @@ impl<'a> Context<'a> {
     /// updates' moments, 0 at the first.
     pub fn dt(&self) -> f64 {
         self.dt
+    }
+
+    /// Whether this is the first update since the component was started.
+    pub fn is_first(&self) -> bool {
+        self.first
     }
 
     /// The clock.

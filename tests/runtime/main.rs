@@ -1,0 +1,8 @@
+//! The embedded runtime: what components, activities and the platform around them promise. All in simulated time but where
+//! threads are meant to race.
+
+mod activities;
+mod calls;
+mod flow;
+mod standard;
+mod support;
