@@ -158,3 +158,6 @@ pub const CHECK_WAITING: usize = 2;
 
 /// Frames of one configuration that `check` follows: a third one means that going round adds one each time.
 pub const CHECK_FRAMES: usize = 3;
+
+/// Forced steps told one by one; more are told by number, so that a line can be read.
+pub const FORCED_SHOWN: usize = 8;

@@ -197,9 +197,6 @@ fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp) ->
 }
 
 fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
-    for note in &ended.forced {
-        progress.line(format!("  {}  {note}", out.paint(Style::Care, "forced")));
-    }
     for note in &ended.left {
         progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
     }

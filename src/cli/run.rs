@@ -54,9 +54,6 @@ impl Run for Args {
         progress.finish();
         let left = end.ended.as_ref().is_some_and(|ended| !ended.is_clean());
         if let Some(ended) = &end.ended {
-            for note in &ended.forced {
-                progress.line(format!("{}  {note}", context.out.paint(Style::Care, "forced")));
-            }
             for note in &ended.left {
                 progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
             }

@@ -77,6 +77,8 @@ pub(super) struct Engine {
     pub heard: Vec<EventName>,
     /// The time of the configuration that is carried out.
     pub allowed: Duration,
+    /// How long one step may take.
+    pub patience: Duration,
     /// Requests that have begun and were not answered.
     pub current: SmallVec<[(Request, Time); 4]>,
     pub revision: u64,
@@ -129,6 +131,7 @@ impl Engine {
             confirming: Vec::new(),
             heard: Vec::new(),
             allowed: Duration::ZERO,
+            patience: parts.limits.step_timeout,
             current: SmallVec::new(),
             revision: 0,
             snapshot: None,

@@ -215,7 +215,7 @@ impl Engine {
         }
         let started = self.clock.now();
         self.tell_started(step);
-        let deadline = (started + self.limits.step_timeout).min(run.until);
+        let deadline = (started + self.patience).min(run.until);
         let outcome = pool::execute(&*self.platform, step, deadline);
         let took = self.clock.now().since(started);
         self.tell_ended(step, &outcome, took, run.undoing);
@@ -226,7 +226,7 @@ impl Engine {
         let step = &work[i as usize].step;
         let started = self.clock.now();
         self.tell_started(step);
-        let deadline = (started + self.limits.step_timeout).min(run.until);
+        let deadline = (started + self.patience).min(run.until);
         let ticket = self.pool.start(Call::Execute(step.clone()), deadline);
         run.flights.push(Flight { ticket, item: i, started, deadline });
         self.names.push((ticket, StepName::of(step), run.undoing));

@@ -125,7 +125,7 @@ impl Engine {
                     }
                 }
                 Ok(planned) => {
-                    let spec = self.spec(pushes.iter().map(|part| part.op));
+                    let spec = self.spec(undos.iter().chain(&pushes).map(|part| part.op));
                     let first = pushes[0].request;
                     match self.carry(first, planned, spec) {
                         Ended::Applied => {
@@ -210,18 +210,27 @@ impl Engine {
         ended
     }
 
-    fn spec(&self, ops: impl IntoIterator<Item = Op>) -> Spec {
-        let mut spec = Spec { timeout: None, hold: false };
+    /// How the ops are carried out: the time that their configurations give themselves, which then is also how long one
+    /// step of theirs, or of their undoing, may take.
+    pub(super) fn spec(&self, ops: impl IntoIterator<Item = Op>) -> Spec {
+        let mut spec = Spec { timeout: None, hold: false, patience: self.limits.step_timeout };
+        let mut undoes = false;
         for op in ops {
-            if let Op::Push(id, ..) = op
-                && let Some(Configuration { timeout, on_failure, .. }) = self.configurations.get(&id)
-            {
+            let Op::Push(id, ..) = op else {
+                undoes = true;
+                continue;
+            };
+            if let Some(Configuration { timeout, on_failure, group, .. }) = self.configurations.get(&id) {
+                undoes |= group.is_some();
                 spec.hold |= *on_failure == OnFailure::Hold;
-                spec.timeout = match (spec.timeout, *timeout) {
-                    (Some(a), Some(b)) => Some(a.max(b)),
-                    (a, b) => a.or(b),
-                };
+                spec.timeout = spec.timeout.max(*timeout);
             }
+        }
+        spec.patience = spec.patience.max(spec.timeout.unwrap_or_default());
+        if undoes {
+            let frames = self.stack.frames().iter();
+            let longest = frames.filter_map(|f| self.configurations.get(&f.configuration)?.timeout).max();
+            spec.patience = spec.patience.max(longest.unwrap_or_default());
         }
         spec
     }
@@ -291,7 +300,7 @@ impl Engine {
             let begun = self.clock.now();
             let (verdict, reason) = match self.plan_ops(&[op]) {
                 Err((_, refused)) => (Verdict::UndoFailed, refused),
-                Ok(planned) => match self.carry(request, planned, Spec { timeout: None, hold: false }) {
+                Ok(planned) => match self.carry(request, planned, self.spec([op])) {
                     Ended::Applied => (Verdict::Reverted, reason),
                     Ended::Undone(failed) => (Verdict::UndoFailed, failed),
                     Ended::Broken(residual) => (Verdict::UndoBroken, Reason::Broken(residual)),

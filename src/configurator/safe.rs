@@ -153,10 +153,12 @@ impl Engine {
     }
 
     fn do_what_goes(&mut self, work: &[Item], between: &mut Interruption) -> Effort {
+        let patience = std::mem::replace(&mut self.patience, self.limits.step_timeout);
         let mut run = Run::new(work, true, false, Time::NEVER);
         run.safe = true;
         self.carry_out(work, &mut run);
         self.collect(work, &mut run);
+        self.patience = patience;
         for item in work {
             between.touched.add(&item.step);
         }

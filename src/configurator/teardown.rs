@@ -6,7 +6,7 @@ use super::exec::Run;
 use super::frames::Op;
 use super::log::{Progress, What};
 use super::request::{Reason, Residual};
-use super::transaction::{Ended, Interruption, Left, Spec};
+use super::transaction::{Ended, Interruption, Left};
 use super::work::{Item, item};
 use crate::model::{Ask, ConfigId, RunState, Step, Verdict};
 use crate::stack::Stack;
@@ -181,6 +181,7 @@ impl Engine {
             taking_apart(steps.into_iter().filter(|step| {
                 matches!(step, Step::Disconnect { .. }) || !self.quarantined.contains(&step.component())
             }));
+        self.patience = self.limits.step_timeout;
         let mut run = Run::new(&work, true, false, deadline);
         self.carry_out(&work, &mut run);
         self.collect(&work, &mut run);
@@ -200,7 +201,7 @@ impl Engine {
 
     /// Pops frame after frame, newest first, as long as that goes.
     fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
-        let spec = Spec { timeout: None, hold: false };
+        let spec = self.spec([Op::Top]);
         while !self.stack.is_empty() && self.clock.now() < deadline {
             let Some(configuration) = self.stack.top().map(|frame| frame.configuration) else { return };
             match self.plan_ops(&[Op::Top]) {

@@ -19,6 +19,8 @@ use std::time::Duration;
 pub(super) struct Spec {
     /// Its own time, beside that of each step.
     pub timeout: Option<Duration>,
+    /// How long one step may take.
+    pub patience: Duration,
     /// A failure undoes nothing.
     pub hold: bool,
 }
@@ -62,6 +64,7 @@ impl Engine {
     pub(super) fn transact(&mut self, work: &[Item], spec: Spec) -> Ended {
         let until = spec.timeout.map_or(Time::NEVER, |limit| self.clock.now() + limit);
         self.allowed = spec.timeout.unwrap_or_default();
+        self.patience = spec.patience;
         let mut run = Run::new(work, false, true, until);
         let carried = catch_unwind(AssertUnwindSafe(|| self.carry_out(work, &mut run)));
         let end = match carried {

@@ -10,7 +10,7 @@ use crate::configurator::{
 };
 use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Verdict};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step, Verdict};
 use crate::platform::{Platform, PlatformEvent};
 use crate::statechart::{Chart, NodeId, RaiseSite, Raised, When};
 use crate::time::Clock;
@@ -290,7 +290,7 @@ impl Session {
     fn taken_down(&self, taken: Option<TakenDown>) -> Vec<String> {
         let Some(taken) = taken else { return vec!["the configurator did not answer".to_owned()] };
         let mut notes: Vec<String> = taken.safe.iter().map(|id| format!("safe configuration `{id}` applied")).collect();
-        notes.extend(taken.forced.iter().map(ToString::to_string));
+        notes.extend(forced(&taken.forced));
         notes.extend(taken.troubles.iter().map(ToString::to_string));
         for note in &notes {
             self.hub.note(Happening::Forced { note: note.clone() });
@@ -339,6 +339,21 @@ impl FrameView {
             floor: frame.floor,
         }
     }
+}
+
+/// Steps that had to be forced: each, or how many of each kind where there are too many to read.
+fn forced(steps: &[Step]) -> Vec<String> {
+    if steps.len() <= limits::FORCED_SHOWN {
+        return steps.iter().map(ToString::to_string).collect();
+    }
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for step in steps {
+        match counts.iter_mut().find(|(verb, _)| *verb == step.verb()) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((step.verb(), 1)),
+        }
+    }
+    counts.into_iter().map(|(verb, count)| format!("{count} × {verb}")).collect()
 }
 
 /// Hears the coordinator: names become requests, and what moves is written down.
