@@ -9,6 +9,7 @@ mod conflicts;
 pub mod footprint;
 mod lists;
 mod order;
+pub mod prepare;
 pub mod undo;
 
 use crate::model::codes;

@@ -5,6 +5,7 @@
 //! and dropping the transaction leaves the stack as it was.
 
 mod net;
+mod prepared;
 mod share;
 mod squash;
 mod transaction;
@@ -14,6 +15,7 @@ pub use transaction::{Request, Transaction, transaction};
 
 use crate::model::{ComponentName, ConfigId, Ident};
 use crate::plan::footprint::Footprint;
+use crate::plan::prepare::Act;
 use crate::plan::undo::Item;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
@@ -92,6 +94,8 @@ pub struct Frame {
     pub floor: Option<String>,
     /// What was squashed into it; empty for a frame of its own.
     pub parts: BTreeSet<Part>,
+    /// Of a frame that a prepared switch pushed: the switch's acts.
+    pub acts: Vec<Act>,
 }
 
 impl Frame {
@@ -120,7 +124,9 @@ pub struct Stack {
     /// What was committed: below the first frame.
     committed: BTreeSet<Part>,
     /// Frames of states of the coordinator that are active.
-    active: BTreeSet<FrameId>,
+    active: Vec<FrameId>,
+    /// Popped frames of prepared switches, to be used again.
+    spares: Vec<Arc<Frame>>,
     bound: usize,
     next: u64,
     version: u64,
@@ -132,7 +138,8 @@ impl Stack {
         Self {
             frames: Vec::with_capacity(bound.clamp(2, 4096) + 1),
             committed: BTreeSet::new(),
-            active: BTreeSet::new(),
+            active: Vec::with_capacity(bound.clamp(2, 4096) + 1),
+            spares: Vec::with_capacity(prepared::SPARES),
             bound: bound.max(2),
             next: 1,
             version: 0,
@@ -180,10 +187,9 @@ impl Stack {
 
     /// Marks the frame of a state of the coordinator that is active (never squashed), or no longer is.
     pub fn set_active(&mut self, frame: FrameId, active: bool) {
+        self.active.retain(|id| *id != frame);
         if active {
-            self.active.insert(frame);
-        } else {
-            self.active.remove(&frame);
+            self.active.push(frame);
         }
     }
 

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Squashes until at most `bound` frames are left. False: frames of active states leave no two that could be squashed.
-pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, bound: usize, active: &BTreeSet<FrameId>) -> bool {
+pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, bound: usize, active: &[FrameId]) -> bool {
     while frames.len() > bound {
         let Some(at) = pair(frames, active) else { return false };
         let upper = frames.remove(at + 1);
@@ -22,7 +22,7 @@ pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, bound: usize, active: &BTreeSet<
 }
 
 /// The lower of the two neighbours that are squashed next: the oldest, but such that as much as possible stays possible.
-fn pair(frames: &[Arc<Frame>], active: &BTreeSet<FrameId>) -> Option<usize> {
+fn pair(frames: &[Arc<Frame>], active: &[FrameId]) -> Option<usize> {
     let free = |f: &Frame| !active.contains(&f.id);
     let pairs =
         || frames.windows(2).enumerate().filter(|(_, w)| free(&w[0]) && free(&w[1])).map(|(i, w)| (i, &w[0], &w[1]));
@@ -98,5 +98,6 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         saved,
         floor,
         parts,
+        acts: Vec::new(),
     }
 }

@@ -89,7 +89,7 @@ pub fn transaction(
     let Work { script, mut frames, warnings, popped, pushed, active, next, .. } = work;
     let whole = script.finish().map_err(|found| drifted(&found))?;
     let steps = if popped.is_empty() || pushed.is_empty() { whole } else { shorter(system, &view, whole) };
-    let kept = stack.active.iter().chain(&active).copied().collect();
+    let kept: Vec<FrameId> = stack.active.iter().chain(&active).copied().collect();
     if !squash::fit(&mut frames, stack.bound, &kept) {
         let message = format!("the stack has {} frames, and none can be squashed", frames.len());
         let finding = Finding::error(codes::STACK_FULL, message)
@@ -216,6 +216,7 @@ impl Work<'_, '_, '_> {
             saved,
             floor,
             parts: std::collections::BTreeSet::new(),
+            acts: Vec::new(),
         }));
         Ok(())
     }

@@ -10,6 +10,7 @@ mod generate;
 mod machine;
 mod plain;
 mod plans;
+mod prepared;
 mod stacks;
 
 /// How many cases each law is tried on.

@@ -1,0 +1,169 @@
+//! What planning costs: a switch in a small and a large system, deployments of growing size, a prepared switch.
+//!
+//! `cargo bench --bench plan`
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use davit::model::*;
+use davit::plan::prepare::Switch;
+use davit::plan::{Context, plan};
+use davit::stack::{Request, Requester, Stack, transaction};
+use davit::system::{System, step};
+use davit::time::Time;
+use std::collections::BTreeMap;
+use std::hint::black_box;
+use std::sync::Arc;
+
+fn ident(text: &str) -> Ident {
+    Ident::new(text).expect("a name")
+}
+
+fn catalogue() -> Arc<Catalogue> {
+    let mut ty = ComponentType::new("bench.Gain", "one in, one out, three properties");
+    for (name, direction) in [("u", Direction::In), ("y", Direction::Out), ("mode", Direction::In)] {
+        let port = PortType {
+            direction,
+            ty: ValueType::Float,
+            unit: None,
+            buffered: false,
+            doc: String::new(),
+            origin: Origin::NONE,
+        };
+        ty.ports.insert(ident(name), port);
+    }
+    for (name, value) in [("k", Value::Float(1.0)), ("gain", Value::floats(&[1.0; 3])), ("on", Value::Bool(false))] {
+        let property = PropertyType {
+            ty: if name == "k" {
+                "float"
+            } else if name == "on" {
+                "bool"
+            } else {
+                "float[3]"
+            }
+            .parse()
+            .expect("a type"),
+            default: Some(value),
+            min: None,
+            max: None,
+            tunable: Tunable::Stopped,
+            unit: None,
+            doc: String::new(),
+            origin: Origin::NONE,
+        };
+        ty.properties.insert(ident(name), property);
+    }
+    let mut catalogue = Catalogue::new();
+    catalogue.insert(ty);
+    Arc::new(catalogue)
+}
+
+fn change(kind: ChangeKind) -> Change {
+    Change { kind, origin: Origin::NONE }
+}
+
+fn name(i: usize) -> ComponentName {
+    ComponentName::new(&format!("c{i}")).expect("a name")
+}
+
+/// A chain of `n` components, running.
+fn deployment(n: usize) -> Configuration {
+    let mut conf = Configuration::new(ConfigId::new("deploy").expect("a name"));
+    let ty = TypeName::new("bench.Gain").expect("a name");
+    for i in 0..n {
+        let component = name(i);
+        conf.changes.push(change(ChangeKind::Create { component, ty, activity: None, properties: BTreeMap::new() }));
+        if i > 0 {
+            let (from, to) = (name(i - 1).member(ident("y")), component.member(ident("u")));
+            conf.changes.push(change(ChangeKind::Connect { from, to, policy: Policy::Data }));
+        }
+    }
+    conf.post.push(StateEntry { target: Target::Default, state: RunState::Running, origin: Origin::NONE });
+    conf
+}
+
+fn deployed(n: usize) -> System {
+    let mut system = System::new(catalogue());
+    let plan = plan(&system, &deployment(n), &Context::default()).expect("a chain is accepted");
+    for s in &plan.steps {
+        step::apply(&s.step, &mut system).expect("a planned step is allowed");
+    }
+    system
+}
+
+/// Stop, set a 3-vector, write a port, start.
+fn switch(id: &str, gain: f64) -> Configuration {
+    let mut conf = Configuration::new(ConfigId::new(id).expect("a name"));
+    let target = Target::Component(name(3));
+    conf.pre.push(StateEntry { target, state: RunState::Stopped, origin: Origin::NONE });
+    let property = name(3).member(ident("gain"));
+    conf.changes.push(change(ChangeKind::PropertySet { property, value: Value::floats(&[gain; 3]) }));
+    conf.changes.push(change(ChangeKind::PortWrite { port: name(3).member(ident("mode")), value: Value::Float(gain) }));
+    conf.post.push(StateEntry { target, state: RunState::Running, origin: Origin::NONE });
+    conf
+}
+
+fn switches(c: &mut Criterion) {
+    let mut group = c.benchmark_group("switch");
+    for n in [10, 10_000] {
+        let system = deployed(n);
+        let conf = switch("switch", 2.0);
+        group.bench_with_input(BenchmarkId::new("plan", n), &n, |b, _| {
+            b.iter(|| plan(black_box(&system), &conf, &Context::default()).expect("accepted"));
+        });
+        let mut system = deployed(n);
+        let mut stack = Stack::new(64);
+        let context = Context::default();
+        let push =
+            |configuration| Request::Push { configuration, requester: Requester::Operator, at: Time(0), active: false };
+        let (eight, five) = (switch("eight", 2.0), switch("five", 3.0));
+        let first = transaction(&system, &stack, &[push(&eight)], &context).expect("accepted");
+        for s in &first.steps {
+            step::apply(&s.step, &mut system).expect("allowed");
+        }
+        stack.commit(first);
+        group.bench_with_input(BenchmarkId::new("net of undo and push", n), &n, |b, _| {
+            b.iter(|| transaction(&system, &stack, &[Request::UndoTop, push(&five)], &context).expect("accepted"));
+        });
+    }
+    for n in [10, 10_000] {
+        let mut system = deployed(n);
+        let mut stack = Stack::new(64);
+        let mut prepared = Switch::new(&mut system, &switch("switch", 2.0)).expect("a fixed switch");
+        group.bench_with_input(BenchmarkId::new("prepared, apply and undo", n), &n, |b, _| {
+            b.iter(|| {
+                assert!(stack.takes(&prepared) && prepared.ready(&system));
+                for i in 0..prepared.acts().len() {
+                    let act = prepared.acts()[i];
+                    black_box(prepared.sends(act));
+                    prepared.done(act, &mut system);
+                }
+                stack.push_switch(&prepared, Requester::Operator, Time(0), false);
+                let top = stack.top_of(&prepared).expect("just pushed");
+                assert!(prepared.ready_undo(&system, &top.acts, &top.saved));
+                for i in 0..prepared.acts().len() {
+                    let act = prepared.acts()[i];
+                    black_box(prepared.sends(act));
+                    prepared.done(act, &mut system);
+                }
+                stack.pop_switch();
+            });
+        });
+    }
+    group.finish();
+}
+
+fn deployments(c: &mut Criterion) {
+    let mut group = c.benchmark_group("deployment");
+    group.sample_size(10);
+    for n in [1_000, 10_000, 100_000] {
+        let system = System::new(catalogue());
+        let conf = deployment(n);
+        group.throughput(Throughput::Elements(n as u64));
+        group.bench_with_input(BenchmarkId::new("plan", n), &n, |b, _| {
+            b.iter(|| plan(&system, &conf, &Context::default()).expect("accepted"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, switches, deployments);
+criterion_main!(benches);
