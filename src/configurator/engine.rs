@@ -82,7 +82,11 @@ pub(super) struct Engine {
     /// Requests that have begun and were not answered.
     pub current: SmallVec<[(Request, Time); 4]>,
     pub revision: u64,
-    snapshot: Option<(u64, Arc<Snapshot>)>,
+    /// Kept for the next view, with what it is a picture of: a picture read back counts its revisions from anew, so the
+    /// view's own revision belongs to it.
+    snapshot: Option<((u64, u64), Arc<Snapshot>)>,
+    /// The safe configurations that a forced teardown has applied already, and what they could not do.
+    pub forced_safe: Option<(Vec<ConfigId>, Vec<Reason>)>,
     pub stopping: bool,
 }
 
@@ -135,6 +139,7 @@ impl Engine {
             current: SmallVec::new(),
             revision: 0,
             snapshot: None,
+            forced_safe: None,
             stopping: false,
         }
     }
@@ -400,10 +405,10 @@ impl Engine {
     pub fn view(&mut self, system: bool) -> Arc<View> {
         let stack = self.frame_views();
         let system = system.then(|| match &self.snapshot {
-            Some((revision, snapshot)) if *revision == self.system.revision() => snapshot.clone(),
+            Some((of, snapshot)) if *of == (self.revision, self.system.revision()) => snapshot.clone(),
             _ => {
                 let snapshot = Arc::new(self.system.snapshot());
-                self.snapshot = Some((self.system.revision(), snapshot.clone()));
+                self.snapshot = Some(((self.revision, self.system.revision()), snapshot.clone()));
                 snapshot
             }
         });

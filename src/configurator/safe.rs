@@ -3,10 +3,12 @@
 //! The picture of what *should* be gets a safe configuration planned on it as if nothing else had happened: so the
 //! interrupted work can be taken back around it, and the frame it leaves on the stack undoes to where the stack was.
 
+use super::control::Command;
 use super::engine::{Broken, Engine};
 use super::exec::Run;
 use super::frames::Op;
 use super::request::{Reason, Request, Residual};
+use super::touched::Touched;
 use super::transaction::{Interruption, Left};
 use super::work::Item;
 use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
@@ -59,7 +61,7 @@ impl Engine {
                 let effort = self.apply_safe(id, &mut between);
                 match self.broken.take() {
                     Some(mut broken) => {
-                        self.fold_in(&mut broken.expected, id, request);
+                        self.fold_in(&mut broken.expected, id, request, &mut between.touched);
                         // What should be has changed; what remains is told anew.
                         let left = Left::of(broken.residual.cause.clone());
                         let residual = Arc::new(self.residual(left, &broken.expected, broken.residual.observed));
@@ -103,9 +105,14 @@ impl Engine {
     /// Serves what waits urgently, in the middle of something.
     pub(super) fn serve_urgent(&mut self, between: &mut Interruption) {
         self.glance();
-        if self.commands.iter().any(super::control::Command::is_urgent) {
-            between.teardown = true;
+        if self.commands.iter().any(Command::is_urgent) {
             between.by.get_or_insert(Reason::TakenDown);
+            if !std::mem::replace(&mut between.teardown, true)
+                && self.commands.iter().any(|command| matches!(command, Command::TakeDown { forced: true, .. }))
+            {
+                // Not after what is out has come in: now.
+                self.forced_safe = Some(self.apply_all_safe());
+            }
             return;
         }
         let mut served = false;
@@ -122,6 +129,17 @@ impl Engine {
             // It was announced and is on its way.
             self.pump(self.clock.now() + Duration::from_millis(1));
         }
+    }
+
+    /// Applies every safe configuration, in the order of their names; what they could not do.
+    pub(super) fn apply_all_safe(&mut self) -> (Vec<ConfigId>, Vec<Reason>) {
+        let mut safe: Vec<ConfigId> = self.configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
+        safe.sort_unstable();
+        let mut troubles = Vec::new();
+        for id in &safe {
+            troubles.extend(self.apply_safe(*id, &mut Interruption::default()).troubles);
+        }
+        (safe, troubles)
     }
 
     /// Applies a safe configuration on the live system as far as it goes.
@@ -171,11 +189,13 @@ impl Engine {
     }
 
     /// Plans a safe configuration that was applied on the picture of what should be, and pushes its frame.
-    pub(super) fn fold_in(&mut self, expected: &mut System, id: ConfigId, request: Request) {
+    /// What it does there is touched: the rollback of what it interrupted must not even pass through the opposite.
+    pub(super) fn fold_in(&mut self, expected: &mut System, id: ConfigId, request: Request, touched: &mut Touched) {
         std::mem::swap(&mut self.system, expected);
         match self.plan_ops(&[Op::Push(id, request.requester, request.scoped)]) {
             Ok(planned) => {
                 for item in planned.steps() {
+                    touched.add(&item.step);
                     let _ = step::apply(&item.step, &mut self.system);
                 }
                 self.commit(planned);
@@ -185,6 +205,7 @@ impl Engine {
                 for piece in configurations.get(&id).map(pieces).unwrap_or_default() {
                     if let Ok(plan) = plan::plan(&self.system, &piece, &self.context) {
                         for item in &plan.steps {
+                            touched.add(&item.step);
                             let _ = step::apply(&item.step, &mut self.system);
                         }
                     }

@@ -8,7 +8,7 @@ use super::log::{Progress, What};
 use super::request::{Reason, Residual};
 use super::transaction::{Ended, Interruption, Left};
 use super::work::{Item, item};
-use crate::model::{Ask, ConfigId, RunState, Step, Verdict};
+use crate::model::{Ask, RunState, Step, Verdict};
 use crate::stack::Stack;
 use crate::system::{self, System, View as _};
 use crate::time::Time;
@@ -122,19 +122,12 @@ impl Engine {
         self.refuse_waiting();
         self.confirming.clear();
         if forced {
-            let safe: Vec<ConfigId> = self
-                .configurations
-                .values()
-                .filter(|c| c.safe)
-                .map(|c| c.id)
-                .collect::<std::collections::BTreeSet<_>>()
-                .into_iter()
-                .collect();
-            for id in safe {
-                let effort = self.apply_safe(id, &mut Interruption::default());
-                down.troubles.extend(effort.troubles);
-                down.safe.push(id);
-            }
+            let (safe, troubles) = match self.forced_safe.take() {
+                Some(done) => done,
+                None => self.apply_all_safe(),
+            };
+            down.safe = safe;
+            down.troubles = troubles;
         } else if self.broken.is_none() {
             self.pop_all(&mut down, deadline);
         }

@@ -9,6 +9,7 @@ use super::work::{Item, chain, item};
 use crate::model::{ComponentName, ConfigId, RunState, Snapshot, Step};
 use crate::system::{self, System, Undo, View as _, step};
 use crate::time::Time;
+use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -80,8 +81,11 @@ impl Engine {
         if end == End::GaveWay {
             self.serve_urgent(&mut between);
         }
+        run.gives_way = !between.teardown;
         while !self.collect(work, &mut run) {
             self.serve_urgent(&mut between);
+            // A teardown waits until this is over: there is nothing more to give way to.
+            run.gives_way = !between.teardown;
         }
         let reason = match run.failures.first() {
             Some((_, reason)) => reason.clone(),
@@ -99,6 +103,7 @@ impl Engine {
             unsettled: run.unsettled.iter().map(|i| work[*i as usize].step.clone()).collect(),
             irreversible: Vec::new(),
             doubted: run.doubted,
+            own: work.iter().map(|item| item.step.component()).collect(),
         };
         self.read_suspects();
         let mut expected = self.without(work, &run, &between.undo);
@@ -118,7 +123,7 @@ impl Engine {
     fn fold(&mut self, expected: &mut System, between: &mut Interruption) {
         while let Some((id, request)) = between.safe.get(between.folded).copied() {
             between.folded += 1;
-            self.fold_in(expected, id, request);
+            self.fold_in(expected, id, request, &mut between.touched);
         }
     }
 
@@ -156,6 +161,7 @@ impl Engine {
             let mut end = self.carry_out(&back, &mut run);
             while end == End::GaveWay {
                 self.serve_urgent(between);
+                run.gives_way = !between.teardown;
                 end = if self.collect(&back, &mut run) { End::All } else { End::GaveWay };
             }
             left.doubted |= run.doubted || !run.failures.is_empty();
@@ -183,7 +189,7 @@ impl Engine {
             return Ended::Undone(left.reason);
         };
         self.fold(&mut expected, between);
-        self.accept_faults(&seen, &mut expected);
+        self.accept_faults(&seen, &mut expected, &left.own);
         if self.adopt(&seen).is_err() {
             return self.broken(left, expected, false);
         }
@@ -213,9 +219,7 @@ impl Engine {
         let mut end = self.carry_out(&work, &mut run);
         while end == End::GaveWay {
             self.serve_urgent(between);
-            if between.teardown {
-                break;
-            }
+            run.gives_way = !between.teardown;
             end = if self.collect(&work, &mut run) { End::All } else { End::GaveWay };
         }
     }
@@ -225,7 +229,11 @@ impl Engine {
         let mut between = Interruption::closed();
         let seen = self.look(&mut between);
         let observed = seen.as_ref().is_some_and(|seen| self.adopt(seen).is_ok());
-        self.broken(left, expected, observed)
+        let ended = self.broken(left, expected, observed);
+        if let Some(broken) = &mut self.broken {
+            broken.mendable = false;
+        }
+        ended
     }
 
     /// From now on the system is broken: it is as the model now says, and should be as `expected`.
@@ -279,12 +287,13 @@ impl Engine {
     }
 
     /// Components that failed by themselves meanwhile (nothing was done to them) are no remainder of the application.
-    fn accept_faults(&self, seen: &Snapshot, expected: &mut System) {
+    fn accept_faults(&self, seen: &Snapshot, expected: &mut System, own: &FxHashSet<ComponentName>) {
         let failed: Vec<ComponentName> = seen
             .components
             .iter()
             .filter(|(name, component)| {
                 component.state == RunState::Faulted
+                    && !own.contains(name)
                     && self.system.component(**name).is_some_and(|node| node.state != RunState::Faulted)
                     && expected.component(**name).map(|node| node.state)
                         == self.system.component(**name).map(|node| node.state)
@@ -304,12 +313,14 @@ pub(super) struct Left {
     pub irreversible: Vec<Step>,
     /// Some answer was unclear, or a step back failed.
     pub doubted: bool,
+    /// Components that the application is about.
+    pub own: FxHashSet<ComponentName>,
 }
 
 impl Left {
     /// Nothing but the reason.
     pub fn of(reason: Reason) -> Self {
-        Self { reason, unsettled: Vec::new(), irreversible: Vec::new(), doubted: false }
+        Self { reason, unsettled: Vec::new(), irreversible: Vec::new(), doubted: false, own: FxHashSet::default() }
     }
 
     fn is_clean(&self) -> bool {

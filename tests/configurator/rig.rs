@@ -140,15 +140,26 @@ impl Rig {
         wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
         limits: DeploymentLimits,
     ) -> Self {
+        Self::of(catalogue(), BTreeSet::new(), configurations, options, wrap, limits)
+    }
+
+    pub fn of(
+        catalogue: Catalogue,
+        activities: BTreeSet<Ident>,
+        configurations: Vec<Configuration>,
+        options: Options,
+        wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
+        limits: DeploymentLimits,
+    ) -> Self {
         let clock = Clock::simulated();
         let guard = clock.enter();
-        let platform = Simulated::new(catalogue(), clock.clone(), options);
+        let platform = Simulated::new(catalogue.clone(), clock.clone(), options);
         let answers: Arc<Mutex<Vec<Answer>>> = Arc::default();
         let sink = answers.clone();
         let handle = Configurator::start(Setup {
             configurations,
-            catalogue: catalogue(),
-            activities: BTreeSet::new(),
+            catalogue,
+            activities,
             platform: wrap(platform.clone()),
             clock: clock.clone(),
             limits,
@@ -218,6 +229,10 @@ impl Rig {
     pub fn see(&self) -> Snapshot {
         self.platform.set_faults(Faults::default());
         self.platform.observe(self.clock.now() + Duration::from_secs(1)).unwrap()
+    }
+
+    pub fn platform_quarantined(&self) -> Vec<ComponentName> {
+        self.platform.quarantined()
     }
 
     pub fn view(&self) -> Arc<View> {

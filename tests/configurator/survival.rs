@@ -1,1 +1,259 @@
-//! to come
+//! Hung components, silent platforms, faults, panics, irreversible steps: named, bounded, survived.
+
+use crate::rig::*;
+use davit::configurator::{Reason, Recovery, Requester};
+use davit::model::*;
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use davit::platform::*;
+use davit::time::Time;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+fn up_with(more: Vec<Configuration>) -> Rig {
+    let mut all = scenario();
+    all.extend(more);
+    let rig = Rig::new(all);
+    for word in ["make", "wire", "run"] {
+        assert_eq!(rig.ask(word), [format!("{word}.ok")]);
+    }
+    rig
+}
+
+#[test]
+fn a_hung_operation_delays_nothing_beyond_its_deadline() {
+    let rig = up_with(vec![configuration("look", "", "call A.look", "")]);
+    let before = rig.see();
+    rig.inject("operation_call", Fault::Hang { returns: Some(Duration::from_secs(20)) });
+    let asked = rig.clock.now();
+    rig.submit("look");
+    rig.submit("eight");
+    rig.wait(3.0);
+    assert_eq!(rig.events()[3..], ["look.failed", "eight.failed"]);
+    let took = rig.answers.lock().unwrap()[3].at.since(asked);
+    assert!(took <= Duration::from_millis(1_200), "{took:?}");
+    assert_eq!(rig.view().quarantined, [name("A")]);
+    assert!(rig.last().findings()[0].message.contains("`A` is in quarantine"), "the refusal names it");
+    assert_eq!(rig.see(), before);
+    rig.wait(30.0);
+    assert!(rig.view().quarantined.is_empty(), "it came back");
+    assert_eq!(rig.ask("eight"), ["eight.ok"]);
+    rig.each_answered_once();
+}
+
+#[test]
+fn a_late_return_makes_whole_what_could_not_be_undone() {
+    let rig = Rig::new(scenario());
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let before = rig.see();
+    // `start B` hangs when A and C have been started or not; whatever was done is taken back, B by its return.
+    rig.platform.set_faults(Faults::new([FaultRule::on("configure D", Fault::Fail)]));
+    rig.inject("start B", Fault::Hang { returns: Some(Duration::from_secs(10)) });
+    rig.submit("run");
+    rig.wait(5.0);
+    assert_eq!(rig.events()[1..], ["run.failed"]);
+    rig.wait(30.0);
+    assert_eq!(rig.see(), before);
+    assert!(rig.view().broken.is_none());
+    rig.in_step();
+}
+
+#[test]
+fn what_nobody_can_settle_is_broken_and_says_so() {
+    let rig = up_with(vec![configuration("open", "", "call A.open; set B.k 2", "")]);
+    rig.inject("operation_call", Fault::LostAnswer);
+    assert_eq!(rig.ask("open"), ["open.broken"]);
+    let view = rig.view();
+    let residual = view.broken.as_ref().unwrap();
+    assert_eq!(residual.unsettled.len(), 1, "{residual}");
+    assert!(residual.difference.is_empty(), "the rest is rolled back: {residual}");
+    assert_eq!(rig.ask("eight"), ["eight.failed"]);
+    assert!(matches!(rig.last().reason.as_deref(), Some(Reason::StillBroken(_))));
+    assert_eq!(rig.ask("open.undo"), ["open.undone"], "its own undo recovers");
+    assert_eq!(rig.ask("eight"), ["eight.ok"]);
+}
+
+#[test]
+fn a_platform_that_cannot_be_read_leaves_it_broken_and_unobserved() {
+    let rig = up_with(vec![]);
+    rig.platform.set_faults(Faults {
+        blind: true,
+        ..Faults::new([FaultRule::on("property_set B.k", Fault::LostAnswer).times(1)])
+    });
+    let asked = rig.clock.now();
+    rig.submit("switch");
+    rig.wait(20.0);
+    assert_eq!(rig.events()[3..], ["switch.broken"]);
+    assert!(rig.last().at.since(asked) < Duration::from_secs(8));
+    assert!(!rig.view().broken.as_ref().unwrap().observed);
+    rig.platform.set_faults(Faults::default());
+    let deadline = rig.clock.now() + Duration::from_secs(20);
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    rig.in_step();
+    assert_eq!(rig.ask("switch"), ["switch.ok"]);
+}
+
+#[test]
+fn a_failure_after_an_irreversible_step_is_broken() {
+    let mut burn = configuration("burn", "", "set B.k 2; call A.burn", "C:stopped");
+    burn.irreversible = true;
+    let rig = up_with(vec![burn]);
+    rig.inject("stop C", Fault::Fail);
+    assert_eq!(rig.ask("burn"), ["burn.broken"]);
+    let view = rig.view();
+    let residual = view.broken.as_ref().unwrap();
+    assert_eq!(residual.irreversible.len(), 1, "{residual}");
+    assert!(residual.difference.is_empty());
+    let deadline = rig.clock.now() + Duration::from_secs(20);
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())), "a person has accepted it");
+    assert_eq!(rig.ask("burn"), ["burn.ok"]);
+    assert_eq!(rig.ask("undo"), ["undo.failed"], "a floor");
+}
+
+#[test]
+fn hold_undoes_nothing() {
+    let mut hold = configuration("hold", "B:stopped", "set B.k 9; set B.s 3", "B:running");
+    hold.on_failure = OnFailure::Hold;
+    let rig = up_with(vec![hold]);
+    let before = rig.see();
+    rig.inject("start B", Fault::Fail);
+    assert_eq!(rig.ask("hold"), ["hold.broken"]);
+    let seen = rig.see();
+    assert_eq!(seen.components[&name("B")].properties[&ident("k")], Value::Float(9.0));
+    let view = rig.view();
+    let residual: Vec<String> = view.broken.as_ref().unwrap().difference.iter().map(ToString::to_string).collect();
+    assert!(residual.contains(&"stop B".to_owned()), "{residual:?}");
+    assert!(residual.contains(&"property_set B.k = 9.0".to_owned()), "{residual:?}");
+    assert_eq!(rig.ask("hold.undo"), ["hold.undone"]);
+    assert_eq!(rig.see(), before);
+    assert_eq!(rig.ask("hold"), ["hold.ok"]);
+}
+
+#[test]
+fn independent_steps_run_side_by_side_within_the_bound() {
+    let rig = up_with(vec![configuration(
+        "many",
+        "",
+        "set A.k 4; set B.k 4; set C.k 4; write A.w 1; write B.w 1; write C.w 1",
+        "",
+    )]);
+    rig.platform.set_delays(Delays { base: Duration::from_millis(100), ..Delays::default() });
+    let asked = rig.clock.now();
+    rig.submit("many");
+    rig.wait(5.0);
+    assert_eq!(rig.events()[3..], ["many.ok"]);
+    let took = rig.last().at.since(asked);
+    // Six steps on four workers: two rounds, not six and not one.
+    assert!(took >= Duration::from_millis(200) && took < Duration::from_millis(300), "{took:?}");
+}
+
+#[test]
+fn a_fault_is_in_the_picture() {
+    let rig = up_with(vec![]);
+    assert!(rig.platform.fault(name("B"), "it burns"));
+    rig.wait(1.0);
+    let view = rig.view();
+    assert_eq!(view.system.as_ref().unwrap().components[&name("B")].state, RunState::Faulted);
+    rig.in_step();
+    assert_eq!(rig.ask("switch"), ["switch.ok"], "the way out of a fault is planned from the picture");
+    assert_eq!(rig.see().components[&name("B")].state, RunState::Running);
+    // A fault is never restored: the undo leaves B where it came to from the fault, and `run` finds it there no more.
+    assert_eq!(rig.ask("undo"), ["undo.done"]);
+    assert_eq!(rig.see().components[&name("B")].state, RunState::Unconfigured);
+    assert_eq!(rig.ask("undo"), ["undo.failed"]);
+    let deadline = rig.clock.now() + Duration::from_secs(30);
+    let told = rig.handle.unwind(deadline).recv_deadline(deadline).expect("it is told how it ended");
+    assert!(told.is_clean() && !told.forced.is_empty(), "{told:?}");
+    rig.each_answered_once();
+}
+
+/// A platform whose caller meets a panic in the configurator's own thread.
+struct Treacherous {
+    inner: Simulated,
+    armed: Arc<AtomicBool>,
+}
+
+impl Platform for Treacherous {
+    fn catalogue(&self) -> &Catalogue {
+        self.inner.catalogue()
+    }
+    fn execution(&self, step: &Step) -> Execution {
+        let meant = matches!(step, Step::PropertySet { .. });
+        if meant && self.armed.swap(false, Ordering::SeqCst) {
+            panic!("a defect of the configurator");
+        }
+        self.inner.execution(step)
+    }
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        Platform::execute(&self.inner, step, deadline)
+    }
+    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
+        self.inner.observe(deadline)
+    }
+    fn observe_component(
+        &self,
+        component: ComponentName,
+        deadline: Time,
+    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
+        self.inner.observe_component(component, deadline)
+    }
+    fn subscribe(&self, sink: EventSink) {
+        self.inner.subscribe(sink);
+    }
+    fn quarantined(&self) -> Vec<ComponentName> {
+        self.inner.quarantined()
+    }
+}
+
+#[test]
+fn a_panic_in_the_configurator_is_answered_and_survived() {
+    let armed = Arc::new(AtomicBool::new(false));
+    let arm = armed.clone();
+    let rig = Rig::with(scenario(), Options::default(), move |inner| Arc::new(Treacherous { inner, armed }));
+    for word in ["make", "wire", "run"] {
+        assert_eq!(rig.ask(word), [format!("{word}.ok")]);
+    }
+    let before = rig.see();
+    // At the first step of all: nothing was done, and everything goes on.
+    arm.store(true, Ordering::SeqCst);
+    assert_eq!(rig.ask("eight"), ["eight.broken"]);
+    assert_eq!(rig.ask("eight"), ["eight.ok"]);
+    assert_eq!(rig.ask("eight.undo"), ["eight.undone"]);
+    // In the middle: B is stopped; the difference is known, and recovered.
+    arm.store(true, Ordering::SeqCst);
+    assert_eq!(rig.ask("switch"), ["switch.broken"]);
+    let view = rig.view();
+    let residual = view.broken.as_ref().expect("B is stopped").clone();
+    assert_eq!(residual.difference.iter().map(ToString::to_string).collect::<Vec<_>>(), ["stop B"]);
+    let deadline = rig.clock.now() + Duration::from_secs(20);
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.see(), before);
+    assert_eq!(rig.ask("switch"), ["switch.ok"]);
+    for _ in 0..4 {
+        assert_eq!(rig.ask_as("undo", Requester::Operator), ["undo.done"]);
+    }
+    assert!(rig.see().is_empty());
+    rig.each_answered_once();
+}
+
+#[test]
+fn the_log_tells_what_happened_and_how_long_it_took() {
+    use davit::configurator::What;
+    let rig = up_with(vec![]);
+    rig.platform.set_delays(Delays {
+        of: vec![(StepPattern::new("property_set B.k"), Duration::from_millis(30))],
+        ..Delays::default()
+    });
+    rig.ask("switch");
+    let log = rig.handle.log().newest(100);
+    let took = log.iter().find_map(|entry| match &entry.what {
+        What::Step { step, took, .. } if step.to_string() == "property_set B.k" => Some(*took),
+        _ => None,
+    });
+    assert_eq!(took, Some(Duration::from_millis(30)));
+    let answered = log.iter().any(|entry| {
+        matches!(&entry.what, What::Answer { verdict: Verdict::Ok, request, .. }
+        if request.ask == Ask::Apply(id("switch")))
+    });
+    assert!(answered);
+}
