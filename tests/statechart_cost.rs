@@ -1,0 +1,151 @@
+//! What a step of a pure chart costs: no allocation, and work that does not grow with the size of the chart. Counted, not
+//! timed; in a binary of its own, because it counts the allocations of its threads.
+
+use davit::coordinator::{Core, Listener};
+use davit::model::finding::Origin;
+use davit::model::names::{ConfigId, EventName, Ident};
+use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
+use davit::statechart::{Chart, EventId, Machine, Nobody, Raised, compile};
+use davit::time::Time;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call is handed on to the system's allocator as it came; the counter is a plain thread-local number that
+// needs neither allocation nor destruction.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `alloc` above, that is from the system's allocator, with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> u64 {
+    let before = ALLOCATIONS.with(Cell::get);
+    work();
+    ALLOCATIONS.with(Cell::get) - before
+}
+
+fn state(name: &str) -> State {
+    State::new(Ident::new(name).unwrap())
+}
+
+fn transition(src: &str, tgt: &str, event: &str) -> Transition {
+    Transition::new(src, tgt, (!event.is_empty()).then(|| Trigger::parse(event).unwrap()))
+}
+
+/// Three levels: groups of `per_group` leaves in a ring, groups in a ring.
+fn rings(groups: usize, per_group: usize) -> Chart {
+    let mut root = state("root");
+    root.transitions.push(transition("initial", "g0", ""));
+    for g in 0..groups {
+        let mut group = state(&format!("g{g}"));
+        group.config.push((ConfigId::new("held").unwrap(), Origin::NONE));
+        group.transitions.push(transition("initial", "s0", ""));
+        for i in 0..per_group {
+            let mut leaf = state(&format!("s{i}"));
+            leaf.entry.push((Action::Raise(EventName::new("entered").unwrap()), Origin::NONE));
+            group.children.push(Node::State(leaf));
+            group.transitions.push(transition(&format!("s{i}"), &format!("s{}", (i + 1) % per_group), "next"));
+            group.transitions.push(transition(&format!("s{i}"), "s0", "e_after(1)"));
+        }
+        root.children.push(Node::State(group));
+        root.transitions.push(transition(&format!("g{g}"), &format!("g{}", (g + 1) % groups), "over"));
+    }
+    let (chart, findings) = compile(&Statechart::new(root));
+    chart.unwrap_or_else(|| panic!("{findings:?}"))
+}
+
+struct Count(u64);
+
+impl Listener for Count {
+    fn raised(&mut self, _: &Chart, batch: &[Raised]) {
+        self.0 += batch.len() as u64;
+    }
+}
+
+#[test]
+fn a_step_of_a_pure_chart_allocates_nothing() {
+    let mut core = Core::new(Arc::new(rings(5, 4)));
+    let events: Vec<EventName> =
+        ["next", "over", "nobody_knows_this"].iter().map(|e| EventName::new(e).unwrap()).collect();
+    let mut listener = Count(0);
+    let mut now = Time(0);
+    core.start(now, &mut listener);
+    let mut reacted = 0;
+    let count = allocations(|| {
+        for i in 0..10_000_usize {
+            now = Time(now.as_nanos() + 400_000_000);
+            core.tick(now, &mut listener);
+            reacted += u64::from(core.deliver(events[i * 7 % 3], None, now, &mut listener) == davit::coordinator::Delivered::Taken);
+        }
+    });
+    assert_eq!(count, 0);
+    assert!(reacted > 5_000 && listener.0 > 10_000, "it did something: {reacted} transitions, {} names", listener.0);
+    assert!(allocations(|| drop(std::hint::black_box(vec![1]))) == 1, "the counter counts");
+}
+
+/// Transitions looked at for 1,000 events.
+fn work(chart: &Chart) -> u64 {
+    let mut machine = Machine::new(chart);
+    machine.run(chart, Time(0), &mut Nobody);
+    let event = |text: &str| -> EventId { chart.event(EventName::new(text).unwrap()) };
+    let events = [event("next"), event("next"), event("over"), event("unknown")];
+    let before = machine.work();
+    for i in 0..1_000 {
+        machine.send(events[i % 4]);
+        machine.run(chart, Time(0), &mut Nobody);
+    }
+    machine.work() - before
+}
+
+#[test]
+fn what_a_step_costs_does_not_depend_on_the_size_of_the_chart() {
+    let small = work(&rings(4, 4));
+    assert!(small > 0);
+    assert_eq!(work(&rings(400, 4)), small);
+    assert_eq!(work(&rings(25_000, 4)), small, "100,000 leaves");
+}
+
+#[test]
+fn a_net_of_connectors_costs_its_transitions_not_its_paths() {
+    // 60 layers of two connectors, each leading to both of the next layer, and nothing at the end: 2^60 paths.
+    let mut root = state("root");
+    root.children.push(Node::State(state("a")));
+    root.children.push(Node::State(state("b")));
+    for layer in 0..60 {
+        for side in 0..2 {
+            let name = format!("k{layer}_{side}");
+            root.children.push(Node::Connector(davit::model::statechart::Connector::new(Ident::new(&name).unwrap())));
+            for next in 0..2 {
+                let target = if layer == 59 { "b".to_owned() } else { format!("k{}_{next}", layer + 1) };
+                root.transitions.push(transition(&name, &target, if layer == 59 { "never" } else { "" }));
+            }
+        }
+    }
+    root.transitions.push(transition("initial", "a", ""));
+    root.transitions.push(transition("a", "k0_0", ""));
+    let (chart, _) = compile(&Statechart::new(root));
+    let chart = chart.unwrap();
+    let mut machine = Machine::new(&chart);
+    machine.run(&chart, Time(0), &mut Nobody);
+    assert!(machine.work() < 1_000, "{} transitions were looked at", machine.work());
+    machine.send(chart.event(EventName::new("never").unwrap()));
+    machine.run(&chart, Time(0), &mut Nobody);
+    assert_eq!(machine.leaf(), chart.find("b").ok());
+}
