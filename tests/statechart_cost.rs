@@ -92,7 +92,9 @@ fn a_step_of_a_pure_chart_allocates_nothing() {
         for i in 0..10_000_usize {
             now = Time(now.as_nanos() + 400_000_000);
             core.tick(now, &mut listener);
-            reacted += u64::from(core.deliver(events[i * 7 % 3], None, now, &mut listener) == davit::coordinator::Delivered::Taken);
+            reacted += u64::from(
+                core.deliver(events[i * 7 % 3], None, now, &mut listener) == davit::coordinator::Delivered::Taken,
+            );
         }
     });
     assert_eq!(count, 0);

@@ -103,6 +103,8 @@ pub struct Core {
 struct Collect<'a>(&'a mut Vec<Raised>);
 
 impl Hook for Collect<'_> {
+    const TURNS: bool = false;
+
     fn raised(&mut self, _: &Chart, raised: Raised) {
         self.0.push(raised);
     }
@@ -182,8 +184,13 @@ impl Core {
                 listener.raised(&self.chart, &self.batch);
                 self.batch.clear();
             }
-            // A time event that came due in an idle turn waits inside for the next one.
-            if matches!(step, Step::Quiet { idle: true }) && self.machine.queue().events().is_empty() {
+            let rests = match step {
+                Step::Taken | Step::Entered => self.machine.rest::<Collect<'_>>(&self.chart),
+                // A time event that came due in an idle turn waits inside for the next one.
+                Step::Quiet { idle } => idle && self.machine.queue().events().is_empty(),
+                _ => false,
+            };
+            if rests {
                 return first.unwrap_or(step);
             }
         }

@@ -94,6 +94,8 @@ pub(super) struct NodeRow {
     /// Its time event, or [`NONE`].
     pub timer: u32,
     pub doo: Option<FunctionId>,
+    /// It is a leaf whose completion, alone in its step, is known to trigger nothing.
+    pub settles: bool,
 }
 
 /// What one step needs to know of a transition.

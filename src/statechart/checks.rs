@@ -337,7 +337,8 @@ fn not_entered(chart: &Chart, findings: &mut Findings) {
 fn endless(chart: &Chart, reached: &[bool], findings: &mut Findings) {
     let mut machine = Machine::new(chart);
     let mut next = vec![NONE; chart.nodes.len()];
-    for leaf in chart.nodes().filter(|n| chart.kind(*n) == Kind::Leaf && reached[n.index()]) {
+    let goes_on = |n: &NodeId| reached[n.index()] && !chart.nodes[n.index()].settles;
+    for leaf in chart.nodes().filter(|n| chart.kind(*n) == Kind::Leaf && goes_on(n)) {
         machine.place(chart, leaf, Time::default());
         machine.send(chart.completion(leaf));
         if machine.turn(chart, Time::default(), &mut Nobody) == Step::Taken {

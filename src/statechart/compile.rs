@@ -5,7 +5,7 @@
 
 use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When};
 use super::resolve::Names;
-use super::{EdgeId, NodeId, checks, order};
+use super::{EdgeId, Machine, NodeId, checks, order};
 use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{self, Finding, Findings, Origin};
@@ -13,6 +13,7 @@ use crate::model::names::{EventName, Ident};
 use crate::model::statechart::{
     Action, FunctionId, INITIAL, Node, ROOT, Since, State, Statechart, Transition, Trigger,
 };
+use crate::time::Time;
 use rustc_hash::FxHashMap;
 
 /// The chart in tables, and all that is wrong or doubtful with it.
@@ -33,6 +34,7 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
     }
     chart.connector_edges =
         chart.nodes.iter().filter(|node| node.kind == Kind::Connector).map(|node| node.out.len).sum();
+    mark_settling(&mut chart);
     checks::doubts(&chart, &mut builder.findings);
     (Some(chart), builder.findings)
 }
@@ -527,6 +529,7 @@ impl<'m> Builder<'m> {
             done: EventId::done(id),
             timer: NONE,
             doo,
+            settles: false,
         }
     }
 
@@ -573,6 +576,22 @@ impl<'m> Builder<'m> {
     fn origin_of(&self, name: EventName) -> Origin {
         let mut all = self.edges.iter().flat_map(|edge| edge.written.events.iter().map(move |event| (edge.src, event)));
         all.find(|(src, (trigger, _))| self.name_of(trigger, *src) == Some(name)).map_or(Origin::NONE, |(_, (_, o))| *o)
+    }
+}
+
+/// Finds the leaves whose completion triggers nothing, by trying. Where guards decide, nobody can know.
+fn mark_settling(chart: &mut Chart) {
+    if !chart.unguarded {
+        return;
+    }
+    let mut machine = Machine::new(chart);
+    for leaf in chart.nodes() {
+        if chart.kind(leaf) != Kind::Leaf {
+            continue;
+        }
+        machine.place(chart, leaf, Time::default());
+        machine.send(chart.completion(leaf));
+        chart.nodes[leaf.index()].settles = !machine.triggers(chart);
     }
 }
 

@@ -61,6 +61,11 @@ pub enum Doo {
 ///
 /// Functions report their own errors; an error never aborts a transition.
 pub trait Hook {
+    /// Whether the hook has its hand in single turns: it implements [`poll`](Self::poll), [`before_step`](Self::before_step),
+    /// [`after_step`](Self::after_step) or [`go_on`](Self::go_on). If not, [`Machine::run`](super::Machine::run) leaves out
+    /// turns of which it is known that they do nothing (a completion that triggers nothing, and the idle turn after it).
+    const TURNS: bool = true;
+
     /// A state is active now; its entry actions follow.
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         let _ = (chart, state);
@@ -149,4 +154,6 @@ pub trait Hook {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Nobody;
 
-impl Hook for Nobody {}
+impl Hook for Nobody {
+    const TURNS: bool = false;
+}

@@ -2,7 +2,7 @@
 
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
-use super::hook::{Doo, Hook, Place, Raised, View};
+use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
 use super::search::{Around, Search};
 use crate::limits;
 use crate::time::Time;
@@ -211,6 +211,14 @@ impl Machine {
         self.mode = if chart.nodes[leaf.index()].doo.is_some() { Mode::Active } else { Mode::Done };
     }
 
+    /// Whether the events that wait trigger a transition; guards may be called. They wait no more then.
+    pub(super) fn triggers(&mut self, chart: &Chart) -> bool {
+        self.events.clear();
+        std::mem::swap(&mut self.queue.events, &mut self.events);
+        self.search.begin();
+        (0..self.path.len()).any(|i| self.find(chart, self.path[i].0, &mut Nobody) != NONE)
+    }
+
     /// The first moment at which a time event of an active state is due; none if no time event is to come.
     pub fn next_deadline(&self, chart: &Chart) -> Option<Time> {
         if chart.timers.is_empty() {
@@ -256,12 +264,17 @@ impl Machine {
     }
 
     /// What rFSM's `run(fsm)` does: turns until nothing is left to do, but no more than [`limits::CHART_RUN`].
-    pub fn run(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Stepped {
+    pub fn run<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Stepped {
         let mut transition = false;
         for _ in 0..limits::CHART_RUN {
             match self.turn(chart, now, hook) {
                 Step::NotEntered => return Stepped { idle: false, transition, ended: Ended::NotEntered },
-                Step::Entered | Step::Taken => transition = true,
+                Step::Entered | Step::Taken => {
+                    transition = true;
+                    if self.rest::<H>(chart) {
+                        return Stepped { idle: true, transition, ended: Ended::Idle };
+                    }
+                }
                 Step::Quiet { idle: true } if !hook.go_on() => {
                     return Stepped { idle: true, transition, ended: Ended::Idle };
                 }
@@ -272,14 +285,16 @@ impl Machine {
     }
 
     /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
-    pub fn turn(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
         hook.poll(&mut self.queue);
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);
-        let mut added = std::mem::take(&mut self.added);
-        hook.before_step(&mut self.view(chart), &mut added);
-        self.events.append(&mut added);
-        self.added = added;
+        if H::TURNS {
+            let mut added = std::mem::take(&mut self.added);
+            hook.before_step(&mut self.view(chart), &mut added);
+            self.events.append(&mut added);
+            self.added = added;
+        }
 
         let step = if self.path.is_empty() {
             self.enter_chart(chart, now, hook)
@@ -293,6 +308,18 @@ impl Machine {
             hook.after_step(&mut self.view(chart));
         }
         step
+    }
+
+    /// Whether the turns that are left do nothing; then they count as taken. All that waits is the completion of a leaf
+    /// without activity, of which compiling found that it triggers nothing, and time events were looked at already.
+    pub fn rest<H: Hook>(&mut self, chart: &Chart) -> bool {
+        let Some(leaf) = self.leaf.filter(|_| !H::TURNS) else { return false };
+        let row = &chart.nodes[leaf.index()];
+        let rests = row.settles && self.mode == Mode::Done && self.queue.events == [row.done];
+        if rests {
+            self.queue.events.clear();
+        }
+        rests
     }
 
     fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {

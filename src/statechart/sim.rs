@@ -156,6 +156,8 @@ struct Trace {
 }
 
 impl Hook for Trace {
+    const TURNS: bool = false;
+
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         self.actions.push(format!("entry {}", chart.fqn(state)));
     }
