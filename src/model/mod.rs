@@ -22,7 +22,7 @@ pub use event::{Ask, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
 pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
 pub use run_state::{RunState, Transition};
-pub use snapshot::{ComponentSnapshot, Snapshot};
+pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};
 pub use statechart::Statechart;
 pub use step::Step;
 pub use value::{Value, ValueType};

@@ -6,6 +6,7 @@ use super::run_state::RunState;
 use super::value::Value;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// A system as it can be observed (the identity of the laws; `SYSTEM` of the JSON views).
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -51,4 +52,47 @@ impl Snapshot {
     pub fn is_empty(&self) -> bool {
         self.components.is_empty() && self.connections.is_empty() && self.ports.is_empty()
     }
+}
+
+/// What an activity did so far.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ActivityStatus {
+    /// Its name.
+    pub name: Ident,
+    /// Its period; none: event-driven.
+    #[serde(rename = "period_s", serialize_with = "seconds_if_any")]
+    pub period: Option<Duration>,
+    /// Components created in it.
+    pub components: usize,
+    /// Components that run.
+    pub running: usize,
+    /// Rounds of updates begun.
+    pub cycles: u64,
+    /// Periods that were missed because a round took too long.
+    pub overruns: u64,
+    /// How late the last round began.
+    #[serde(rename = "latency_last_s", serialize_with = "seconds")]
+    pub latency_last: Duration,
+    /// How late a round began at most.
+    #[serde(rename = "latency_max_s", serialize_with = "seconds")]
+    pub latency_max: Duration,
+    /// How long the last round took.
+    #[serde(rename = "duration_last_s", serialize_with = "seconds")]
+    pub duration_last: Duration,
+    /// How long a round took at most.
+    #[serde(rename = "duration_max_s", serialize_with = "seconds")]
+    pub duration_max: Duration,
+    /// The component whose update or operation has been running for longer than [`crate::limits::ACTIVITY_STUCK`].
+    pub stuck: Option<ComponentName>,
+    /// What the operating system refused: a priority, a CPU.
+    pub complaint: Option<String>,
+}
+
+fn seconds<S: serde::Serializer>(duration: &Duration, s: S) -> Result<S::Ok, S::Error> {
+    s.serialize_f64(duration.as_secs_f64())
+}
+
+#[allow(clippy::ref_option)]
+fn seconds_if_any<S: serde::Serializer>(duration: &Option<Duration>, s: S) -> Result<S::Ok, S::Error> {
+    duration.as_ref().map(Duration::as_secs_f64).serialize(s)
 }

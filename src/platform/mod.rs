@@ -6,7 +6,7 @@
 pub mod embedded;
 pub mod simulated;
 
-use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
+use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -137,6 +137,12 @@ pub trait Platform: Send + Sync {
 
     /// Components whose call never returned.
     fn quarantined(&self) -> Vec<ComponentName>;
+
+    /// What the activities that have components did so far, by name: rounds, overruns, latencies, who holds one up.
+    /// Empty: the platform does not know.
+    fn activities(&self) -> Vec<ActivityStatus> {
+        Vec::new()
+    }
 }
 
 /// A fixed list of immediate steps, resolved.

@@ -7,7 +7,7 @@ use super::cell::{Cell, Closed};
 use super::component::{Call, Reply};
 use super::latest::Reader;
 use crate::limits;
-use crate::model::{Activity as Spec, ComponentName, Ident, RunState, Value};
+use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState, Value};
 use crate::time::{Clock, Receiver, Signal, Time};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -64,35 +64,6 @@ struct Counters {
     latency_max: AtomicU64,
     duration_last: AtomicU64,
     duration_max: AtomicU64,
-}
-
-/// What an activity did so far.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct ActivityStatus {
-    /// Its name.
-    pub name: Ident,
-    /// Its period; none: event-driven.
-    pub period: Option<Duration>,
-    /// Components created in it.
-    pub components: usize,
-    /// Components that run.
-    pub running: usize,
-    /// Rounds of updates begun.
-    pub cycles: u64,
-    /// Periods that were missed because a round took too long.
-    pub overruns: u64,
-    /// How late the last round began.
-    pub latency_last: Duration,
-    /// How late a round began at most.
-    pub latency_max: Duration,
-    /// How long the last round took.
-    pub duration_last: Duration,
-    /// How long a round took at most.
-    pub duration_max: Duration,
-    /// The component whose update or operation has been running for longer than [`limits::ACTIVITY_STUCK`].
-    pub stuck: Option<ComponentName>,
-    /// What the operating system refused: a priority, a CPU.
-    pub complaint: Option<String>,
 }
 
 pub(crate) struct Activity {
@@ -262,7 +233,9 @@ impl Activity {
                     next = next.min(wake_at);
                 } else if let Some(inside) = cell.enter_running() {
                     any = true;
-                    cell.beat.pending.store(false, Ordering::Release);
+                    // An exchange, not a store: what was written before the last poke must be seen by this update, and a
+                    // poke after it must stay.
+                    cell.beat.pending.swap(false, Ordering::AcqRel);
                     if wake_at <= now {
                         cell.beat.wake_at.store(Time::NEVER.0, Ordering::Relaxed);
                     }

@@ -21,7 +21,7 @@ pub mod property;
 mod realtime;
 pub mod value;
 
-pub use activity::ActivityStatus;
+pub use crate::model::ActivityStatus;
 pub use beat::{Notice, NoticeSink, Notices};
 pub use builder::Builder;
 pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, Returned, Ticket};

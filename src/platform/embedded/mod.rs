@@ -1,6 +1,7 @@
 //! The embedded platform: components of this process, run by the embedded runtime.
 //!
-//! * [`registry`]: what is there, behind one lock that no activity ever takes.
+//! * [`registry`]: what is there, behind one lock that no activity ever takes; [`crews`] its activities, [`wiring`] its
+//!   ports and properties.
 //! * [`steps`]: the steps that are immediate. [`calls`]: those that run a component's own code, on workers under a deadline.
 //! * [`prepared`]: fixed lists of immediate steps. [`order`]: the data-flow order. [`workers`]: the threads of `calls`.
 //!
@@ -12,19 +13,21 @@
 //! cleaned up, disconnected and destroyed, and [`PlatformEvent::Returned`] says so.
 
 mod calls;
+mod crews;
 mod order;
 mod prepared;
 mod registry;
 mod steps;
+mod wiring;
 mod workers;
 
 use super::{EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
 use crate::limits;
 use crate::model::{
-    Activity as Spec, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot, Step,
-    Transition, TypeName,
+    Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot,
+    Step, Transition, TypeName,
 };
-use crate::runtime::{ActivityStatus, Kind, Libraries, Notice, Notices, guard};
+use crate::runtime::{Kind, Libraries, Notice, Notices, guard};
 use crate::time::{Clock, Time, lock};
 use registry::Registry;
 use rustc_hash::FxHashMap;
@@ -32,7 +35,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 use workers::Workers;
 
-/// The embedded platform. Dropping it ends its threads and destroys its components.
+/// The embedded platform. Dropping it ends its threads and drops its components, without calling their hooks: taking a
+/// system down in order is the configurator's business.
 pub struct EmbeddedPlatform {
     inner: Arc<Inner>,
 }
@@ -81,14 +85,6 @@ impl EmbeddedPlatform {
             workers: Workers::new(clock),
         });
         Self { inner }
-    }
-
-    /// What the activities did so far, by name; only those that have components.
-    pub fn activities(&self) -> Vec<ActivityStatus> {
-        let registry = lock(&self.inner.registry);
-        let mut list: Vec<_> = registry.crews().map(|crew| crew.activity.status(registry.cells(crew))).collect();
-        list.sort_by_key(|status| status.name);
-        list
     }
 
     /// The buffered connections with the number of values each has lost because it was full (the newest ones).
@@ -166,6 +162,13 @@ impl Platform for EmbeddedPlatform {
         let mut names: Vec<_> = lock(&self.inner.registry).quarantined.iter().copied().collect();
         names.sort_unstable();
         names
+    }
+
+    fn activities(&self) -> Vec<ActivityStatus> {
+        let registry = lock(&self.inner.registry);
+        let mut list: Vec<_> = registry.crews().map(|crew| crew.activity.status(registry.cells(crew))).collect();
+        list.sort_by_key(|status| status.name);
+        list
     }
 }
 

@@ -1,6 +1,7 @@
 //! Carrying out steps: the immediate ones here, the others by [`calls`](super::calls).
 
-use super::registry::{Registry, check_values};
+use super::registry::Registry;
+use super::wiring::check_values;
 use super::{Inner, Outcome};
 use crate::model::{ComponentName, Ident, Policy, RunState, Step, Transition, TypeName, Value};
 use crate::platform::{Cause, PlatformEvent};
