@@ -28,4 +28,4 @@ pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, 
 pub use library::{Kind, Libraries, Library};
 pub use port::{EventIn, EventOut, In, Out, Sample};
 pub use property::Prop;
-pub use value::PortValue;
+pub use value::{PortValue, record};

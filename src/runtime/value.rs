@@ -256,12 +256,14 @@ macro_rules! record {
     )+};
 }
 
+pub use record;
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fmt::Debug;
 
-    crate::record! {
+    record! {
         struct Pose {
             at: [f64; 3],
             id: u8,

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-crate::record! {
+crate::runtime::record! {
     /// One packet.
     #[derive(Copy, Default)]
     pub struct Packet {

@@ -3,7 +3,7 @@
 use crate::libraries::youbot::base::{Pose2, Twist2};
 use crate::time::Time;
 
-crate::record! {
+crate::runtime::record! {
     /// What the joints measure.
     #[derive(Copy, Default)]
     pub struct JointState {
