@@ -315,7 +315,12 @@ impl Search<'_, '_> {
                 Trouble::Refused(ask, reasons) => {
                     let first = reasons.first().map_or_else(String::new, |f| f.message.clone());
                     if said.insert((*ask, first)) {
+                        let failed = self.with_failure[*at as usize];
                         findings.push((self.refused(*at, *ask, reasons), self.trace(*at)));
+                        // The reasons are findings of their own, each at its place.
+                        for reason in reasons.iter().filter(|r| !failed && r.origin.is_some()) {
+                            findings.push((reason.clone(), self.trace(*at)));
+                        }
                     }
                 }
                 Trouble::TooDeep(id) => {

@@ -12,8 +12,10 @@ mod types;
 mod universe;
 mod world;
 
-use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
-use crate::model::{Catalogue, ConfigId, Deployment, Finding, Findings, finding};
+use crate::model::codes::{
+    CLASH, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED,
+};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, finding};
 use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
@@ -79,6 +81,7 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
             let mut traced = ways(deployment, chart, &mut product);
             let exploration = explore::explore(&mut product);
             explored = exploration.explored;
+            findings.extend(unasked(deployment, &product));
             traced.extend(exploration.findings);
             traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
             for (finding, way) in traced {
@@ -95,6 +98,20 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     let sound = chart.is_some() && !finding::has_errors(&findings);
     Report { checked: sound.then(|| Checked(deployment.clone())), findings, explored, trace }
+}
+
+/// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system
+/// then is not known; what is wrong with them in any system is.
+fn unasked(deployment: &Deployment, product: &explore::Product<'_>) -> Findings {
+    const ANYWHERE: [Code; 4] = [CLASH, PRE_ON_CREATED, POST_ON_DESTROYED, TOUCHES_DESTROYED];
+    let mut findings = Vec::new();
+    let asked = product.worlds.asked();
+    for configuration in deployment.configurations.iter().filter(|c| !asked.contains(&c.id)) {
+        if let Err(refusal) = product.worlds.try_anywhere(configuration) {
+            findings.extend(refusal.findings.into_iter().filter(|f| ANYWHERE.contains(&f.code)));
+        }
+    }
+    findings
 }
 
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
@@ -134,6 +151,12 @@ fn ways(deployment: &Deployment, chart: &Chart, product: &mut explore::Product<'
         }
         finding.at(deployment.key_origin(key)).path(key)
     };
+    // The reasons of a refusal are findings of their own, each at its place.
+    for way in [Some(&rise), fall.as_ref()].into_iter().flatten() {
+        if let Some((_, reasons)) = &way.refused {
+            found.extend(reasons.iter().map(|reason| (reason.clone(), tell(product, way))));
+        }
+    }
     if !rise.reached {
         found.push((
             stops(&rise, DEPLOY_NEVER_UP, "deploy.up", &deployment.deploy.up, "the bring-up"),

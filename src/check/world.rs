@@ -6,10 +6,10 @@
 //! Each world is planned in with the real planner and the real stack, once per request.
 
 use crate::model::{
-    Ask, Catalogue, ComponentName, ConfigId, Deployment, Findings, MemberRef, Policy, RunState, TypeName,
+    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, Findings, MemberRef, Policy, RunState, TypeName,
 };
 use crate::plan::footprint::{Index, Slot};
-use crate::plan::{Context, PlannedStep, Refusal};
+use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::{Frame, Request, Requester, Stack, transaction};
 use crate::system::{System, View, step};
 use crate::time::Time;
@@ -138,6 +138,21 @@ impl<'a> Worlds<'a> {
         };
         self.done.insert((id, asks.to_vec()), applied.clone());
         applied
+    }
+
+    /// Configurations that were asked for in some world.
+    pub fn asked(&self) -> FxHashSet<ConfigId> {
+        let asks = self.done.keys().flat_map(|(_, asks)| asks);
+        asks.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None }).collect()
+    }
+
+    /// Plans a configuration in the world with the most components.
+    ///
+    /// # Errors
+    /// Why it is refused there.
+    pub fn try_anywhere(&self, configuration: &Configuration) -> Result<(), Refusal> {
+        let fullest = self.worlds.iter().max_by_key(|world| world.system.len());
+        fullest.map_or(Ok(()), |world| plan(&world.system, configuration, &self.context).map(|_| ()))
     }
 
     fn is_undone(&self, id: ConfigId) -> bool {
