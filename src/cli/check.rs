@@ -6,6 +6,7 @@ use super::output::Style;
 use super::{Answer, Context, Run};
 use crate::check::{self, Explored};
 use crate::diagnostics::{SourceMap, to_json};
+use crate::limits::CHECK_WAITING;
 use crate::model::{Finding, Severity, finding};
 use serde_json::json;
 
@@ -48,7 +49,7 @@ impl Run for Args {
         let out = &context.out;
         out.findings(&findings, &read.sources);
         if !report.trace.is_empty() {
-            out.error("the way there:\n");
+            out.error("the way to the first of these that has one:\n");
             for line in &report.trace {
                 out.error(format!("  {line}\n"));
             }
@@ -60,7 +61,10 @@ impl Run for Args {
         let explored = report.explored;
         let reach = match (explored.states, explored.complete) {
             (0, _) => String::new(),
-            (n, true) => format!("; followed through all {n} states and {} transitions", explored.transitions),
+            (n, true) => format!(
+                "; followed through all {n} states and {} transitions (at most {CHECK_WAITING} requests waiting)",
+                explored.transitions
+            ),
             (n, false) => {
                 format!("; followed through {n} states and {} transitions, not all there are", explored.transitions)
             }

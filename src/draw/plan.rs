@@ -6,18 +6,24 @@ use crate::plan::{PlannedStep, Stage};
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
 
+/// Plans up to this many stand in a row, joined by arrows; more are numbered and fill rows, or the picture would be a
+/// ribbon.
+const ROW: usize = 3;
+
 /// What plans look like that are carried out one after the other, each with a heading.
 pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Picture {
     let mut picture = Picture::new(Subject::Plan, Direction::Right, title);
     let mut before: Option<usize> = None;
-    for (heading, steps) in plans {
+    let row = plans.len() <= ROW;
+    for (i, (heading, steps)) in plans.iter().enumerate() {
+        let heading = if row { heading.clone() } else { format!("{}. {heading}", i + 1) };
         let mut group = Node::new(format!("plan{}", picture.nodes.len()), heading);
         group.shape = Shape::Group;
         if steps.is_empty() {
             group.lines.push("nothing to do".to_owned());
         }
         let group = picture.add(group);
-        if let Some(before) = before {
+        if let Some(before) = before.filter(|_| row) {
             picture.edges.push(Edge::new(before, group));
         }
         before = Some(group);

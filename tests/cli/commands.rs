@@ -1,0 +1,290 @@
+//! Each command: what it prints, the shape of its JSON, its exit status.
+
+use crate::demo::{Demo, at_home};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::process::Stdio;
+
+#[test]
+fn usage_and_unreadable_input_are_status_2() {
+    let demo = Demo::new();
+    std::fs::create_dir(demo.path("directory.yaml")).unwrap();
+    demo.write("broken.yaml", "davit: 1\nname: [\n");
+    for args in [
+        vec![],
+        vec!["chekc", "deployment.yaml"],
+        vec!["check"],
+        vec!["check", "missing.yaml"],
+        vec!["check", "directory.yaml"],
+        vec!["check", "broken.yaml"],
+        vec!["plan", "missing.yaml"],
+        vec!["graph", "missing.yaml"],
+        vec!["convert", "missing.lua", "--to", "yaml"],
+        vec!["sim", "missing.lua"],
+        vec!["sim", "coordinator.lua", "--events", "missing.txt"],
+        vec!["check", "deployment.yaml", "--set", "nonsense"],
+        vec!["plan", "deployment.yaml", "--bringup", "--shutdown"],
+        vec!["graph", "deployment.yaml", "-o", "no/such/directory/picture.svg"],
+    ] {
+        let ran = demo.run(&args);
+        assert_eq!(ran.code, 2, "{args:?}: {}{}", ran.out, ran.err);
+        assert!(!ran.err.is_empty(), "{args:?} says nothing");
+    }
+    for args in [["--help"], ["--version"]] {
+        let ran = demo.run(&args);
+        assert_eq!((ran.code, ran.err.as_str()), (0, ""), "{args:?}");
+    }
+}
+
+#[test]
+fn the_help_of_every_command_says_what_it_does() {
+    let help = at_home(&["--help"]).out;
+    for command in ["check", "plan", "graph", "types", "convert", "sim", "explain", "completions"] {
+        assert!(help.contains(command), "{help}");
+        let own = at_home(&[command, "--help"]).out;
+        assert!(own.contains("Usage: davit"), "{own}");
+    }
+}
+
+#[test]
+fn explain_lists_and_explains_every_code() {
+    let list = at_home(&["explain"]);
+    assert_eq!(list.code, 0);
+    for page in davit::model::codes::PAGES {
+        assert!(list.out.contains(page.code.0), "{}", page.code);
+    }
+    let one = at_home(&["explain", "davit::coord::stuck"]);
+    assert!(one.out.contains("nothing leads on"), "{}", one.out);
+    let unknown = at_home(&["explain", "coord::stuk"]);
+    assert_eq!(unknown.code, 1);
+    assert!(unknown.err.contains("coord::stuck"), "{}", unknown.err);
+    assert_eq!(at_home(&["explain", "coord::stuck", "--json"]).json()["code"], "coord::stuck");
+}
+
+#[test]
+fn completions_are_scripts() {
+    for (shell, word) in [("bash", "complete"), ("zsh", "compdef"), ("fish", "complete")] {
+        let ran = at_home(&["completions", shell]);
+        assert_eq!(ran.code, 0);
+        assert!(ran.out.contains(word) && ran.out.contains("davit"));
+    }
+}
+
+#[test]
+fn check_says_it_in_words_and_as_json() {
+    let demo = Demo::new();
+    let ran = demo.run(&["check", "deployment.yaml"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.out.starts_with("demo: sound; followed through all "), "{}", ran.out);
+    assert!(!ran.out.contains('\x1b'), "colours only on a terminal");
+    assert!(demo.run(&["check", "deployment.yaml", "--color", "always"]).out.contains('\x1b'));
+    let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    let keys: Vec<&String> = json.as_object().unwrap().keys().collect();
+    for key in ["ok", "findings", "explored", "trace"] {
+        assert!(keys.iter().any(|k| *k == key), "{keys:?}");
+    }
+    demo.replace("configurations.lua", "\"source.y\"", "\"source.z\"");
+    let ran = demo.run(&["check", "deployment.yaml"]);
+    assert_eq!(ran.code, 1);
+    assert!(ran.err.contains("davit::conf::unknown_port") && ran.err.contains("configurations.lua"), "{}", ran.err);
+    assert!(ran.out.contains("refused"));
+    let finding = demo.run(&["check", "deployment.yaml", "--json"]).json()["findings"][0].clone();
+    for key in ["code", "severity", "message", "file", "line", "column", "help"] {
+        assert!(finding.get(key).is_some(), "{key} is missing: {finding}");
+    }
+}
+
+#[test]
+fn plan_has_the_documented_shape() {
+    let demo = Demo::new();
+    let plans =
+        demo.run(&["plan", "deployment.yaml", "create_all", "connect_all", "start_all", "fast", "--json"]).json();
+    let plans = plans.as_array().unwrap();
+    let ids: Vec<&str> = plans.iter().map(|p| p["configuration"].as_str().unwrap()).collect();
+    assert_eq!(ids, ["create_all", "connect_all", "start_all", "fast"]);
+    for plan in plans {
+        for (i, step) in plan["steps"].as_array().unwrap().iter().enumerate() {
+            assert_eq!(step["id"], i);
+            for key in ["do", "target", "after", "stage", "reversibility", "undo"] {
+                assert!(step.get(key).is_some(), "{key} is missing: {step}");
+            }
+            assert!(step["undo"].is_object());
+            assert!(step["after"].as_array().unwrap().iter().all(|a| a.as_u64().unwrap() < i as u64));
+        }
+    }
+    let fast = &plans[3];
+    let set = fast["steps"].as_array().unwrap().iter().find(|s| s["do"] == "property_set").unwrap();
+    assert_eq!(set["target"], "source.k");
+    assert_eq!(set["value"], json!(9.0));
+    assert_eq!(set["stage"], "changes");
+    assert_eq!(set["reversibility"], "exact");
+    assert_eq!(set["undo"]["value"], json!(2.0));
+    assert_eq!(plans[2]["steps"][0]["do"], "configure");
+    let system = &fast["result"];
+    assert_eq!(system["components"]["source"]["state"], "running");
+    assert_eq!(system["components"]["source"]["type"], "Source");
+    assert_eq!(system["components"]["source"]["properties"]["k"], json!(9.0));
+    assert_eq!(system["components"]["source"]["activity"], "control");
+    assert_eq!(system["connections"], json!([{ "from": "source.y", "to": "sink.u", "policy": "data" }]));
+    assert_eq!(system["ports"], json!({ "sink.flag": true }));
+}
+
+#[test]
+fn a_list_of_run_states_is_worked_off_in_order() {
+    let demo = Demo::new();
+    let plans = demo.run(&["plan", "deployment.yaml", "create_all", "start_all", "--json"]).json();
+    let steps = plans[1]["steps"].as_array().unwrap();
+    let place = |what: &str, who: &str| steps.iter().find(|s| s["do"] == what && s["target"] == who).unwrap();
+    // Both lists name sink first: whatever follows `after` backwards from source's first step meets sink's last one.
+    let mut open = vec![place("configure", "source")["id"].as_u64().unwrap()];
+    let mut met = Vec::new();
+    while let Some(id) = open.pop() {
+        let step = steps.iter().find(|s| s["id"] == id).unwrap();
+        open.extend(step["after"].as_array().unwrap().iter().filter_map(Value::as_u64));
+        met.push(id);
+    }
+    assert!(met.contains(&place("start", "sink")["id"].as_u64().unwrap()), "{steps:#?}");
+}
+
+#[test]
+fn a_group_replaces_its_frame() {
+    let demo = Demo::new();
+    let args = ["plan", "deployment.yaml", "create_all", "slow", "fast", "slow", "--json"];
+    let plans = demo.run(&args).json();
+    assert_eq!(plans[3]["result"], plans[1]["result"], "back to the first of the group");
+    let sets: Vec<&Value> =
+        plans[2]["steps"].as_array().unwrap().iter().filter(|s| s["target"] == "source.k").collect();
+    assert_eq!(sets.len(), 1, "the net: never through the value before both");
+}
+
+#[test]
+fn plan_refuses_what_was_asked_for_and_nothing_else() {
+    let demo = Demo::new();
+    let ran = demo.run(&["plan", "deployment.yaml", "connect_all", "--json"]);
+    assert_eq!(ran.code, 1);
+    assert_eq!(ran.json()["ok"], false);
+    assert!(ran.json()["findings"].as_array().is_some_and(|f| !f.is_empty()));
+    let ran = demo.run(&["plan", "deployment.yaml", "create_al", "--json"]);
+    assert_eq!(ran.code, 1);
+    assert_eq!(ran.json()["findings"][0]["code"], "cli::unknown_configuration");
+    assert_eq!(ran.json()["findings"][0]["help"], "did you mean `create_all`?");
+    // A mistake in another configuration.
+    demo.replace("configurations.lua", "property_set(\"source.name\"", "property_set(\"sorce.name\"");
+    assert_eq!(demo.run(&["plan", "deployment.yaml", "create_all"]).code, 0);
+    assert_eq!(demo.run(&["plan", "deployment.yaml", "create_all", "rename"]).code, 1);
+}
+
+#[test]
+fn bringup_and_shutdown_are_planned_through_the_coordinator() {
+    let demo = Demo::new();
+    let plans = demo.run(&["plan", "deployment.yaml", "--bringup", "--json"]).json();
+    let ids: Vec<&str> = plans.as_array().unwrap().iter().map(|p| p["configuration"].as_str().unwrap()).collect();
+    assert_eq!(ids, ["create_all", "connect_all", "start_all", "slow"]);
+    let plans = demo.run(&["plan", "deployment.yaml", "--shutdown", "--json"]).json();
+    let last = plans.as_array().unwrap().last().unwrap();
+    assert_eq!(last["result"], json!({ "components": {}, "connections": [], "ports": {} }));
+    assert_eq!(last["requests"], json!(["create_all.undo"]));
+    let text = demo.run(&["plan", "deployment.yaml", "--bringup"]).out;
+    assert!(text.contains("-- e_start") && text.contains("connect source.y -> sink.u"), "{text}");
+}
+
+#[test]
+fn graphs_come_in_three_formats() {
+    let demo = Demo::new();
+    for what in ["components", "coordinator", "plan"] {
+        let svg = demo.run(&["graph", "deployment.yaml", "--what", what]);
+        assert_eq!(svg.code, 0, "{}", svg.err);
+        assert!(svg.out.starts_with("<svg") && svg.out.trim_end().ends_with("</svg>"));
+        let dot = demo.run(&["graph", "deployment.yaml", "--what", what, "--format", "dot"]).out;
+        assert!(dot.starts_with("digraph"));
+        let mermaid = demo.run(&["graph", "deployment.yaml", "--what", what, "--format", "mermaid"]).out;
+        assert!(mermaid.contains(if what == "coordinator" { "stateDiagram-v2" } else { "flowchart" }));
+    }
+    assert_eq!(demo.run(&["graph", "coordinator.lua", "-o", "picture.svg"]).code, 0);
+    assert!(demo.read("picture.svg").contains("fast_mode"));
+}
+
+#[test]
+fn converting_there_and_back_changes_nothing() {
+    let demo = Demo::new();
+    for file in ["configurations", "coordinator"] {
+        let yaml = demo.run(&["convert", &format!("{file}.lua"), "--to", "yaml", "-o", &format!("{file}.yaml")]);
+        assert_eq!(yaml.code, 0, "{}", yaml.err);
+        let back = demo.run(&["convert", &format!("{file}.yaml"), "--to", "lua"]);
+        let direct = demo.run(&["convert", &format!("{file}.lua"), "--to", "lua"]);
+        assert_eq!(back.out, direct.out);
+    }
+    demo.replace("deployment.yaml", "configurations.lua", "configurations.yaml");
+    demo.replace("deployment.yaml", "coordinator.lua", "coordinator.yaml");
+    let ran = demo.run(&["check", "deployment.yaml"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+}
+
+#[test]
+fn types_are_listed_and_shown() {
+    let demo = Demo::new();
+    let list = demo.run(&["types", "deployment.yaml"]).out;
+    assert!(list.contains("Source") && list.contains("Sink"), "{list}");
+    let one = demo.run(&["types", "deployment.yaml", "Source"]).out;
+    assert!(one.contains("0 … 10") && one.contains("reset(float)") && one.contains("irreversible"), "{one}");
+    assert!(at_home(&["types"]).out.contains("youbot."));
+    let wrong = demo.run(&["types", "deployment.yaml", "Sorce", "--json"]);
+    assert_eq!(wrong.code, 1);
+    assert_eq!(wrong.json()["findings"][0]["code"], "cli::unknown_type");
+    assert!(demo.run(&["types", "deployment.yaml", "--json"]).json().is_array());
+}
+
+#[test]
+fn sim_prints_an_object_for_every_line() {
+    let demo = Demo::new();
+    let mut child = demo
+        .command(&["sim", "coordinator.lua", "--events", "-", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(b"\ne_start\ncreate_all.ok\nrun\n").unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert_eq!(lines.len(), 4);
+    assert_eq!(lines[0]["active"], json!(["root", "root.idle"]));
+    assert_eq!(lines[0]["actions"], json!(["entry root", "entry root.idle"]));
+    assert_eq!(lines[1]["active"], json!(["root", "root.deploying", "root.deploying.creating"]));
+    assert_eq!(
+        lines[1]["actions"],
+        json!(["exit root.idle", "entry root.deploying", "entry root.deploying.creating", "raise create_all"])
+    );
+    assert_eq!(lines[1]["transition"], true);
+    let mut keys: Vec<&str> = lines[1].as_object().unwrap().keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    assert_eq!(keys, ["actions", "active", "idle", "mode", "queue", "transition"]);
+}
+
+#[test]
+fn a_model_that_init_rejects_is_status_1() {
+    let demo = Demo::new();
+    demo.write("bad.lua", "return state { a = state {}, trans { src = 'initial', tgt = 'nowhere' } }");
+    let ran = demo.run(&["sim", "bad.lua", "--events", "/dev/null"]);
+    assert_eq!(ran.code, 1, "{}", ran.err);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_panic() {
+    let demo = Demo::new();
+    for args in [
+        vec!["explain"],
+        vec!["completions", "bash"],
+        vec!["plan", "deployment.yaml", "--bringup", "--json"],
+        vec!["graph", "deployment.yaml"],
+        vec!["--help"],
+    ] {
+        let mut child = demo.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!err.contains("panicked"), "{args:?}: {err}");
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {err}");
+    }
+}

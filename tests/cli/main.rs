@@ -1,0 +1,5 @@
+//! The command line as people and programs meet it: what is printed, in which shape, with which exit status.
+
+mod breakages;
+mod commands;
+mod demo;
