@@ -190,14 +190,31 @@ pub struct Exploration {
     pub explored: Explored,
 }
 
+/// The worst that failed on a way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Failed {
+    Nothing,
+    /// A configuration was not applied: to be expected, and the coordinator's to deal with.
+    Apply,
+    /// Something could not be undone: it stays in force, and not every coordinator can go on from there. A shutdown that
+    /// gets stuck on it is forced.
+    Undo,
+}
+
+impl Failed {
+    fn of(asks: &[Ask]) -> Self {
+        if asks.iter().all(|ask| matches!(ask, Ask::Apply(_))) { Self::Apply } else { Self::Undo }
+    }
+}
+
 struct Search<'p, 'a> {
     product: &'p mut Product<'a>,
     states: Vec<State>,
     index: FxHashMap<State, u32>,
     /// How each state was first reached: from where, by what.
     from: Vec<Option<(u32, Move)>>,
-    /// Whether the way to each has a failure in it, and whether it was followed further.
-    with_failure: Vec<bool>,
+    /// The worst that failed on the way to each, and whether it was followed further.
+    with_failure: Vec<Failed>,
     followed: Vec<bool>,
     edges: Vec<(u32, u32)>,
     /// To be followed: reached without a failure, and with one.
@@ -229,7 +246,7 @@ pub fn explore(product: &mut Product<'_>) -> Exploration {
 impl Search<'_, '_> {
     fn run(&mut self) {
         let Some(start) = self.product.start() else { return };
-        self.reach(start, None, false);
+        self.reach(start, None, Failed::Nothing);
         while let Some(at) = self.clean.pop_front().or_else(|| self.failed.pop_front()) {
             if self.edges.len() >= limits::CHECK_TRANSITIONS {
                 self.cut = true;
@@ -239,7 +256,7 @@ impl Search<'_, '_> {
         }
     }
 
-    fn reach(&mut self, state: State, from: Option<(u32, Move)>, failed: bool) {
+    fn reach(&mut self, state: State, from: Option<(u32, Move)>, failed: Failed) {
         let next = u32::try_from(self.states.len()).unwrap_or(u32::MAX);
         let id = *self.index.entry(state).or_insert_with_key(|state| {
             self.states.push(state.clone());
@@ -250,7 +267,7 @@ impl Search<'_, '_> {
             self.from.push(from);
             self.with_failure.push(failed);
             self.followed.push(false);
-            if failed { self.failed.push_back(id) } else { self.clean.push_back(id) }
+            if failed == Failed::Nothing { self.clean.push_back(id) } else { self.failed.push_back(id) }
         }
         if let Some(source) = source {
             self.edges.push((source, id));
@@ -283,7 +300,8 @@ impl Search<'_, '_> {
             }
             if fails {
                 let next = self.product.answer(&state, false, state.world);
-                self.reach(next, Some((at, Move::Answer { asks, ok: false })), true);
+                let failed = self.with_failure[at as usize].max(Failed::of(&asks));
+                self.reach(next, Some((at, Move::Answer { asks, ok: false })), failed);
             }
         }
         if state.waiting.len() < limits::CHECK_WAITING {
@@ -315,7 +333,7 @@ impl Search<'_, '_> {
                 Trouble::Refused(ask, reasons) => {
                     let first = reasons.first().map_or_else(String::new, |f| f.message.clone());
                     if said.insert((*ask, first)) {
-                        let failed = self.with_failure[*at as usize];
+                        let failed = self.with_failure[*at as usize] != Failed::Nothing;
                         findings.push((self.refused(*at, *ask, reasons), self.trace(*at)));
                         // The reasons are findings of their own, each at its place.
                         for reason in reasons.iter().filter(|r| !failed && r.origin.is_some()) {
@@ -348,10 +366,10 @@ impl Search<'_, '_> {
         let site = self.site(ask, owner);
         let message =
             format!("`{ask}` is refused when it is asked for: {}", reasons.first().map_or("", |f| &f.message));
-        let mut finding = if self.with_failure[at as usize] {
-            Finding::warning(COORD_REQUEST_REFUSED, message)
-        } else {
-            Finding::error(COORD_REQUEST_REFUSED, message)
+        let mut finding = match self.with_failure[at as usize] {
+            Failed::Nothing => Finding::error(COORD_REQUEST_REFUSED, message),
+            Failed::Apply => Finding::warning(COORD_REQUEST_REFUSED, message),
+            Failed::Undo => Finding::info(COORD_REQUEST_REFUSED, message),
         };
         if let Some(site) = site {
             finding = finding.at(site.origin).labelled("asked for here").path(place(chart, site.when));

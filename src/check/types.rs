@@ -1,8 +1,8 @@
 //! The component types that a deployment declares, and what it says about itself.
 
-use crate::model::codes::{TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE};
+use crate::model::codes::{TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, Deployment, Effect, Finding, Findings, Ident};
+use crate::model::{Catalogue, ChangeKind, Deployment, Effect, Finding, Findings, Ident};
 
 /// What is wrong with the declared types: names of other types and of operations that are not there.
 pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
@@ -49,6 +49,30 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
                     .path(path)
                     .also(inverse.origin, "declared here")
                     .help("an undo takes the same arguments, or none"),
+                );
+            }
+        }
+    }
+    findings.extend(without_code(deployment));
+    findings
+}
+
+/// Declared types say what a component looks like, not what it does: only the simulated platform can make one.
+fn without_code(deployment: &Deployment) -> Findings {
+    let mut findings = Vec::new();
+    if deployment.platform.as_str() != "embedded" {
+        return findings;
+    }
+    for configuration in &deployment.configurations {
+        for change in &configuration.changes {
+            let ChangeKind::Create { component, ty, .. } = &change.kind else { continue };
+            if let Some(declared) = deployment.types.iter().find(|d| d.name == *ty) {
+                findings.push(
+                    Finding::error(TYPE_WITHOUT_CODE, format!("`{component}` cannot be made: `{ty}` is only declared"))
+                        .at(change.origin)
+                        .path(format!("configurations.{}", configuration.id))
+                        .also(declared.origin, "declared here, which gives it no code")
+                        .help("use `platform: simulated`, or a type of a library"),
                 );
             }
         }

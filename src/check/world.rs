@@ -6,7 +6,8 @@
 //! Each world is planned in with the real planner and the real stack, once per request.
 
 use crate::model::{
-    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, Findings, MemberRef, Policy, RunState, TypeName,
+    Ask, Catalogue, Code, ComponentName, ConfigId, Configuration, Deployment, Findings, MemberRef, Policy, RunState,
+    TypeName,
 };
 use crate::plan::footprint::{Index, Slot};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
@@ -70,9 +71,9 @@ pub struct Worlds<'a> {
     worlds: Vec<World>,
     keys: FxHashMap<Key, WorldId>,
     done: FxHashMap<(WorldId, Vec<Ask>), Applied>,
-    /// Warnings of plans, each configuration's once.
+    /// Warnings of plans, each once.
     pub warnings: Findings,
-    warned: FxHashSet<ConfigId>,
+    warned: FxHashSet<(Code, String)>,
     /// By address of the two frames, which are kept alive here.
     blocks: FxHashMap<(usize, usize), (bool, Arc<Frame>, Arc<Frame>)>,
 }
@@ -122,12 +123,10 @@ impl<'a> Worlds<'a> {
         }
         let applied = match apply(self.deployment, &self.context, self.requester, self.get(id), asks) {
             Err(refusal) => Applied::Refused { which: refusal.request, findings: Rc::new(refusal.findings) },
-            Ok(Change { world, steps, warnings, pushed }) => {
-                for id in pushed {
-                    if self.warned.insert(id) {
-                        self.warnings.extend(
-                            warnings.iter().filter(|w| w.path.contains(id.as_str()) || w.path.is_empty()).cloned(),
-                        );
+            Ok(Change { world, steps, warnings }) => {
+                for warning in warnings {
+                    if self.warned.insert((warning.code, warning.message.clone())) {
+                        self.warnings.push(warning);
                     }
                 }
                 match self.too_deep(&world) {
@@ -217,8 +216,6 @@ pub struct Change {
     pub steps: Vec<PlannedStep>,
     /// What the plans warn of.
     pub warnings: Findings,
-    /// Configurations that were pushed.
-    pub pushed: Vec<ConfigId>,
 }
 
 /// What `asks`, made together by `requester`, do in `world`.
@@ -234,12 +231,13 @@ pub fn apply(
 ) -> Result<Change, Refusal> {
     let mut requests = Vec::new();
     let mut places = Vec::new();
-    let mut pushed = Vec::new();
     for (i, ask) in asks.iter().enumerate() {
         let request = match ask {
-            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| {
-                pushed.push(*id);
-                Request::Push { configuration, requester, at: Time::default(), active: false }
+            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| Request::Push {
+                configuration,
+                requester,
+                at: Time::default(),
+                active: false,
             }),
             Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Request::Undo(frame.id)),
             Ask::Undo => Some(Request::UndoTop),
@@ -260,5 +258,5 @@ pub fn apply(
     }
     let (steps, warnings) = (transaction.steps.clone(), transaction.warnings.clone());
     world.stack.commit(transaction);
-    Ok(Change { world, steps, warnings, pushed })
+    Ok(Change { world, steps, warnings })
 }

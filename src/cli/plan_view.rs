@@ -6,6 +6,7 @@ use crate::plan::{PlannedStep, Stage};
 use crate::system::{Reversibility, Undo};
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
+use std::collections::BTreeSet;
 
 /// An object of `plan --json`.
 #[derive(Serialize)]
@@ -86,8 +87,8 @@ impl Iterator for SystemSteps<'_> {
         if index > 0 && self.steps[index - 1].wave != step.wave {
             // The last steps of the wave before: those that no other of it waits for.
             let last = std::mem::take(&mut self.wave);
-            let waited: Vec<u32> =
-                self.steps.iter().filter(|s| last.contains(&s.id)).flat_map(|s| s.after.iter().copied()).collect();
+            let steps = &self.steps[index - last.len()..index];
+            let waited: BTreeSet<u32> = steps.iter().flat_map(|s| s.after.iter().copied()).collect();
             self.before = last.into_iter().filter(|id| !waited.contains(id)).collect();
         }
         self.wave.push(step.id);

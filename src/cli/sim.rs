@@ -5,7 +5,6 @@ use super::input::{Parameters, coordinator};
 use super::output::Style;
 use super::{Answer, Context, Failure, Run};
 use crate::model::codes::CLI_EVENTS_UNREADABLE;
-use crate::model::finding::has_errors;
 use crate::statechart::{Chart, Sim, compile};
 use std::io::{BufRead, BufReader, IsTerminal, Read};
 use std::path::PathBuf;
@@ -35,7 +34,7 @@ impl Run for Args {
         let read = coordinator(&self.file, &self.parameters).map_err(|f| f.as_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
-        let Some(chart) = chart.filter(|_| !has_errors(&findings)) else {
+        let Some(chart) = chart else {
             return Err(Failure { findings, sources: read.sources, json: self.json, ..Failure::default() });
         };
         context.out.findings(&findings, &read.sources);

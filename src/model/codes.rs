@@ -188,6 +188,10 @@ codes! {
     TYPE_UNKNOWN_TYPE = "type::unknown_type", "a component type refers to a type that there is not",
         "`start_after` and `stop_before` name other component types, whose components start before and stop after those of \
          this one. A name that no type has would silently order nothing. Correct it, or leave it out.";
+    TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
+        "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
+         platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \
+         `platform: simulated`, or a type of one of the libraries; your own code goes into a library of your own program.";
     TYPE_UNKNOWN_OPERATION = "type::unknown_operation", "the undo of an operation is not an operation that fits",
         "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
          or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \

@@ -122,13 +122,7 @@ const MISTAKES: &[Mistake] = &[
     warning(K, "\"e_shutdown\"", "\"e_shutdwon\"", "coord::near_event", "`e_shutdown`"),
     // What the coordinator does.
     warning(K, "\"connect_all.failed\", ", "", "coord::failure_unhandled", "connect_all.failed"),
-    error(
-        K,
-        "events = { \"connect_all.ok\" }",
-        "events = { \"e_never_mind\", \"connect_all.cancelled\" }",
-        "deploy::never_up",
-        "",
-    ),
+    error(K, "events = { \"connect_all.ok\" }", "events = { \"connect_all.cancelled\" }", "deploy::never_up", ""),
     error(K, "tgt = \"removing\"", "tgt = \"stopping\"", "deploy::never_down", ""),
     error(
         K,
