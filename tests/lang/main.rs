@@ -3,3 +3,4 @@
 mod helpers;
 mod listings;
 mod round_trip;
+mod hostile;

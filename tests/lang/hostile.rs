@@ -1,0 +1,276 @@
+//! Files that mean harm, or were made by a program gone wrong: each ends in a clear finding, none in a crash.
+//!
+//! The budgets are counted (instructions, bytes, values, depth); nothing here looks at a clock.
+
+use crate::helpers::{codes, load, shown, with_configurations};
+use davit::lang::{self, LoadOptions, Sources};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// The codes that a Lua file of configurations gives, without places.
+fn lua(text: &str) -> Vec<String> {
+    let loaded = with_configurations(text);
+    assert!(loaded.deployment.is_none());
+    let mut codes: Vec<String> = loaded.findings.iter().map(|f| f.code.to_string()).collect();
+    codes.dedup();
+    codes
+}
+
+fn yaml(text: impl Into<Vec<u8>>) -> Vec<String> {
+    let loaded = lang::load_configurations(
+        &Sources::memory([("c.yaml", text)]),
+        Path::new("c.yaml"),
+        &LoadOptions::default(),
+    );
+    let _ = shown(&loaded.findings, &loaded.sources);
+    loaded.findings.iter().map(|f| f.code.to_string()).collect()
+}
+
+#[test]
+fn endless_loops_end() {
+    for text in [
+        "while true do end",
+        "while true do pcall(function() while true do end end) end",
+        "local function f() while true do end end while true do xpcall(f, f) end",
+        "local co = coroutine.create(function() while true do end end) while true do coroutine.resume(co) end",
+        "while true do pcall(coroutine.wrap(function() while true do end end)) end",
+        "local f = coroutine.wrap(function() while true do coroutine.yield() end end) while true do f() end",
+        "local t = setmetatable({}, { __index = function(t, k) return t[k + 1] end }) while true do pcall(function() return t[1] end) end",
+        "local t = setmetatable({}, { __add = function(a, b) while true do end end }) return t + 1",
+        "local t = setmetatable({}, { __close = function() while true do end end }) do local x <close> = t end",
+        "goto a ::a:: goto a",
+        "for i = 1, math.huge do end",
+        "local function f() return f() end f()",
+        "while true do pcall(error) end",
+        "table.sort({ 3, 2, 1 }, function() while true do end end)",
+        "local t = {} for i = 1, 100000 do t[i] = i % 7 end while true do table.sort(t) end",
+        "local s = string.rep('x', 1000000) while true do local _ = s:upper() end",
+        "local s = 'x' while #s < 8000000 do s = s .. s end while true do local _ = s .. 'y' end",
+    ] {
+        assert_eq!(lua(text), ["lua::instructions"], "{text}");
+    }
+}
+
+#[test]
+fn memory_bombs_end() {
+    for text in [
+        "local t = {} while true do t[#t + 1] = { {}, {}, {} } end",
+        "local s = 'x' while true do s = s .. s end",
+        "local s = 'x' while true do pcall(function() s = s .. s end) end",
+        "local t = {} for i = 1, 1e9 do t[i] = tostring(i) .. 'abcdefgh' end",
+        "local function f(...) return f(1, ...) end f()",
+    ] {
+        let codes = lua(text);
+        assert!(codes == ["lua::memory"] || codes == ["lua::instructions"] || codes == ["lua::error"], "{text}: {codes:?}");
+    }
+    assert_eq!(lua("string.rep('x', 1e9)"), ["lua::error"]);
+    assert_eq!(lua("while true do create('A', 'B') end"), ["text::too_many_values"]);
+    assert_eq!(lua("while true do state {} end"), ["text::too_many_values"]);
+    assert_eq!(lua("while true do pcall(create, 'A', 'B') end"), ["text::too_many_values"]);
+    let shared = "local t = {} for i = 1, 40 do t = { t, t } end property_set('A.k', t)";
+    assert!(lua(shared).contains(&"text::too_many_values".to_owned()));
+}
+
+#[test]
+fn pattern_functions_are_left_out() {
+    let text = "local s = string.rep('a', 100) local _ = s:find(string.rep('a?', 100) .. string.rep('a', 100))";
+    assert_eq!(lua(text), ["lua::closed"]);
+    for name in ["match", "gmatch", "gsub"] {
+        assert_eq!(lua(&format!("local _ = string.{name}('a', '.*')")), ["lua::closed"], "{name}");
+    }
+}
+
+#[test]
+fn the_world_is_closed() {
+    for text in [
+        "io.open('/etc/passwd')",
+        "os.execute('true')",
+        "local _ = os.time()",
+        "load('return 1')()",
+        "loadstring('return 1')",
+        "dofile('x.lua')",
+        "loadfile('x.lua')",
+        "debug.sethook()",
+        "package.loadlib('x', 'y')",
+        "require 'socket'",
+        "collectgarbage('stop')",
+        "local _ = math.random()",
+        "string.dump(function() end)",
+        "local _ = _G.io",
+        "local _ = _ENV.os",
+    ] {
+        assert_eq!(lua(text), ["lua::closed"], "{text}");
+    }
+    assert_eq!(lua("setmetatable({}, { __gc = function() while true do end end })"), ["lua::error"]);
+    assert_eq!(lua("setmetatable(_G, nil)"), ["lua::error"], "the undefined names stay guarded");
+    assert_eq!(lua("setmetatable({}, { __gc = true })"), ["lua::error"]);
+    assert_eq!(lua("getmetatable('').__index = nil"), ["lua::error"]);
+}
+
+#[test]
+fn bytecode_is_refused() {
+    let bytecode: &[u8] = b"\x1bLuaT\x00\x19\x93\r\n\x1a\n\x04\x08\x08xV";
+    for bytes in [bytecode.to_vec(), b"\x1bLua text".to_vec()] {
+        let loaded = lang::load_configurations(
+            &Sources::memory([("c.lua", bytes)]),
+            Path::new("c.lua"),
+            &LoadOptions::default(),
+        );
+        assert_eq!(loaded.findings[0].code.0, "lua::bytecode");
+        assert!(loaded.unreadable);
+    }
+    let hidden = with_configurations("#!/usr/bin/lua\n\x1bLua");
+    assert!(hidden.unreadable && hidden.findings[0].code.0 == "text::syntax");
+}
+
+#[test]
+fn ten_thousand_levels_end() {
+    let n = 10_000;
+    for text in [
+        format!("return {}{}", "{".repeat(n), "}".repeat(n)),
+        format!("return {}1{}", "(".repeat(n), ")".repeat(n)),
+        format!("{}{}", "do ".repeat(n), "end ".repeat(n)),
+        format!("return {}1", "-".repeat(2 * n).replace("--", "- ")),
+        format!("return {}", "function() return ".repeat(n)),
+    ] {
+        assert_eq!(lua(&text), ["text::too_deep"], "{}", &text[..40]);
+    }
+    let by_loop = "local t = {} local r = t for i = 1, 10000 do t.x = {} t = t.x end property_set('A.k', r)";
+    assert!(lua(by_loop).contains(&"text::too_deep".to_owned()));
+    let cycle = "local t = {} t.t = t Configuration { property_set('A.k', t) }";
+    assert!(lua(cycle).contains(&"text::too_deep".to_owned()));
+    let states = "local s = state {} for i = 1, 10000 do s = state { x = s } end return s";
+    let loaded = load(&[("k.lua", states)], &LoadOptions::default());
+    assert_eq!(loaded.findings[0].code.0, "text::too_deep");
+    for text in [
+        "[".repeat(n),
+        format!("{}{}", "[".repeat(n), "]".repeat(n)),
+        "{a: ".repeat(n),
+        "- ".repeat(n),
+        (0..n).fold(String::new(), |mut out, i| {
+            _ = writeln!(out, "{}a:", " ".repeat(i % 3_000));
+            out
+        }),
+        format!("configurations: {}1{}", "[".repeat(100), "]".repeat(100)),
+        "? ".repeat(n),
+    ] {
+        let codes = yaml(text.clone());
+        assert!(matches!(codes[0].as_str(), "text::too_deep" | "text::syntax"), "{codes:?} {}", &text[..40]);
+    }
+}
+
+#[test]
+fn alias_bombs_end() {
+    let mut bomb = String::from("a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n");
+    for i in 1..12 {
+        _ = writeln!(bomb, "a{i}: &a{i} [{}]", vec![format!("*a{}", i - 1); 10].join(", "));
+    }
+    assert_eq!(yaml(bomb), ["text::too_many_values"]);
+    assert_eq!(yaml("a: &a [*a]")[0], "text::syntax");
+    assert_eq!(yaml("a: *b")[0], "text::syntax");
+}
+
+#[test]
+fn files_are_refused_by_size_and_encoding() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = folder.path().join("large.lua");
+    // A hole: a hundred megabytes by its size, nothing on the disk.
+    std::fs::File::create(&large).unwrap().set_len(100 * 1024 * 1024).unwrap();
+    let loaded = lang::load_configurations(&Sources::Disk, &large, &LoadOptions::default());
+    assert_eq!(loaded.findings[0].code.0, "text::too_large");
+    assert!(loaded.unreadable && loaded.sources.files().is_empty());
+    let folder_as_file = lang::load(folder.path().join("x.yaml").as_path(), &LoadOptions::default());
+    assert_eq!(folder_as_file.findings[0].code.0, "text::no_file");
+    assert_eq!(yaml(b"name: \xff\xfe".to_vec()), ["text::not_utf8"]);
+    assert_eq!(lua("property_set('A.k', '\\xff')")[0], "text::not_utf8");
+    std::fs::create_dir(folder.path().join("d.yaml")).unwrap();
+    let directory = lang::load(&folder.path().join("d.yaml"), &LoadOptions::default());
+    assert_eq!(directory.findings[0].code.0, "text::unreadable");
+}
+
+#[test]
+fn values_are_finite() {
+    for value in ["0/0", "1/0", "-math.huge", "{ 1.0, 0/0 }"] {
+        let text = format!("ConfiguratorConf {{ a = Configuration {{ property_set('A.k', {value}) }} }}");
+        assert_eq!(lua(&text), ["text::not_finite"], "{value}");
+    }
+    for value in [".nan", ".inf", "-.inf", "[1.0, .nan]"] {
+        let text =
+            format!("configurations: {{ a: {{ changes: [{{ property_set: {{ property: A.k, value: {value} }} }}] }} }}");
+        assert_eq!(yaml(text), ["text::not_finite"], "{value}");
+    }
+    let huge = "configurations: { a: { changes: [{ port_write: { port: A.k, value: 99999999999999999999 } }] } }";
+    assert_eq!(yaml(huge), ["text::wrong_type"]);
+}
+
+#[test]
+fn duplicates_are_found() {
+    let twice = "ConfiguratorConf { a = Configuration { }, a = Configuration { destroy('A') } }";
+    assert_eq!(codes(&with_configurations(twice)), ["conf::unnamed 1:24"]);
+    let over_files = load(
+        &[
+            ("c.lua", "ConfiguratorConf { up = Configuration {} }"),
+            ("b.lua", "ConfiguratorConf {\n up = Configuration {} }"),
+            ("d.yaml", &crate::helpers::DEPLOYMENT.replace("[c.lua]", "[c.lua, b.lua]")),
+        ],
+        &LoadOptions::default(),
+    );
+    assert_eq!(codes(&over_files), ["conf::duplicate 2:7"]);
+    assert!(shown(&over_files.findings, &over_files.sources).contains("c.lua:1:25"), "the other file is shown too");
+    assert_eq!(yaml("configurations: { a: {}, b: {}, a: {} }"), ["text::duplicate_key"]);
+    let many: String = (0..20).map(|i| format!("  a{i}: {{}}\n")).collect();
+    assert_eq!(yaml(format!("configurations:\n{many}  a15: {{}}\n")), ["text::duplicate_key"]);
+}
+
+#[test]
+fn odd_yaml_is_refused() {
+    assert_eq!(yaml("configurations:\n\ta: {}\n"), ["text::syntax"]);
+    assert_eq!(yaml("configurations: {}\n---\nconfigurations: {}\n"), ["text::several_documents"]);
+    assert_eq!(yaml("configurations: !include x.yaml\n"), ["text::tag"]);
+    assert_eq!(yaml("configurations: !!binary aGk=\n"), ["text::tag"]);
+    assert_eq!(yaml("? [a, b]\n: c\n")[0], "text::syntax");
+    assert_eq!(yaml(""), ["text::missing_key"]);
+    assert_eq!(yaml("configurations: {a: {}"), ["text::syntax"]);
+    assert_eq!(yaml("\u{feff}configurations: {}\n"), Vec::<String>::new(), "a byte order mark is no mistake");
+    assert_eq!(yaml("configurations: &x\n  a: &y { changes: [] }\n  b: *y\n"), Vec::<String>::new());
+}
+
+#[test]
+fn findings_do_not_flood() {
+    let text = "for i = 1, 100000 do local _ = _G['x' .. i] end";
+    let loaded = with_configurations(text);
+    assert!(loaded.findings.len() <= davit::limits::FINDINGS);
+    let shown = shown(&loaded.findings, &loaded.sources);
+    assert!(shown.contains("more findings") && shown.len() < 100_000);
+}
+
+#[test]
+fn a_shebang_keeps_the_line_numbers() {
+    let loaded = with_configurations("#!/usr/bin/env davit\nConfiguratorConf { a = Configuration { frobnicate() } }");
+    assert_eq!(codes(&loaded), ["lua::undefined 2:40"]);
+}
+
+/// Any text whatever: no panic, and an error always leaves a finding.
+#[test]
+fn any_text_is_answered() {
+    use proptest::prelude::*;
+    let words = prop::sample::select(vec![
+        "Configuration", "ConfiguratorConf", "{", "}", "(", ")", "create", "\"A\"", "'_default:running'", ",", "=",
+        "state", "trans", "src", "return", "end", "function", "local", "x", "1", "..", ":undo", "nil", "[", "]", "\n",
+        "davit: 1", "- ", ": ", "&a", "*a", "configurations:", "coordinator:", "states:", "|", ">", "'", "\"", "é", "\t",
+        "connect", "pcall", "post_conf_state", "_G", "rfsm.",
+    ]);
+    let texts = proptest::collection::vec(words, 0..24).prop_map(|words| words.join(" "));
+    let config = ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() };
+    proptest!(config, |(text in texts)| {
+        for file in ["c.lua", "c.yaml"] {
+            let sources = Sources::memory([(file, text.as_str())]);
+            let loaded = lang::load_configurations(&sources, Path::new(file), &LoadOptions::default());
+            let chart = lang::load_coordinator(&sources, Path::new(file), &LoadOptions::default());
+            prop_assert!(chart.coordinator.is_some() || !chart.findings.is_empty());
+            let _ = (shown(&loaded.findings, &loaded.sources), shown(&chart.findings, &chart.sources));
+        }
+        let loaded = lang::load_from(&Sources::memory([("d.yaml", text.as_str())]), Path::new("d.yaml"), &LoadOptions::default());
+        prop_assert!(loaded.deployment.is_none() && !loaded.findings.is_empty());
+    });
+}
