@@ -17,11 +17,8 @@ fn lua(text: &str) -> Vec<String> {
 }
 
 fn yaml(text: impl Into<Vec<u8>>) -> Vec<String> {
-    let loaded = lang::load_configurations(
-        &Sources::memory([("c.yaml", text)]),
-        Path::new("c.yaml"),
-        &LoadOptions::default(),
-    );
+    let loaded =
+        lang::load_configurations(&Sources::memory([("c.yaml", text)]), Path::new("c.yaml"), &LoadOptions::default());
     let _ = shown(&loaded.findings, &loaded.sources);
     loaded.findings.iter().map(|f| f.code.to_string()).collect()
 }
@@ -61,12 +58,17 @@ fn memory_bombs_end() {
         "local function f(...) return f(1, ...) end f()",
     ] {
         let codes = lua(text);
-        assert!(codes == ["lua::memory"] || codes == ["lua::instructions"] || codes == ["lua::error"], "{text}: {codes:?}");
+        assert!(
+            codes == ["lua::memory"] || codes == ["lua::instructions"] || codes == ["lua::error"],
+            "{text}: {codes:?}"
+        );
     }
     assert_eq!(lua("string.rep('x', 1e9)"), ["lua::error"]);
-    assert_eq!(lua("while true do create('A', 'B') end"), ["text::too_many_values"]);
-    assert_eq!(lua("while true do state {} end"), ["text::too_many_values"]);
-    assert_eq!(lua("while true do pcall(create, 'A', 'B') end"), ["text::too_many_values"]);
+    // Whichever budget is met first: that depends on how the program was built.
+    for text in ["create('A', 'B')", "state {}", "pcall(create, 'A', 'B')", "connect('A.x', 'B.y', { buffer = 1 })"] {
+        let codes = lua(&format!("while true do {text} end"));
+        assert!(codes == ["text::too_many_values"] || codes == ["lua::instructions"], "{text}: {codes:?}");
+    }
     let shared = "local t = {} for i = 1, 40 do t = { t, t } end property_set('A.k', t)";
     assert!(lua(shared).contains(&"text::too_many_values".to_owned()));
 }
@@ -195,8 +197,9 @@ fn values_are_finite() {
         assert_eq!(lua(&text), ["text::not_finite"], "{value}");
     }
     for value in [".nan", ".inf", "-.inf", "[1.0, .nan]"] {
-        let text =
-            format!("configurations: {{ a: {{ changes: [{{ property_set: {{ property: A.k, value: {value} }} }}] }} }}");
+        let text = format!(
+            "configurations: {{ a: {{ changes: [{{ property_set: {{ property: A.k, value: {value} }} }}] }} }}"
+        );
         assert_eq!(yaml(text), ["text::not_finite"], "{value}");
     }
     let huge = "configurations: { a: { changes: [{ port_write: { port: A.k, value: 99999999999999999999 } }] } }";
@@ -255,10 +258,51 @@ fn a_shebang_keeps_the_line_numbers() {
 fn any_text_is_answered() {
     use proptest::prelude::*;
     let words = prop::sample::select(vec![
-        "Configuration", "ConfiguratorConf", "{", "}", "(", ")", "create", "\"A\"", "'_default:running'", ",", "=",
-        "state", "trans", "src", "return", "end", "function", "local", "x", "1", "..", ":undo", "nil", "[", "]", "\n",
-        "davit: 1", "- ", ": ", "&a", "*a", "configurations:", "coordinator:", "states:", "|", ">", "'", "\"", "é", "\t",
-        "connect", "pcall", "post_conf_state", "_G", "rfsm.",
+        "Configuration",
+        "ConfiguratorConf",
+        "{",
+        "}",
+        "(",
+        ")",
+        "create",
+        "\"A\"",
+        "'_default:running'",
+        ",",
+        "=",
+        "state",
+        "trans",
+        "src",
+        "return",
+        "end",
+        "function",
+        "local",
+        "x",
+        "1",
+        "..",
+        ":undo",
+        "nil",
+        "[",
+        "]",
+        "\n",
+        "davit: 1",
+        "- ",
+        ": ",
+        "&a",
+        "*a",
+        "configurations:",
+        "coordinator:",
+        "states:",
+        "|",
+        ">",
+        "'",
+        "\"",
+        "é",
+        "\t",
+        "connect",
+        "pcall",
+        "post_conf_state",
+        "_G",
+        "rfsm.",
     ]);
     let texts = proptest::collection::vec(words, 0..24).prop_map(|words| words.join(" "));
     let config = ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() };

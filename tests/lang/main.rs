@@ -1,6 +1,6 @@
 //! The languages: the paper's listings, both spellings, typos, hostile files, round trips.
 
 mod helpers;
+mod hostile;
 mod listings;
 mod round_trip;
-mod hostile;

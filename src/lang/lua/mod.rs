@@ -74,7 +74,10 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
     };
     let chunk = lua.load(text).set_name("=davit").set_mode(ChunkMode::Text).set_environment(env);
     // Not `eval`, which tries the text as an expression first: a file never is one.
-    let returned: mlua::Value = chunk.into_function()?.call(())?;
+    shared.borrow_mut().parsing = true;
+    let function = chunk.into_function()?;
+    shared.borrow_mut().parsing = false;
+    let returned: mlua::Value = function.call(())?;
     lua.remove_global_hook();
     lua.remove_hook();
     if matches!(returned, mlua::Value::Nil) {

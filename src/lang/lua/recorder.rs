@@ -55,6 +55,8 @@ pub struct Recorder {
     pub exhausted: Option<Exhausted>,
     /// Names of which it was said already that they are undefined.
     pub undefined: FxHashSet<String>,
+    /// Whether the text is being parsed, not run.
+    pub parsing: bool,
     /// Calls so far on the current line, by constructor.
     line: u32,
     on_line: Vec<(&'static str, u32)>,
@@ -72,6 +74,7 @@ impl Recorder {
             nodes: 0,
             exhausted: None,
             undefined: FxHashSet::default(),
+            parsing: false,
             line: 0,
             on_line: Vec::new(),
         }
@@ -177,8 +180,8 @@ impl Recorder {
             self.cx.report(
                 finding.at(at).help("a configuration file only lists what is to be changed: look for what grows"),
             );
-        } else if is_syntax(error) {
-            if message.contains("C stack overflow") || message.contains("syntax levels") || message.contains("overflow")
+        } else if self.parsing {
+            if message.contains("overflow") || message.contains("levels") || message.contains("error in error handling")
             {
                 let finding = Finding::error(codes::TEXT_TOO_DEEP, format!("nested too deeply: {message}")).at(at);
                 self.cx.refuse(
@@ -199,13 +202,5 @@ impl Recorder {
             let finding = Finding::error(codes::LUA_ERROR, format!("the file fails: {message}")).at(at);
             self.cx.report(finding.help("the message is Lua's own; the file must run to its end once, without errors"));
         }
-    }
-}
-
-fn is_syntax(error: &mlua::Error) -> bool {
-    match error {
-        mlua::Error::SyntaxError { .. } => true,
-        mlua::Error::CallbackError { cause, .. } => is_syntax(cause),
-        _ => false,
     }
 }
