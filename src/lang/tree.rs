@@ -185,12 +185,7 @@ impl Fields {
         let field = self.take(key);
         if field.is_none() {
             // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
-            let misspelt = self
-                .entries
-                .iter()
-                .flatten()
-                .any(|e| !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8);
-            if !misspelt {
+            if !self.misspelt(key) {
                 cx.report(
                     Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.what))
                         .at(self.origin)
@@ -202,10 +197,18 @@ impl Fields {
         field
     }
 
+    /// Whether what is left has a key that is probably meant to be this one.
+    pub fn misspelt(&self, key: &str) -> bool {
+        self.entries
+            .iter()
+            .flatten()
+            .any(|e| !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8)
+    }
+
     /// Reports what was not taken.
     pub fn finish(self, cx: &mut Cx) {
         let Self { what, entries, asked, .. } = self;
-        for entry in entries.into_iter().flatten() {
+        for entry in entries.into_iter().flatten().filter(|e| !matches!(e.value.kind, Kind::Poison)) {
             if asked.contains(&&*entry.key) {
                 cx.report(
                     Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{}` stands twice in {what}", entry.key))

@@ -1,6 +1,6 @@
 //! A deployment in memory, of which one file is replaced.
 
-use davit::diagnostics::{Location, SourceMap};
+use davit::diagnostics::SourceMap;
 use davit::lang::{self, LoadOptions, Loaded, Sources};
 use davit::model::Finding;
 use std::path::Path;
@@ -76,9 +76,4 @@ pub fn shown(findings: &[Finding], sources: &SourceMap) -> String {
 pub fn clean(loaded: &Loaded) {
     assert!(loaded.findings.is_empty(), "{}", shown(&loaded.findings, &loaded.sources));
     assert!(loaded.deployment.is_some() && !loaded.unreadable);
-}
-
-/// Where a finding stands, as text.
-pub fn text_at(sources: &SourceMap, location: &Location) -> String {
-    sources.file(location.file).text[location.span.clone()].to_owned()
 }

@@ -67,7 +67,8 @@ fn memory_bombs_end() {
     // Whichever budget is met first: that depends on how the program was built.
     for text in ["create('A', 'B')", "state {}", "pcall(create, 'A', 'B')", "connect('A.x', 'B.y', { buffer = 1 })"] {
         let codes = lua(&format!("while true do {text} end"));
-        assert!(codes == ["text::too_many_values"] || codes == ["lua::instructions"], "{text}: {codes:?}");
+        let budgets = ["text::too_many_values", "lua::instructions", "lua::memory"];
+        assert!(codes.len() == 1 && budgets.contains(&codes[0].as_str()), "{text}: {codes:?}");
     }
     let shared = "local t = {} for i = 1, 40 do t = { t, t } end property_set('A.k', t)";
     assert!(lua(shared).contains(&"text::too_many_values".to_owned()));

@@ -4,3 +4,4 @@ mod helpers;
 mod hostile;
 mod listings;
 mod round_trip;
+mod typos;

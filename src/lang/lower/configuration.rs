@@ -2,7 +2,7 @@
 
 use super::{Unit, choice, name, text, time, truth, value, whole};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{
     Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, EventName, Finding, Ident, MemberRef,
     OnFailure, Origin, Policy, RunState, StateEntry, Target, TypeName, Value, codes,
@@ -201,7 +201,12 @@ fn state_entry(cx: &mut Cx, who: &str, state: &str, origin: Origin) -> Option<St
         }
         Some(state) => Some(state),
         None => {
-            let help = did_you_mean(state, "states", RunState::NAMES.iter().copied());
+            // Our own names before the field's, which differ from them in a capital letter.
+            let ours = nearest(state, RunState::NAMES[..3].iter().copied());
+            let help = ours.map_or_else(
+                || did_you_mean(state, "states", RunState::NAMES.iter().copied()),
+                |near| format!("did you mean `{near}`?"),
+            );
             cx.report(
                 Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help),
             );

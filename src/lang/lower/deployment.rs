@@ -90,7 +90,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         .and_then(|node| name::<Ident>(cx, &node, "`platform`", "platform: embedded"));
     let libraries = fields.take("libraries").map(|node| libraries(cx, node));
     let types = fields.take("types").map(|node| types::types(cx, node));
-    if libraries.is_none() && types.is_none() {
+    if libraries.is_none() && types.is_none() && !fields.misspelt("types") {
         let _ = fields.required(cx, "libraries", "libraries: [standard]");
     }
     let activities = fields.take("activities").map(|node| activities(cx, node)).unwrap_or_default();

@@ -149,11 +149,8 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
     if let Kind::Str(text) = &node.kind {
         let help = match parse_time(text) {
             Some(seconds) => {
-                let shown = seconds / factor;
-                format!(
-                    "write the number alone: `{}`",
-                    example.replace(char::is_numeric, "#").replace("#.#", "#").replace('#', &shown.to_string())
-                )
+                let key = example.rsplit_once(' ').map_or("", |(key, _)| key);
+                format!("write the number alone: `{key} {}`", seconds / factor)
             }
             None => format!("write it like `{example}`"),
         };

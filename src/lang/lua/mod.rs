@@ -152,6 +152,9 @@ impl Recorder {
                 entries.push(Entry { key: stem.to_owned().into(), origin: value.origin, value });
                 continue;
             }
+            if self.has_undefined() {
+                continue;
+            }
             let finding =
                 Finding::error(codes::CONF_UNNAMED, "this configuration has no name, so nothing can ask for it");
             self.cx.report(finding.at(value.origin).labelled("made, and held by nothing").help(
@@ -163,6 +166,9 @@ impl Recorder {
 
     /// Changes that no configuration holds.
     fn unused(&mut self) {
+        if self.has_undefined() {
+            return;
+        }
         for index in 0..self.made.len() {
             let made = &self.made[index];
             if made.uses == 0 && made.verb != "Configuration" && made.verb != "ConfiguratorConf" {

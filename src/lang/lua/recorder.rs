@@ -136,6 +136,11 @@ impl Recorder {
         node
     }
 
+    /// Whether the file uses names that are not defined. What they should have held is lost, and no news.
+    pub fn has_undefined(&self) -> bool {
+        self.undefined.iter().any(|name| !name.starts_with('\0'))
+    }
+
     /// Counts nodes; answers whether there are too many.
     pub fn count(&mut self, nodes: usize, line: u32) -> bool {
         self.nodes += nodes;
@@ -196,7 +201,7 @@ impl Recorder {
             }
         } else {
             // A name that is not defined makes other errors in its wake; the finding about it says enough.
-            if !self.undefined.is_empty() && message.contains("light userdata") {
+            if self.has_undefined() && message.contains("light userdata") {
                 return;
             }
             let finding = Finding::error(codes::LUA_ERROR, format!("the file fails: {message}")).at(at);

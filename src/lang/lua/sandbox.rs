@@ -318,6 +318,7 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
             let finding =
                 Finding::error(codes::LUA_UNDEFINED, format!("`{name}` is not defined for what a constructor made"));
             recorder.cx.report(finding.at(origin).help("the only one is `operation_call(…):undo(…)`"));
+            recorder.undefined.insert(name);
             Ok(convert::poison())
         })?,
     )?;
