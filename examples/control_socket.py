@@ -4,7 +4,7 @@
     davit deploy deployments/youbot_arm.yaml --detach
     python3 examples/control_socket.py youbot_arm e_5dof
 
-Prints the status, raises the event given (if one is), and then shows what happens until it has been quiet for a while.
+Prints the status, raises the event given (if one is), and then shows what happens for a while.
 Only the standard library is used: the protocol is one JSON object a line.
 """
 
@@ -14,6 +14,7 @@ import os
 import socket
 import sys
 import tempfile
+import time
 
 
 def socket_path(name):
@@ -54,12 +55,13 @@ class Deployment:
         return json.loads(line)
 
     def listen(self, seconds):
-        """Yields notifications until none came for `seconds`."""
-        self.socket.settimeout(seconds)
-        while True:
+        """Yields notifications for so many seconds."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
             if self.waiting:
                 yield self.waiting.pop(0)
                 continue
+            self.socket.settimeout(max(0.01, end - time.monotonic()))
             try:
                 yield self.read()
             except (TimeoutError, EOFError, OSError):
@@ -70,7 +72,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("name", help="the deployment's name")
     parser.add_argument("event", nargs="?", help="an event to raise")
-    parser.add_argument("--listen", type=float, default=1.0, help="stop after so many quiet seconds (default 1)")
+    parser.add_argument("--listen", type=float, default=1.0, help="for how many seconds (default 1)")
     arguments = parser.parse_args()
 
     try:

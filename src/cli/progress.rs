@@ -68,11 +68,13 @@ impl Progress {
         let time = out.paint(Style::Dim, format!("{:>9.3} s", at.as_secs_f64()));
         match what {
             Happening::Requested { ask, by, .. } => {
-                self.bar.enable_steady_tick(std::time::Duration::from_millis(100));
+                self.bar.reset();
                 self.bar.set_message(format!("{ask} (asked by {by})"));
+                self.bar.enable_steady_tick(std::time::Duration::from_millis(100));
             }
             Happening::Answered(answer) => {
-                self.bar.set_message(String::new());
+                self.bar.disable_steady_tick();
+                self.bar.finish_and_clear();
                 let (mark, style) = if answer.ok { ("ok", Style::Good) } else { ("no", Style::Bad) };
                 self.line(format!(
                     "{time}  {}  {:<28} {:>9}  {:>9}",

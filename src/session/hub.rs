@@ -151,8 +151,7 @@ impl Hub {
         for observer in observers {
             observer(now, &what);
         }
-        self.changed.notify();
-        self.outside.notify_all();
+        self.wake();
     }
 
     /// From now on everything that happens is told to `observer`.
@@ -173,17 +172,32 @@ impl Hub {
         id
     }
 
-    /// A request was answered.
+    /// A request was answered. It stays outstanding until it is [settled](Self::settled), when whoever asked has been told.
     pub fn answered(&self, answered: Answered) {
         {
             let mut state = self.lock();
-            state.outstanding.remove(&RequestId(answered.request));
             if state.answers.len() == limits::HEARD {
                 state.answers.pop_front();
             }
             state.answers.push_back(answered.clone());
         }
         self.note(Happening::Answered(answered));
+    }
+
+    /// The answer to a request has been delivered.
+    pub fn settled(&self, request: RequestId) {
+        {
+            let mut state = self.lock();
+            state.outstanding.remove(&request);
+            state.epoch += 1;
+        }
+        self.wake();
+    }
+
+    /// Lets everybody who waits look again.
+    pub fn wake(&self) {
+        self.changed.notify();
+        self.outside.notify_all();
     }
 
     /// A component failed, or its call does not return.

@@ -14,7 +14,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 /// What answers the calls.
@@ -52,9 +52,33 @@ impl Subscribers {
     }
 }
 
-/// A listening control socket; dropping it closes and removes it.
+/// Calls that are being answered.
+#[derive(Default)]
+struct Calls {
+    open: Mutex<usize>,
+    ended: Condvar,
+}
+
+impl Calls {
+    fn run<T>(&self, call: impl FnOnce() -> T) -> T {
+        *self.open.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        let result = call();
+        *self.open.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+        self.ended.notify_all();
+        result
+    }
+
+    /// Waits until all are answered, at most as long as writing to a client may take.
+    fn finish(&self) {
+        let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        let _ = self.ended.wait_timeout_while(open, limits::SOCKET_WRITE, |open| *open > 0);
+    }
+}
+
+/// A listening control socket; dropping it lets the calls under way be answered, closes and removes it.
 pub struct ControlSocket {
     path: PathBuf,
+    calls: Arc<Calls>,
     stop: Arc<AtomicBool>,
     subscribers: Arc<Subscribers>,
     accepting: Option<JoinHandle<()>>,
@@ -97,14 +121,15 @@ impl ControlSocket {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let stop = Arc::new(AtomicBool::new(false));
         let subscribers = Arc::new(Subscribers::default());
+        let calls = Arc::new(Calls::default());
         let accepting = {
-            let (stop, subscribers) = (stop.clone(), subscribers.clone());
+            let (stop, subscribers, calls) = (stop.clone(), subscribers.clone(), calls.clone());
             std::thread::Builder::new()
                 .name("davit-socket".to_owned())
-                .spawn(move || accept(&listener, &stop, &subscribers, &service))
+                .spawn(move || accept(&listener, &stop, &subscribers, &calls, &service))
                 .map_err(io)?
         };
-        Ok(Self { path, stop, subscribers, accepting: Some(accepting) })
+        Ok(Self { path, calls, stop, subscribers, accepting: Some(accepting) })
     }
 
     /// Where it listens.
@@ -133,6 +158,7 @@ impl Drop for ControlSocket {
         if let Some(thread) = self.accepting.take() {
             let _ = thread.join();
         }
+        self.calls.finish();
     }
 }
 
@@ -150,8 +176,9 @@ fn accept(listener: &UnixListener, stop: &Arc<AtomicBool>, subscribers: &Arc<Sub
             continue;
         }
         let (subscribers, service, counter) = (subscribers.clone(), service.clone(), open.clone());
+        let calls = calls.clone();
         let serving = std::thread::Builder::new().name("davit-client".to_owned()).spawn(move || {
-            let _ = serve(stream, &subscribers, &*service);
+            let _ = serve(stream, &subscribers, &calls, &*service);
             counter.fetch_sub(1, Ordering::AcqRel);
         });
         if serving.is_err() {
@@ -161,7 +188,7 @@ fn accept(listener: &UnixListener, stop: &Arc<AtomicBool>, subscribers: &Arc<Sub
 }
 
 /// Answers the calls of one connection until it closes.
-fn serve(stream: UnixStream, subscribers: &Subscribers, service: &dyn Service) -> io::Result<()> {
+fn serve(stream: UnixStream, subscribers: &Subscribers, calls: &Calls, service: &dyn Service) -> io::Result<()> {
     let writer = Arc::new(Mutex::new(stream.try_clone()?));
     // A client that does not read must not hold a thread for ever.
     stream.set_write_timeout(Some(limits::SOCKET_WRITE))?;
@@ -192,12 +219,10 @@ fn serve(stream: UnixStream, subscribers: &Subscribers, service: &dyn Service) -
                     send(&writer, &rpc::answer(id, Ok(Json::Bool(true))))?;
                 }
             }
-            Ok(call) => {
+            Ok(call) => calls.run(|| {
                 let result = service.call(&call.method, &call.params);
-                if let Some(id) = &call.id {
-                    send(&writer, &rpc::answer(id, result))?;
-                }
-            }
+                call.id.as_ref().map_or(Ok(()), |id| send(&writer, &rpc::answer(id, result)))
+            })?,
             Err(error) => send(&writer, &rpc::answer(&Json::Null, Err(error)))?,
         }
     }

@@ -198,7 +198,7 @@ impl Session {
 
     pub(super) fn set_ended(&self, ended: &Ended) {
         *lock(&self.ended) = Some(ended.clone());
-        self.hub.set_phase(ended.phase);
+        self.hub.wake();
     }
 
     fn view(&self, system: bool) -> Option<Arc<View>> {
@@ -449,18 +449,6 @@ fn on_progress(steps: &Steps, progress: &Progress) {
 /// An answer becomes an event for whoever asked.
 fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &Answer) {
     let event = answer.event();
-    // Delivered first: who sees that all is answered also sees that the coordinator has something to react to.
-    if let Requester::Coordinator(_) = answer.request.requester
-        && let Some(coordinator) = lock(&junction.coordinator).clone()
-    {
-        let (owner, visit) = answer.request.tag;
-        let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
-        let incoming = match (owner, u32::try_from(visit)) {
-            (Some(owner), Ok(visit)) => Incoming::answer(event, Tag { owner, visit }),
-            _ => Incoming::control(event),
-        };
-        let _ = coordinator.deliver(incoming);
-    }
     let reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
     hub.answered(Answered {
         request: answer.request.id.0,
@@ -472,6 +460,19 @@ fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &Answer) {
         reasons,
         steps: std::mem::take(&mut *lock(steps)),
     });
+    if let Requester::Coordinator(_) = answer.request.requester
+        && let Some(coordinator) = lock(&junction.coordinator).clone()
+    {
+        let (owner, visit) = answer.request.tag;
+        let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
+        let incoming = match (owner, u32::try_from(visit)) {
+            (Some(owner), Ok(visit)) => Incoming::answer(event, Tag { owner, visit }),
+            _ => Incoming::control(event),
+        };
+        let _ = coordinator.deliver(incoming);
+    }
+    // Only now: who sees that all is answered also sees that the coordinator has something to react to.
+    hub.settled(answer.request.id);
 }
 
 /// What the platform reports becomes an event; a fault is told as `COMPONENT.faulted`.
