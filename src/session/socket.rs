@@ -162,7 +162,13 @@ impl Drop for ControlSocket {
     }
 }
 
-fn accept(listener: &UnixListener, stop: &Arc<AtomicBool>, subscribers: &Arc<Subscribers>, service: &Arc<dyn Service>) {
+fn accept(
+    listener: &UnixListener,
+    stop: &Arc<AtomicBool>,
+    subscribers: &Arc<Subscribers>,
+    calls: &Arc<Calls>,
+    service: &Arc<dyn Service>,
+) {
     let open = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
         if stop.load(Ordering::Acquire) {
