@@ -105,6 +105,8 @@ pub(super) struct EdgeRow {
     pub tgt: u32,
     /// The least common ancestor: it is neither left nor entered.
     pub lca: u32,
+    /// How many states from the root inwards stay active: those down to the least common ancestor.
+    pub keep: u32,
     /// Triggered by any event.
     pub null: bool,
     /// Events that trigger it, sorted by id.

@@ -457,10 +457,12 @@ impl<'m> Builder<'m> {
         chart.unguarded &= guard.is_none() && predicates.len == 0;
         chart.edge_origins.push(transition.origin);
         chart.priorities.push(transition.pn);
+        let lca = self.least_common_ancestor(src, tgt);
         chart.edges.push(EdgeRow {
             src,
             tgt,
-            lca: self.least_common_ancestor(src, tgt),
+            lca,
+            keep: self.depths[lca as usize] + 1,
             null: transition.events.is_empty(),
             events: Span { start: first_event, len: len(&chart.triggers) - first_event },
             predicates,

@@ -3,7 +3,7 @@
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
 use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
-use super::search::{Around, Search};
+use super::search::{Around, Search, Straight};
 use crate::limits;
 use crate::time::Time;
 
@@ -351,6 +351,19 @@ impl Machine {
             if chart.nodes[node.index()].out.len == 0 {
                 continue;
             }
+            // By far the most transitions lead from a state straight to a leaf; these need no tree of ways.
+            if chart.unguarded {
+                match self.search.straight(chart, node.0, &self.events) {
+                    Straight::None => continue,
+                    Straight::Leaf(edge) => {
+                        hook.taking(chart, EdgeId(edge));
+                        let row = &chart.edges[edge as usize];
+                        self.segment(chart, edge, NodeId(row.lca), now, hook);
+                        return Step::Taken;
+                    }
+                    Straight::Unclear => (),
+                }
+            }
             let way = self.find(chart, node.0, hook);
             if way != NONE {
                 self.execute(chart, way, now, hook);
@@ -387,19 +400,11 @@ impl Machine {
         let owner = self.owner_of(chart, way);
         loop {
             let taken = self.search.ways[way as usize];
-            let edge = &chart.edges[taken.edge as usize];
             hook.taking(chart, EdgeId(taken.edge));
-            let keep = chart.nodes[edge.lca as usize].depth as usize + 1;
-            while self.path.len() > keep {
-                self.exit(chart, owner, hook);
-            }
-            self.act(chart, edge.effect, Place::Effect(EdgeId(taken.edge)), owner, hook);
-            let target = &chart.nodes[edge.tgt as usize];
-            let ends_at_connector = target.kind == Kind::Connector;
-            self.enter_down_to(chart, if ends_at_connector { target.parent } else { edge.tgt }, now, hook);
-            if !ends_at_connector {
+            if self.segment(chart, taken.edge, owner, now, hook) {
                 return;
             }
+            let edge = &chart.edges[taken.edge as usize];
             way = taken.then;
             if self.search.ways[way as usize].other != NONE {
                 let ways = &self.search.ways;
@@ -412,6 +417,27 @@ impl Machine {
                 hook.conflict(chart, NodeId(edge.tgt), &mut all);
             }
         }
+    }
+
+    /// Takes one transition: exits, effect, entries. Answers whether it ended in a leaf.
+    fn segment(&mut self, chart: &Chart, edge: u32, owner: NodeId, now: Time, hook: &mut impl Hook) -> bool {
+        let row = &chart.edges[edge as usize];
+        let keep = row.keep as usize;
+        while self.path.len() > keep {
+            self.exit(chart, owner, hook);
+        }
+        if row.effect.len > 0 {
+            self.act(chart, row.effect, Place::Effect(EdgeId(edge)), owner, hook);
+        }
+        let target = &chart.nodes[row.tgt as usize];
+        let into = if target.kind == Kind::Connector { target.parent } else { row.tgt };
+        let depth = chart.nodes[into as usize].depth as usize;
+        if depth == keep {
+            self.enter(chart, NodeId(into), now, hook);
+        } else if depth > keep {
+            self.enter_down_to(chart, into, now, hook);
+        }
+        target.kind != Kind::Connector
     }
 
     /// Who owns what the exits and effects of the path raise: the outermost of its least common ancestors, which stays

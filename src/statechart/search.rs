@@ -49,7 +49,34 @@ impl Around<'_> {
     }
 }
 
+/// The first look at a state's transitions.
+pub(super) enum Straight {
+    /// None of them is enabled.
+    None,
+    /// This one is taken: it leads to a leaf.
+    Leaf(u32),
+    /// The first that is enabled leads to a connector: it must be searched.
+    Unclear,
+}
+
 impl Search {
+    /// Whether the first enabled transition of `node` needs no search. Only for charts without guards.
+    pub fn straight(&mut self, chart: &Chart, node: u32, events: &[EventId]) -> Straight {
+        for edge in chart.nodes[node as usize].out.ids() {
+            self.work += 1;
+            let row = &chart.edges[edge as usize];
+            let listed = row.events.of(&chart.triggers);
+            if row.null || events.iter().any(|event| lists(listed, *event)) {
+                match chart.nodes[row.tgt as usize].kind {
+                    Kind::Leaf => return Straight::Leaf(edge),
+                    Kind::Connector => return Straight::Unclear,
+                    Kind::Composite => (),
+                }
+            }
+        }
+        Straight::None
+    }
+
     pub fn new(chart: &Chart) -> Self {
         let memo = if chart.unguarded { vec![(0, NONE); chart.nodes.len()] } else { Vec::new() };
         // One more for the segment that leaves a state: without guards its search stops at the first way.
