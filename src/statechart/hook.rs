@@ -1,7 +1,7 @@
 //! What a machine calls: functions of a model that has some, and whoever wants to see what happens.
 
 use super::chart::{Chart, NodeId};
-use super::machine::Queue;
+use super::queue::Queue;
 use super::{EdgeId, EventId};
 use crate::model::names::EventName;
 use crate::model::statechart::FunctionId;

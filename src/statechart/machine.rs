@@ -3,43 +3,10 @@
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
 use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
+use super::queue::Queue;
 use super::search::{Around, Search, Straight};
 use crate::limits;
 use crate::time::Time;
-
-/// Events on their way to the next step, bounded.
-#[derive(Debug, Clone)]
-pub struct Queue {
-    events: Vec<EventId>,
-    dropped: u64,
-}
-
-impl Queue {
-    fn new() -> Self {
-        Self { events: Vec::with_capacity(limits::CHART_QUEUE), dropped: 0 }
-    }
-
-    /// Appends an event; `false`: the queue is full, and the event is dropped and counted.
-    pub fn push(&mut self, event: EventId) -> bool {
-        let room = self.events.len() < limits::CHART_QUEUE;
-        if room {
-            self.events.push(event);
-        } else {
-            self.dropped += 1;
-        }
-        room
-    }
-
-    /// The events, oldest first.
-    pub fn events(&self) -> &[EventId] {
-        &self.events
-    }
-
-    /// How many events found no room so far.
-    pub fn dropped(&self) -> u64 {
-        self.dropped
-    }
-}
 
 /// The mode of the active leaf.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]

@@ -12,7 +12,7 @@
 use super::EdgeId;
 use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
 use super::hook::{Hook, View};
-use super::machine::Queue;
+use super::queue::Queue;
 use crate::limits;
 
 /// One way on from a node: a transition and, if it ends at a connector, the ways on from there.
