@@ -15,7 +15,7 @@ mod world;
 use crate::model::codes::{
     CLASH, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED,
 };
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, finding};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Severity, finding};
 use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
@@ -84,7 +84,10 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
             findings.extend(unasked(deployment, &product));
             traced.extend(exploration.findings);
             traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
-            for (finding, way) in traced {
+            for (mut finding, way) in traced {
+                if !chart.is_pure() && finding.severity == Severity::Error {
+                    finding.severity = Severity::Warning;
+                }
                 if findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
                     continue;
                 }

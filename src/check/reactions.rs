@@ -3,8 +3,9 @@
 //! In a pure coordinator at rest the active leaf is all there is to know, so that is all the state that is kept of it.
 
 use super::coordinator::ask_of;
+use crate::model::statechart::FunctionId;
 use crate::model::{Ask, Deployment, EventName};
-use crate::statechart::{Chart, EventId, Hook, Machine, NodeId, Raised};
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
@@ -141,8 +142,21 @@ impl Hook for Watch<'_> {
         }
     }
 
-    fn taking(&mut self, _: &Chart, _: crate::statechart::EdgeId) {
+    fn taking(&mut self, _: &Chart, _: EdgeId) {
         self.taken = true;
+    }
+
+    // What a function decides is not known: it is taken to let everything pass, and what is found then is a warning.
+    fn guard(&mut self, _: FunctionId, _: EdgeId, _: &mut View<'_>) -> bool {
+        true
+    }
+
+    fn predicate(&mut self, _: FunctionId, _: EventId, _: &mut View<'_>) -> bool {
+        true
+    }
+
+    fn doo(&mut self, _: FunctionId, _: NodeId, _: &mut View<'_>) -> Doo {
+        Doo::Finished
     }
 
     fn raised(&mut self, _: &Chart, raised: Raised) {

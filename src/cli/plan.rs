@@ -122,7 +122,17 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
         let Some(configuration) = deployment.configuration(id) else { continue };
         let request =
             Request::Push { configuration, requester: Requester::Operator, at: Time::default(), active: false };
-        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
+        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| {
+            let mut findings = refusal.findings;
+            if let Some(first) = findings.first_mut().filter(|_| names.is_empty()) {
+                let help = first.help.take().map_or_else(String::new, |help| format!("{help}; "));
+                first.help = Some(format!(
+                    "{help}without names, all configurations are planned in the order they are written: name those you \
+                     mean, or follow the coordinator with `--bringup`"
+                ));
+            }
+            findings
+        })?;
         for planned in &transaction.steps {
             step::effect(&planned.step, &mut system);
         }

@@ -122,3 +122,94 @@ pub fn layout(picture: &Picture) -> Layout {
     };
     Layout { nodes, routes, size }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::picture::{Edge, Node, Subject};
+
+    fn overlap(a: &Rect, b: &Rect) -> bool {
+        let slack = 0.01;
+        a.x + a.w > b.x + slack && b.x + b.w > a.x + slack && a.y + a.h > b.y + slack && b.y + b.h > a.y + slack
+    }
+
+    fn inside(a: &Rect, b: &Rect) -> bool {
+        let slack = 0.01;
+        a.x >= b.x - slack && a.y >= b.y - slack && a.x + a.w <= b.x + b.w + slack && a.y + a.h <= b.y + b.h + slack
+    }
+
+    /// A picture from a seed: groups in groups, edges between any two nodes, labels, loops.
+    fn picture(seed: u64) -> Picture {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut next = |n: usize| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 33) as usize % n
+        };
+        let direction = if next(2) == 0 { Direction::Down } else { Direction::Right };
+        let mut picture = Picture::new(Subject::Plan, direction, "seeded");
+        let count = 2 + next(18);
+        for i in 0..count {
+            let mut node = Node::new(format!("n{i}"), "x".repeat(1 + next(14)));
+            node.shape = if next(3) == 0 { Shape::Group } else { Shape::Box };
+            let groups: Vec<usize> = (0..i).filter(|g| picture.nodes[*g].shape == Shape::Group).collect();
+            if !groups.is_empty() && next(2) == 0 {
+                node.parent = Some(groups[next(groups.len())]);
+            }
+            picture.add(node);
+        }
+        for _ in 0..next(2 * count) {
+            let mut edge = Edge::new(next(count), next(count));
+            edge.label = (0..next(3)).map(|_| "label".repeat(1 + next(3))).collect();
+            picture.edges.push(edge);
+        }
+        picture
+    }
+
+    #[test]
+    fn nothing_overlaps_and_everything_is_inside_its_group() {
+        for seed in 0..400 {
+            let picture = picture(seed);
+            let Layout { nodes, routes, size } = layout(&picture);
+            let all = Rect { x: 0.0, y: 0.0, w: size.0, h: size.1 };
+            for (i, node) in picture.nodes.iter().enumerate() {
+                let around = node.parent.map_or(all, |p| nodes[p]);
+                assert!(inside(&nodes[i], &around), "seed {seed}: node {i} {:?} in {around:?}", nodes[i]);
+                for j in 0..i {
+                    let siblings = picture.nodes[j].parent == node.parent;
+                    assert!(!siblings || !overlap(&nodes[i], &nodes[j]), "seed {seed}: nodes {j} and {i}");
+                }
+            }
+            let labels: Vec<(usize, Rect)> =
+                routes.iter().enumerate().filter_map(|(i, r)| Some((i, r.label?))).collect();
+            for (k, (i, label)) in labels.iter().enumerate() {
+                for (j, other) in &labels[..k] {
+                    assert!(!overlap(label, other), "seed {seed}: labels of edges {j} and {i}");
+                }
+                for (n, node) in picture.nodes.iter().enumerate() {
+                    let leaf = picture.children(Some(n)).next().is_none();
+                    assert!(
+                        node.shape == Shape::Group && !leaf || !overlap(label, &nodes[n]),
+                        "seed {seed}: label {i} on {n}"
+                    );
+                }
+            }
+            for (edge, route) in picture.edges.iter().zip(&routes) {
+                assert!(route.looped.is_some() || route.runs.len() > 1, "seed {seed}: {edge:?} is not drawn");
+            }
+        }
+    }
+
+    #[test]
+    fn many_components_are_laid_out_all_the_same() {
+        let mut picture = Picture::new(Subject::Components, Direction::Right, "chain");
+        for i in 0..3_000 {
+            picture.add(Node::new(format!("n{i}"), format!("n{i}")));
+            if i > 0 {
+                picture.edges.push(Edge::new(i - 1, i));
+            }
+        }
+        assert_eq!(layout(&picture).nodes.len(), 3_000);
+    }
+}
