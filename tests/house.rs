@@ -7,6 +7,13 @@ use std::path::{Path, PathBuf};
 /// A file past this is a sign that a second idea lives in it.
 const LINES: usize = 500;
 
+/// The same for tests, which may be long lists of cases.
+const TEST_LINES: usize = 1000;
+
+/// Files outside `time` that may read the clock, each with the reason.
+const CLOCK_READERS: &[(&str, &str)] =
+    &[("src/lang/lua/sandbox.rs", "a budget against hostile files: library calls can only be timed")];
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -227,7 +234,7 @@ fn files_hold_one_idea() {
     let long: Vec<String> = sources("src")
         .into_iter()
         .chain(sources("tests"))
-        .filter(|(_, text)| text.lines().count() > LINES)
+        .filter(|(file, text)| text.lines().count() > if file.starts_with("tests/") { TEST_LINES } else { LINES })
         // A list of pages is one idea however long it gets.
         .filter(|(file, _)| file != "src/model/codes.rs")
         .map(|(file, text)| format!("{file}: {} lines", text.lines().count()))
@@ -273,7 +280,7 @@ fn nothing_is_left_undone_and_no_machine_is_named() {
 fn time_is_read_in_one_room() {
     let mut wrong = Vec::new();
     for (file, text) in sources("src") {
-        if room_of(&file) == "time" {
+        if room_of(&file) == "time" || CLOCK_READERS.iter().any(|(reader, _)| file == *reader) {
             continue;
         }
         for (i, line) in code_lines(&text).iter().enumerate() {

@@ -215,12 +215,18 @@ impl<'a> Check<'a> {
             );
         }
         let Some(description) = self.catalogue.get(ty) else {
-            let known = self.catalogue.iter().map(|ty| ty.name.as_str());
+            let known: Vec<&str> = self.catalogue.iter().map(|ty| ty.name.as_str()).collect();
+            // A library's prefix too many or too few is the likeliest slip.
+            let own = |name: &str| name.rsplit('.').next().map(str::to_owned);
+            let help = match known.iter().find(|name| own(name) == own(ty.as_str())) {
+                Some(name) => format!("did you mean `{name}`?"),
+                None => did_you_mean(ty.as_str(), "types", known),
+            };
             self.add(
                 Finding::error(UNKNOWN_TYPE, format!("there is no component type `{ty}`"))
                     .at(at)
                     .labelled(format!("{component} would be one"))
-                    .help(did_you_mean(ty.as_str(), "types", known)),
+                    .help(help),
             );
             return;
         };

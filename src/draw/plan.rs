@@ -6,8 +6,8 @@ use crate::plan::{PlannedStep, Stage};
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
 
-/// Plans up to this many stand in a row, joined by arrows; more are numbered and fill rows, or the picture would be a
-/// ribbon.
+/// Plans up to this many stand in a row, joined by arrows; more are numbered and stand one below the other, or the
+/// picture would be a ribbon.
 const ROW: usize = 3;
 
 /// What plans look like that are carried out one after the other, each with a heading.

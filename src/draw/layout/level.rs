@@ -5,7 +5,7 @@ use super::order::{Segment, order};
 use super::place::{Tie, place};
 use super::rank::ranks;
 use super::{LINE, Run, header, label_size, text_size};
-use crate::draw::picture::{Direction, Picture, Shape};
+use crate::draw::picture::{Direction, Picture, Shape, Subject};
 use std::collections::BTreeMap;
 
 /// The place of an item in its level: its start and its extent, along and across.
@@ -148,7 +148,11 @@ impl<'a> Levels<'a> {
                 (None, None) => {}
             }
         }
-        let rank = ranks(items.len(), &inner.iter().map(|(_, a, b)| (*a, *b)).collect::<Vec<_>>());
+        let mut rank = ranks(items.len(), &inner.iter().map(|(_, a, b)| (*a, *b)).collect::<Vec<_>>());
+        // Plans without arrows between them stand one below the other, as they are read.
+        if level.is_none() && picture.subject == Subject::Plan && inner.is_empty() {
+            rank.fill(0);
+        }
         let layer_count = layer_count(&rank);
         let layer_of = |i: usize| rank[i] * 2 + 2;
 
