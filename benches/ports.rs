@@ -157,7 +157,7 @@ fn chain(n: usize) -> (Vec<Step>, Vec<Step>) {
     let names: Vec<ComponentName> = (0..n).map(|i| ComponentName::new(&format!("gain_{i}")).unwrap()).collect();
     let (u, y) = (ident("u"), ident("y"));
     let (mut up, mut down) = (Vec::new(), Vec::new());
-    up.extend(names.iter().map(|name| create(*name, "Gain", vec![Value::Float(1.0)])));
+    up.extend(names.iter().map(|name| create(*name, "standard.Gain", vec![Value::Float(1.0)])));
     for pair in names.windows(2) {
         let (from, to) = (pair[0].member(y), pair[1].member(u));
         up.push(Step::Connect { from, to, policy: Policy::Data });

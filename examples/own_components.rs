@@ -1,7 +1,7 @@
 //! A program of one's own with components of one's own: all of `davit`, and a library beside the built-in ones.
 //!
 //! ```sh
-//! cargo run --example own_components -- types LowPass
+//! cargo run --example own_components -- types mine.LowPass
 //! cargo run --example own_components -- check examples/own_components/deployment.yaml
 //! cargo run --example own_components -- deploy examples/own_components/deployment.yaml
 //! ```
@@ -44,6 +44,6 @@ impl Component for LowPass {
 }
 
 fn main() -> std::process::ExitCode {
-    let mine = Library::new("mine").with::<LowPass>("LowPass");
+    let mine = Library::new("mine").with::<LowPass>("mine.LowPass");
     davit::cli::main(libraries::builtin().with(mine))
 }

@@ -1,9 +1,9 @@
--- The whole story of one robot of the coupling, in simulated time:  davit run examples/youbot_story.lua
+-- The whole story of one robot of the coupling, in simulated time:  davit run examples/youbot_story.lua --clock simulated
 --
 -- Bring-up from nothing; the link is found good; the operator brings the arms together; the coupling engages; eight
 -- degrees of freedom, then five, then eight again; one frame undone by hand; down to nothing.
 
-deploy("deployments/youbot_arm.yaml")
+deploy("../deployments/youbot_arm.yaml")
 wait_state("operational", 20)
 
 wait_state("harmonizing", 5)            -- the link has been good for a second

@@ -157,7 +157,10 @@ impl Session {
     fn finish(&self, forced: Vec<String>) -> Ended {
         self.detach_coordinator();
         let left = self.left_over();
-        self.stop_threads();
+        // With something left the configurator stays, as long as the session: when a call returns late, it cleans up.
+        if left.is_empty() {
+            self.stop_threads();
+        }
         let phase = if left.is_empty() { Phase::Down } else { Phase::Broken };
         self.hub().set_phase(phase);
         Ended { phase, forced, left }

@@ -265,7 +265,7 @@ fn a_hook_that_comes_back_late_leaves_nothing() {
         ("cleanup", vec!["configure", "cleanup"]),
     ] {
         let b = bench(library());
-        b.create("source", "Constant", "fast", &[]);
+        b.create("source", "standard.Constant", "fast", &[]);
         b.create("h", "Hooked", "fast", &[("late", Value::str(hook)), ("takes_ms", Value::Int(3_000))]);
         b.connect("source.y", "h.u", Policy::Data);
         b.start(&["source"]);

@@ -60,13 +60,13 @@ fn f(v: f64) -> Value {
 
 #[test]
 fn sources() {
-    let b = with_recorder("Constant");
-    b.create("c", "Constant", "fast", &[("value", f(2.5))]);
+    let b = with_recorder("standard.Constant");
+    b.create("c", "standard.Constant", "fast", &[("value", f(2.5))]);
     let found = record(&b, &["c"], "c.y", 5);
     assert_eq!(found, [2.5; 5]);
 
-    let b = with_recorder("Ramp");
-    b.create("r", "Ramp", "fast", &[("offset", f(1.0)), ("slope", f(-3.0))]);
+    let b = with_recorder("standard.Ramp");
+    b.create("r", "standard.Ramp", "fast", &[("offset", f(1.0)), ("slope", f(-3.0))]);
     let found = record(&b, &["r"], "r.y", 200);
     assert_eq!(found.len(), 200);
     near(&found, |i| 1.0 - 3.0 * i as f64 * 1e-3);
@@ -76,32 +76,32 @@ fn sources() {
     b.wait(MS);
     assert_eq!(recorded(&b).last(), Some(&1.0));
 
-    let b = with_recorder("Sine");
+    let b = with_recorder("standard.Sine");
     let values = [("amplitude", f(2.0)), ("frequency", f(5.0)), ("phase", f(0.3)), ("offset", f(-1.0))];
-    b.create("s", "Sine", "fast", &values);
+    b.create("s", "standard.Sine", "fast", &values);
     let found = record(&b, &["s"], "s.y", 500);
     near(&found, |i| -1.0 + 2.0 * (std::f64::consts::TAU * 5.0 * i as f64 * 1e-3 + 0.3).sin());
 }
 
 #[test]
 fn arithmetic() {
-    let b = with_recorder("Gain");
-    b.create("g", "Gain", "fast", &[("k", f(-2.0))]);
+    let b = with_recorder("standard.Gain");
+    b.create("g", "standard.Gain", "fast", &[("k", f(-2.0))]);
     b.start(&["g"]);
     b.wait(MS * 3);
     b.write("g.u", 1.5);
     assert_eq!(record(&b, &["g"], "g.y", 3), [-3.0; 3]);
 
-    let b = with_recorder("Sum");
-    b.create("s", "Sum", "fast", &[("gains", Value::floats(&[1.0, -1.0, 10.0, 100.0]))]);
+    let b = with_recorder("standard.Sum");
+    b.create("s", "standard.Sum", "fast", &[("gains", Value::floats(&[1.0, -1.0, 10.0, 100.0]))]);
     b.write("s.u1", 5.0);
     b.write("s.u2", 2.0);
     b.write("s.u4", 1.0);
     assert_eq!(record(&b, &["s"], "s.y", 2), [103.0; 2]);
 
-    let b = with_recorder("Saturation");
-    b.create("r", "Ramp", "fast", &[("offset", f(-2.0)), ("slope", f(1000.0))]);
-    b.create("s", "Saturation", "fast", &[]);
+    let b = with_recorder("standard.Saturation");
+    b.create("r", "standard.Ramp", "fast", &[("offset", f(-2.0)), ("slope", f(1000.0))]);
+    b.create("s", "standard.Saturation", "fast", &[]);
     b.connect("r.y", "s.u", Policy::Data);
     assert_eq!(record(&b, &["r", "s"], "s.y", 5), [-1.0, -1.0, 0.0, 1.0, 1.0]);
     // Limits in the wrong order: the lower one wins.
@@ -112,7 +112,7 @@ fn arithmetic() {
 
 #[test]
 fn nothing_written_gives_nothing() {
-    for ty in ["Gain", "Sum", "Saturation"] {
+    for ty in ["standard.Gain", "standard.Sum", "standard.Saturation"] {
         let b = with_recorder(ty);
         b.create("c", ty, "fast", &[]);
         assert_eq!(record(&b, &["c"], "c.y", 5), [] as [f64; 0], "{ty}");
@@ -122,10 +122,10 @@ fn nothing_written_gives_nothing() {
 #[test]
 fn pid_follows_its_formula() {
     let (kp, ki, kd, tf, h) = (2.0, 30.0, 0.05, 0.004, 1e-3);
-    let b = with_recorder("Pid");
+    let b = with_recorder("standard.Pid");
     let values = [("kp", f(kp)), ("ki", f(ki)), ("kd", f(kd)), ("tf", f(tf)), ("lower", f(-1.5)), ("upper", f(1.2))];
-    b.create("p", "Pid", "fast", &values);
-    b.create("m", "Sine", "fast", &[("frequency", f(7.0)), ("amplitude", f(0.4))]);
+    b.create("p", "standard.Pid", "fast", &values);
+    b.create("m", "standard.Sine", "fast", &[("frequency", f(7.0)), ("amplitude", f(0.4))]);
     b.write("p.setpoint", 0.3);
     b.write("p.feedforward", 0.1);
     b.connect("m.y", "p.measured", Policy::Data);
@@ -157,8 +157,8 @@ fn pid_follows_its_formula() {
 
 #[test]
 fn pid_does_not_wind_up_and_can_be_reset() {
-    let b = with_recorder("Pid");
-    b.create("p", "Pid", "fast", &[("kp", f(0.0)), ("ki", f(100.0)), ("lower", f(-1.0)), ("upper", f(1.0))]);
+    let b = with_recorder("standard.Pid");
+    b.create("p", "standard.Pid", "fast", &[("kp", f(0.0)), ("ki", f(100.0)), ("lower", f(-1.0)), ("upper", f(1.0))]);
     b.write("p.setpoint", 1.0);
     b.write("p.measured", 0.0);
     let found = record(&b, &["p"], "p.command", 1000);
@@ -176,10 +176,10 @@ fn pid_does_not_wind_up_and_can_be_reset() {
 
 #[test]
 fn threshold_has_hysteresis() {
-    let b = with_recorder("Threshold");
+    let b = with_recorder("standard.Threshold");
     let values =
         [("rise", f(1.0)), ("fall", f(0.5)), ("rise_event", Value::str("e_high")), ("fall_event", Value::str("e_low"))];
-    b.create("t", "Threshold", "fast", &values);
+    b.create("t", "standard.Threshold", "fast", &values);
     b.start(&["t"]);
     for u in [0.0, 0.9, 1.0, 1.1, 0.6, 1.2, 0.5, 0.4, 0.9, 2.0] {
         b.write("t.u", u);
@@ -197,10 +197,10 @@ fn threshold_has_hysteresis() {
 fn csv_logger_writes_a_line_an_update() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
-    let b = with_recorder("CsvLogger");
-    b.create("r", "Ramp", "fast", &[("slope", f(1000.0))]);
+    let b = with_recorder("standard.CsvLogger");
+    b.create("r", "standard.Ramp", "fast", &[("slope", f(1000.0))]);
     let values = [("path", Value::str(path.to_str().unwrap())), ("every", Value::Int(2))];
-    b.create("log", "CsvLogger", "fast", &values);
+    b.create("log", "standard.CsvLogger", "fast", &values);
     b.connect("r.y", "log.u2", Policy::Data);
     b.start(&["r", "log"]);
     b.wait(MS * 5 + MS / 2);

@@ -1,3 +1,5 @@
-//! A deployment alive: control socket, bring-up, shutdown.
+//! A deployment alive: control socket, bring-up, shutdown, faults on the way.
 
+mod bringup;
+mod life;
 mod socket;

@@ -20,13 +20,13 @@ pub use threshold::Threshold;
 /// The library.
 pub fn library() -> Library {
     Library::new("standard")
-        .with::<Constant>("Constant")
-        .with::<CsvLogger>("CsvLogger")
-        .with::<Gain>("Gain")
-        .with::<Pid>("Pid")
-        .with::<Ramp>("Ramp")
-        .with::<Saturation>("Saturation")
-        .with::<Sine>("Sine")
-        .with::<Sum>("Sum")
-        .with::<Threshold>("Threshold")
+        .with::<Constant>("standard.Constant")
+        .with::<CsvLogger>("standard.CsvLogger")
+        .with::<Gain>("standard.Gain")
+        .with::<Pid>("standard.Pid")
+        .with::<Ramp>("standard.Ramp")
+        .with::<Saturation>("standard.Saturation")
+        .with::<Sine>("standard.Sine")
+        .with::<Sum>("standard.Sum")
+        .with::<Threshold>("standard.Threshold")
 }

@@ -1,0 +1,212 @@
+//! The story of a deployment in simulated time, on both platforms.
+
+use davit::app::script::{self, Options};
+use davit::app::{self, Checked};
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::session::{Command, Happening, Phase, Session};
+use davit::time::Clock;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// A file of the project, checked.
+pub fn checked(file: &str) -> Checked {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    app::read(&path, &LoadOptions::default(), &libraries::builtin())
+        .and_then(app::check)
+        .unwrap_or_else(|refused| panic!("{file} is refused: {:?}", refused.findings))
+}
+
+/// Everything an observer of a session hears, in words.
+fn record(session: &Session) -> Arc<Mutex<Vec<String>>> {
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let log = heard.clone();
+    session.hub().observe(Arc::new(move |at, what| {
+        let line = match what {
+            Happening::State { active } => format!("in {}", active.last().map_or("", |s| s.as_str())),
+            Happening::Answered(answer) => answer.answer.clone(),
+            Happening::Phase { phase } => phase.as_str().to_owned(),
+            _ => return,
+        };
+        log.lock().unwrap().push(format!("{at} {line}"));
+    }));
+    heard
+}
+
+fn up_and_down(file: &str) -> Vec<String> {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let session = app::start(&checked(file), &clock).unwrap();
+    let heard = record(&session);
+    session.bring_up().unwrap();
+    assert_eq!(session.status().phase, Phase::Up);
+    assert!(!session.system().is_empty());
+    let ended = session.take_down(false);
+    assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");
+    assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
+    clock.shutdown();
+    let heard = heard.lock().unwrap().clone();
+    heard
+}
+
+#[test]
+fn every_deployment_comes_up_and_goes_down_to_nothing() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        if name.ends_with(".yaml") {
+            up_and_down(&format!("deployments/{name}"));
+            seen += 1;
+        }
+    }
+    assert!(seen >= 4, "{seen}");
+}
+
+#[test]
+fn simulated_time_tells_the_same_story_twice() {
+    let file = "deployments/youbot_arm.yaml";
+    let first = up_and_down(file);
+    assert_eq!(first, up_and_down(file));
+    assert!(first.iter().any(|line| line.ends_with("park.ok")), "{first:?}");
+}
+
+/// The paper's hypothesis: the same coordinator file, unchanged, over two platforms' configurations.
+#[test]
+fn one_coordinator_drives_two_platforms() {
+    let states = |file: &str| -> Vec<String> {
+        let words = |line: &String| line.split_once(" in ").map(|(_, state)| state.to_owned());
+        up_and_down(file).iter().filter_map(words).collect()
+    };
+    let coordinator = |file: &str| {
+        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
+        text.lines().find_map(|l| l.strip_prefix("coordinator: ").map(str::to_owned)).unwrap()
+    };
+    let (youbot, generic) = ("deployments/youbot_arm.yaml", "deployments/generic_arm.yaml");
+    assert_eq!(coordinator(youbot), coordinator(generic), "one file");
+    let (a, b) = (checked(youbot), checked(generic));
+    assert_ne!(a.deployment.platform, b.deployment.platform);
+    assert_eq!(a.deployment.coordinator, b.deployment.coordinator);
+    assert_eq!(states(youbot), states(generic), "the same states in the same order");
+}
+
+#[test]
+fn the_whole_story_runs_as_a_script() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/youbot_story.lua");
+    let said = Arc::new(Mutex::new(Vec::new()));
+    let heard = said.clone();
+    let clock = Clock::simulated();
+    let end = script::run(
+        &path,
+        Options {
+            clock: clock.clone(),
+            libraries: libraries::builtin(),
+            load: LoadOptions::default(),
+            observer: None,
+            say: Box::new(move |text| heard.lock().unwrap().push(text.to_owned())),
+        },
+    );
+    clock.shutdown();
+    assert!(end.failure.is_none(), "{:?}", end.failure);
+    let ended = end.ended.expect("it deployed something");
+    assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");
+}
+
+/// Runs a script given as text, beside the deployments of the project.
+fn run_text(text: &str) -> (Option<String>, Option<bool>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("script.lua");
+    let root = env!("CARGO_MANIFEST_DIR");
+    std::fs::write(&path, text.replace("@", &format!("{root}/deployments/"))).unwrap();
+    let clock = Clock::simulated();
+    let end = script::run(
+        &path,
+        Options {
+            clock: clock.clone(),
+            libraries: libraries::builtin(),
+            load: LoadOptions::default(),
+            observer: None,
+            say: Box::new(|_| {}),
+        },
+    );
+    clock.shutdown();
+    (end.failure.map(|f| f.to_string()), end.ended.map(|e| e.is_clean()))
+}
+
+#[test]
+fn a_script_that_fails_leaves_nothing_behind() {
+    for (script, message) in [
+        ("deploy('@generic_arm.yaml') assert(false, 'no luck')", "no luck"),
+        ("deploy('@generic_arm.yaml') wait_state('idle', 0.5)", "not in `idle` after 0.5 s"),
+        ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`"),
+        ("deploy('@generic_arm.yaml') raise('e_5dofs')", "did you mean `e_5dof`?"),
+        ("deploy('@generic_arm.yaml') apply('eight_DOFF')", "did you mean `eight_DOF`?"),
+        ("deploy('@generic_arm.yaml') asert_running('x')", "did you mean `assert_running`?"),
+        ("deploy('@generic_arm.yaml') wait_answer('never.ok', 1)", "`never.ok` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') local t = {} while true do t[1] = 1 end", "endless loop"),
+        ("deploy('@generic_arm.yaml') while true do pcall(function() while true do end end) end", "endless loop"),
+        ("deploy('@generic_arm.yaml') deploy('@generic_arm.yaml')", "already up"),
+    ] {
+        let (failure, clean) = run_text(script);
+        let failure = failure.unwrap_or_else(|| panic!("no failure: {script}"));
+        assert!(failure.contains(message), "{script}: {failure}");
+        assert_eq!(clean, Some(true), "{script}");
+    }
+    let (failure, ended) = run_text("shutdown()");
+    assert!(failure.unwrap().contains("nothing is deployed"));
+    assert_eq!(ended, None);
+    let (failure, ended) = run_text("deploy('@no_such.yaml')");
+    assert!(failure.unwrap().contains("is refused"));
+    assert_eq!(ended, None);
+}
+
+#[test]
+fn an_operator_pushes_and_undoes() {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
+    session.bring_up().unwrap();
+    let before = session.system();
+    let frames = session.status().stack.len();
+    let soft = session.configurations().into_iter().find(|c| c.as_str() == "profile_soft").unwrap();
+    let wait = |request| {
+        let deadline = clock.now() + Duration::from_secs(1);
+        while session.hub().answer(request).is_none() {
+            assert!(session.hub().changed.wait(deadline), "no answer");
+        }
+        session.hub().answer(request).unwrap()
+    };
+    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator")).answer, "profile_soft.ok");
+    assert_ne!(session.system(), before);
+    assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator")).answer, "undo.done");
+    assert_eq!(session.system(), before);
+    assert_eq!(session.status().stack.len(), frames);
+    assert!(session.take_down(false).is_clean());
+    clock.shutdown();
+}
+
+#[test]
+fn a_command_during_bring_up_rolls_back() {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
+    let asked = Arc::downgrade(&session);
+    // In the middle of the unfolding of the arm, the longest step of the bring-up.
+    let interrupter = {
+        let clock = clock.clone();
+        let at = clock.now() + Duration::from_secs(2);
+        clock.clone().spawn("interrupter", move || {
+            clock.sleep_until(at);
+            if let Some(session) = asked.upgrade() {
+                session.command(Command::Shutdown { force: false });
+            }
+        })
+    };
+    let not_up = session.bring_up().unwrap_err();
+    assert!(not_up.interrupted, "{not_up:?}");
+    assert!(not_up.ended.is_clean(), "{not_up:?}");
+    assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
+    interrupter.join(clock.now() + Duration::from_secs(1)).unwrap();
+    clock.shutdown();
+}
