@@ -1,5 +1,10 @@
 //! The youBot reference application, measured in simulated time.
 
+mod bench;
 mod coupling;
 mod files;
 mod golden;
+mod robot;
+
+#[global_allocator]
+static ALLOCATOR: bench::Counting = bench::Counting;

@@ -48,6 +48,8 @@ pub struct ScriptError(pub String);
 const SEGMENTS_MAX: usize = 256;
 /// Fastest that a hand carries a tool, in m/s.
 const CARRY_SPEED: f64 = 0.1;
+/// A hand that has to pull with all its strength for so long lets go, in s.
+const PATIENCE: f64 = 0.5;
 
 impl std::str::FromStr for Script {
     type Err = ScriptError;
@@ -98,6 +100,7 @@ pub struct Hand {
     target: Vector3<f64>,
     origin: Vector3<f64>,
     begun: bool,
+    strained: f64,
 }
 
 impl Hand {
@@ -113,6 +116,7 @@ impl Hand {
             target: Vector3::zeros(),
             origin: Vector3::zeros(),
             begun: false,
+            strained: 0.0,
         }
     }
 
@@ -125,6 +129,7 @@ impl Hand {
     }
 
     /// The force on the tool (N, world frame) in the next `dt` seconds. `other`: where the other robot's tool is.
+    /// A hand that the robot pulls along against all its strength lets go until the next segment.
     pub fn update(
         &mut self,
         position: &Vector3<f64>,
@@ -144,10 +149,14 @@ impl Hand {
         };
         if !self.begun {
             self.begun = true;
+            self.strained = 0.0;
             self.origin = *position;
             self.target = *position;
         }
         self.elapsed += dt;
+        if self.strained > PATIENCE {
+            return Vector3::zeros();
+        }
         let before = self.target;
         match act {
             Act::Free => return Vector3::zeros(),
@@ -173,7 +182,12 @@ impl Hand {
         let speed = (self.target - before) / dt;
         let force = (self.target - position) * self.stiffness + (speed - velocity) * self.damping;
         let norm = force.norm();
-        if norm > self.f_max { force * (self.f_max / norm) } else { force }
+        if norm > self.f_max {
+            self.strained += dt;
+            return force * (self.f_max / norm);
+        }
+        self.strained = 0.0;
+        force
     }
 }
 
@@ -189,6 +203,15 @@ mod tests {
             assert!(bad.parse::<Script>().is_err(), "{bad}");
         }
         assert!("free 1;".repeat(1000).parse::<Script>().is_err());
+    }
+
+    #[test]
+    fn a_hand_lets_go_of_what_is_stronger() {
+        let mut hand = Hand::new("hold 60".parse().unwrap());
+        hand.update(&Vector3::zeros(), &Vector3::zeros(), None, 0.001);
+        let away = Vector3::new(1.0, 0.0, 0.0);
+        let pulls = (0..1000).filter(|_| hand.update(&away, &Vector3::zeros(), None, 0.001).norm() > 0.0).count();
+        assert!((490..510).contains(&pulls), "{pulls} ms");
     }
 
     #[test]

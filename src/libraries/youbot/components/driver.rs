@@ -12,6 +12,8 @@ use nalgebra::Vector3;
 
 /// Falling by more than this when the drives go off is dropping the arm, in m.
 const DROP: f64 = 0.02;
+/// A push older than this has ended, in s.
+const PUSH_STALE: f64 = 0.05;
 /// Heating per current squared and time constant of a motor, °C/A² and s (assumed).
 const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
@@ -223,7 +225,9 @@ impl Component for Driver {
         self.inject();
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
-        let push = self.ext_force.get().unwrap_or_default();
+        // Nobody pushes on after the hand is gone.
+        let push =
+            aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE).map(|(f, _)| f).unwrap_or_default();
         let _ = self.gripper.take();
         if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
             // Nobody waits any more: the motion ends where it is.
