@@ -56,6 +56,7 @@ ConfiguratorConf {
     connect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
     connect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
     connect("Link_Rx.ext_ref",               "Operator.ext_ref"),
+    connect("youbot.control_mode",           "Operator.control_mode"),
     connect("Operator.ext_force",            "youbot.ext_force"),
     -- monitors
     connect("Link_Rx.link_stats",            "Link_Monitor.link_stats"),
@@ -195,6 +196,7 @@ ConfiguratorConf {
     disconnect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
     disconnect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
     disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
+    disconnect("youbot.control_mode",           "Operator.control_mode"),
     disconnect("Operator.ext_force",            "youbot.ext_force"),
     disconnect("Link_Rx.link_stats",            "Link_Monitor.link_stats"),
     disconnect("Link_Rx.peer_state",            "Link_Monitor.peer_state"),

@@ -56,6 +56,8 @@ pub enum Happening {
     CalibrationFailed,
     /// A motion ended.
     Arrived,
+    /// A motion did not reach its end: something is in the way. The arm is held where it is.
+    MotionFailed,
 }
 
 /// Limits and times of the driver.
@@ -90,6 +92,9 @@ const POSITION_GAIN: [f64; JOINTS] = [400.0, 400.0, 200.0, 80.0, 30.0];
 const SPEED_GAIN: [f64; JOINTS] = [24.0, 24.0, 12.0, 4.0, 1.5];
 /// Peak joint speed of folding and unfolding, in rad/s.
 const MOTION_SPEED: f64 = 1.2;
+/// How close to its end a motion must come, in rad, and how much later than planned, in s.
+const ARRIVAL_ERROR: f64 = 0.03;
+const ARRIVAL_TIME: f64 = 3.0;
 /// Speed at which calibration looks for the stops, in rad/s.
 const CALIBRATION_SPEED: f64 = 0.3;
 /// A calibration that has not found the stops by then has failed, in s.
@@ -292,10 +297,17 @@ impl Drives {
                 let speed = 30.0 * s * s * (1.0 - 2.0 * s + s * s) / *duration;
                 self.target = *from + (*to - *from) * way;
                 self.target_speed = (*to - *from) * speed;
-                if s >= 1.0 {
-                    self.task = Task::Idle;
+                let (to, over) = (*to, *elapsed - *duration);
+                if over >= 0.0 {
                     self.target_speed = J5::zeros();
-                    report(Happening::Arrived);
+                    // The motion has ended when the arm is there, not when it should be.
+                    if (self.arm.q - to).amax() < ARRIVAL_ERROR {
+                        self.task = Task::Idle;
+                        report(Happening::Arrived);
+                    } else if over > ARRIVAL_TIME {
+                        self.hold();
+                        report(Happening::MotionFailed);
+                    }
                 }
             }
             Task::Calibrating { elapsed, met } => {
@@ -444,6 +456,17 @@ mod tests {
         assert_eq!(seen, [Happening::CommandWatchdog]);
         assert!((drives.arm.q - at).norm() < 0.01 && drives.mode() == Mode::Positioning);
         assert!(drives.switch_off() > 0.03);
+    }
+
+    #[test]
+    fn a_motion_that_is_held_up_fails_and_the_arm_stays() {
+        let mut drives = parked();
+        drives.calibrate().unwrap();
+        run(&mut drives, 3.0);
+        drives.arm.friction_scale = 1e6;
+        drives.unfold().unwrap();
+        assert!(run(&mut drives, 10.0).contains(&Happening::MotionFailed));
+        assert!(drives.mode() == Mode::Positioning && !drives.busy());
     }
 
     #[test]

@@ -36,6 +36,7 @@ struct Events {
     calibrated: EventName,
     calibration_failed: EventName,
     arrived: EventName,
+    blocked: EventName,
     dropped: EventName,
     emergency: EventName,
     faults: [EventName; FAULTS.len()],
@@ -201,6 +202,7 @@ impl Component for Driver {
                 calibrated: b.event("e_calibrated"),
                 calibration_failed: b.event("e_calibration_failed"),
                 arrived: b.event("e_arrived"),
+                blocked: b.event("e_motion_blocked"),
                 dropped: b.event("e_arm_dropped"),
                 emergency: b.event("e_EMERGENCY_STOP"),
                 faults: FAULTS.map(|(_, event, _)| b.event(event)),
@@ -244,6 +246,12 @@ impl Component for Driver {
                 events.raise(if what == Happening::Arrived { names.arrived } else { names.calibrated });
                 if let Some(ticket) = task.take() {
                     ticket.done(());
+                }
+            }
+            Happening::MotionFailed => {
+                events.raise(names.blocked);
+                if let Some(ticket) = task.take() {
+                    ticket.failed("the arm did not get there: something is in the way");
                 }
             }
             Happening::CalibrationFailed => {

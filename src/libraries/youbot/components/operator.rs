@@ -11,6 +11,7 @@ pub struct Operator {
     tool_pose: In<ToolPose>,
     tool_twist: In<ToolTwist>,
     ext_ref: In<ExtRef>,
+    control_mode: In<u8>,
     ext_force: Out<Vector3<f64>>,
     script: Prop<String>,
     hand_k: Prop<f64>,
@@ -40,6 +41,9 @@ impl Component for Operator {
             tool_pose: b.doc("Where the tool is.").input("tool_pose"),
             tool_twist: b.doc("How it moves.").input("tool_twist"),
             ext_ref: b.doc("Where the other tool is.").input("ext_ref"),
+            control_mode: b
+                .doc("What the drives do: a hand does not hold an arm that moves by itself. Not connected: 6.")
+                .input("control_mode"),
             ext_force: b.doc("What the hand does to the tool, in the world.").unit("N").output("ext_force"),
             script: b.doc("What the hand does.").property("script", String::new()),
             hand_k: b.doc("Stiffness of the hand.").unit("N/m").range(0.0..=2000.0).property("hand_k", 300.0),
@@ -59,6 +63,9 @@ impl Component for Operator {
         self.hand.stiffness = self.hand_k.get();
         self.hand.damping = self.hand_b.get();
         self.hand.f_max = self.f_max.get();
+        if self.control_mode.get().is_some_and(|mode| mode != 6) {
+            return self.ext_force.write(Vector3::zeros());
+        }
         let other = self.ext_ref.get().map(|r| Vector3::from(r.p));
         let force = self.hand.update(&pose.p.into(), &twist.v.into(), other.as_ref(), cx.dt());
         self.ext_force.write(force);
