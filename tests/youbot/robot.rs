@@ -42,14 +42,15 @@ fn up_engaged_and_down_to_nothing() {
     let coupled: Vec<Row> = rows.iter().filter(|r| r.force.norm() > 0.0).copied().collect();
     assert!(coupled.len() > 9_000, "{}", coupled.len());
 
+    for event in ["e_cmd_watchdog", "e_overspeed", "e_torque_sat", "e_calibration_failed", "e_controller_lost"] {
+        assert!(!bench.heard(event), "{event}");
+    }
+
     bench.all(&["disable_copying"]);
     bench.unprobe();
     bench.all(DOWN);
     assert!(bench.system.is_empty());
-    assert!(!bench.heard("e_arm_dropped"));
-    for event in ["e_cmd_watchdog", "e_overspeed", "e_torque_sat", "e_calibration_failed", "e_controller_lost"] {
-        assert!(!bench.heard(event), "{event}");
-    }
+    assert!(!bench.heard("e_arm_dropped") && !bench.heard("e_motion_blocked"));
 }
 
 #[test]
