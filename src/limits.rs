@@ -56,7 +56,7 @@ pub const FILE_BYTES: u64 = 32 * 1024 * 1024;
 pub const TEXT_DEPTH: usize = 64;
 
 /// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
-pub const TEXT_NODES: usize = 2_000_000;
+pub const TEXT_NODES: usize = 1_500_000;
 
 /// Findings collected from the texts of one deployment; past it reading stops, since the rest follows from the first.
 pub const FINDINGS: usize = 1_000;
@@ -66,7 +66,7 @@ pub const FINDINGS: usize = 1_000;
 pub const LUA_INSTRUCTIONS: u64 = 20_000_000;
 
 /// Bytes the Lua state of one file may hold.
-pub const LUA_BYTES: usize = 128 * 1024 * 1024;
+pub const LUA_BYTES: usize = 96 * 1024 * 1024;
 
 /// Longest time of the processor one Lua file may use: the backstop for library calls, which count as one instruction
 /// however long they take.
