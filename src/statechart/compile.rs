@@ -74,7 +74,7 @@ impl<'m> Builder<'m> {
     fn walk_root(&mut self, root: &'m State) {
         let node = self.add(Ident::new(ROOT).expect("`root` is a name"), NONE, 0, Kind::Composite, root.origin);
         self.walk(root, node, 0);
-        if self.children.get(&(node, initial())).is_none() {
+        if !self.children.contains_key(&(node, initial())) {
             self.findings.push(
                 Finding::error(codes::CHART_NO_INITIAL, "the coordinator does not say in which state it begins")
                     .at(root.origin)

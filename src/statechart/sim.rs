@@ -85,7 +85,7 @@ impl<'c> Sim<'c> {
                 let seconds = seconds.ok_or_else(|| SimError::Advance(line.trim().to_owned()))?;
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // finite, not negative; saturates
                 let nanos = (seconds * 1e9).round() as u64;
-                self.now = self.now + Duration::from_nanos(nanos);
+                self.now += Duration::from_nanos(nanos);
                 self.machine.step(self.chart, self.now, 1, &mut trace)
             }
             _ => {
