@@ -10,6 +10,8 @@ pub mod footprint;
 mod lists;
 mod order;
 pub mod prepare;
+#[cfg(test)]
+mod tests;
 pub mod undo;
 
 use crate::model::codes;

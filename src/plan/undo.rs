@@ -5,11 +5,11 @@
 
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
-use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step};
+use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition};
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A step to be simulated, with what the planner must know of it beyond the step.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,14 +70,14 @@ pub struct Script<'o, 's> {
     pub steps: Vec<PlannedStep>,
     /// Where failed components are to go, once something needs them there.
     goals: BTreeMap<ComponentName, (RunState, Stage, Origin)>,
-    /// A failed component was met: the order is then that of the list.
-    failed: bool,
+    /// Components that were met failed. The order is then that of the list.
+    failed: BTreeSet<ComponentName>,
 }
 
 impl<'o, 's> Script<'o, 's> {
     /// An empty list over `view`.
     pub fn new(view: &'o mut Overlay<'s>) -> Self {
-        Self { view, steps: Vec::new(), goals: BTreeMap::new(), failed: false }
+        Self { view, steps: Vec::new(), goals: BTreeMap::new(), failed: BTreeSet::new() }
     }
 
     /// The system after the steps so far.
@@ -105,19 +105,27 @@ impl<'o, 's> Script<'o, 's> {
             }
             Step::State { transition, .. } => {
                 let state = self.view.component(component).map(|n| n.state);
-                if state == Some(RunState::Faulted) {
-                    self.failed = true;
+                if state == Some(RunState::Faulted) || self.failed.contains(&component) {
+                    self.failed.insert(component);
                     self.goals.insert(component, (transition.target(), item.stage, item.origin));
                     return Ok(None);
                 }
             }
             // Connections do not depend on run states, and a failed component may be destroyed as it is.
             Step::Connect { .. } | Step::Disconnect { .. } | Step::Create { .. } => {}
-            Step::Destroy { .. } => _ = self.goals.remove(&component),
+            Step::Destroy { .. } => {
+                let state = self.view.component(component).map(|n| n.state);
+                if matches!(state, Some(RunState::Faulted | RunState::Unconfigured)) {
+                    self.goals.remove(&component);
+                } else {
+                    self.settle(component, wave)?;
+                }
+            }
             Step::Operation(_) => {}
         }
         if matches!(item.step, Step::PropertySet { .. } | Step::Operation(_)) {
             self.settle(component, wave)?;
+            self.clear_fault(&item, wave)?;
         }
         self.push(item, wave, after).map(Some)
     }
@@ -129,6 +137,20 @@ impl<'o, 's> Script<'o, 's> {
         for transition in state.path_to(goal) {
             let step = Step::State { component, transition: *transition };
             self.push(Item::bare(step, stage, origin), wave, &[])?;
+        }
+        Ok(())
+    }
+
+    /// Cleans a failed component up when a property can be set only then.
+    fn clear_fault(&mut self, item: &Item, wave: u32) -> Result<(), Vec<Violation>> {
+        let Step::PropertySet { property, .. } = &item.step else { return Ok(()) };
+        let component = property.component;
+        let Some(node) = self.view.component(component) else { return Ok(()) };
+        let allowed = node.property(property.member).is_none_or(|(_, p)| p.tunable.allows(RunState::Faulted));
+        if node.state == RunState::Faulted && !allowed {
+            self.failed.insert(component);
+            let step = Step::State { component, transition: Transition::Cleanup };
+            self.push(Item::bare(step, item.stage, item.origin), wave, &[])?;
         }
         Ok(())
     }
@@ -184,7 +206,7 @@ impl<'o, 's> Script<'o, 's> {
     /// The false preconditions.
     pub fn finish(mut self) -> Result<Vec<PlannedStep>, Vec<Violation>> {
         self.settle_all()?;
-        if self.failed {
+        if !self.failed.is_empty() {
             for i in 0..self.steps.len() {
                 self.steps[i].after = i.checked_sub(1).map(|p| self.steps[p].id).into_iter().collect();
             }

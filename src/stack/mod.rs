@@ -8,6 +8,8 @@ mod net;
 mod prepared;
 mod share;
 mod squash;
+#[cfg(test)]
+mod tests;
 mod transaction;
 
 pub use net::reduce;

@@ -1,0 +1,273 @@
+//! What the laws leave to examples: groups, floors, hand-over, the bound, failed components.
+
+use super::{FrameId, Request, Requester, Stack, Transaction, transaction};
+use crate::model::*;
+use crate::plan::{Context, Refusal};
+use crate::system::{System, View, step};
+use crate::time::Time;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+fn ident(name: &str) -> Ident {
+    Ident::new(name).unwrap()
+}
+
+fn member(text: &str) -> MemberRef {
+    MemberRef::new(text).unwrap()
+}
+
+fn types() -> Arc<Catalogue> {
+    let mut ty = ComponentType::new("t.Arm", "an arm");
+    for (name, tunable) in [("gain", Tunable::Always), ("mass", Tunable::Stopped)] {
+        let property = PropertyType {
+            ty: ValueType::Float,
+            default: Some(Value::Float(0.0)),
+            min: None,
+            max: None,
+            tunable,
+            unit: None,
+            doc: String::new(),
+            origin: Origin::NONE,
+        };
+        ty.properties.insert(ident(name), property);
+    }
+    for (name, effect) in
+        [("open", Effect::Undo(ident("close"))), ("close", Effect::None), ("weld", Effect::Irreversible)]
+    {
+        let operation = OperationType { args: vec![], returns: None, effect, doc: String::new(), origin: Origin::NONE };
+        ty.operations.insert(ident(name), operation);
+    }
+    let mut catalogue = Catalogue::new();
+    catalogue.insert(ty);
+    Arc::new(catalogue)
+}
+
+struct Bench {
+    system: System,
+    stack: Stack,
+}
+
+fn conf(
+    id: &str,
+    group: Option<&str>,
+    pre: &[(&str, RunState)],
+    changes: Vec<ChangeKind>,
+    post: &[(&str, RunState)],
+) -> Configuration {
+    let mut conf = Configuration::new(ConfigId::new(id).unwrap());
+    conf.group = group.map(ident);
+    let entry = |(name, state): &(&str, RunState)| StateEntry {
+        target: Target::Component(ComponentName::new(name).unwrap()),
+        state: *state,
+        origin: Origin::NONE,
+    };
+    conf.pre = pre.iter().map(entry).collect();
+    conf.changes = changes.into_iter().map(|kind| Change { kind, origin: Origin::NONE }).collect();
+    conf.post = post.iter().map(entry).collect();
+    conf
+}
+
+fn set(property: &str, value: f64) -> ChangeKind {
+    ChangeKind::PropertySet { property: member(property), value: Value::Float(value) }
+}
+
+fn call(operation: &str) -> ChangeKind {
+    ChangeKind::OperationCall { call: Call { operation: member(operation), args: vec![] }, undo: None }
+}
+
+fn push(configuration: &Configuration) -> Request<'_> {
+    Request::Push { configuration, requester: Requester::Operator, at: Time(0), active: false }
+}
+
+impl Bench {
+    /// `A` and `B` exist, running, and the stack is empty.
+    fn new(bound: usize) -> Self {
+        let mut bench = Self { system: System::new(types()), stack: Stack::new(bound) };
+        let create = |name: &str| ChangeKind::Create {
+            component: ComponentName::new(name).unwrap(),
+            ty: TypeName::new("t.Arm").unwrap(),
+            activity: None,
+            properties: BTreeMap::new(),
+        };
+        let running = [("A", RunState::Running), ("B", RunState::Running)];
+        let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
+        bench.ok(&[push(&up)]);
+        bench.stack.make_floor();
+        bench
+    }
+
+    fn ask(&self, requests: &[Request<'_>]) -> Result<Transaction, Refusal> {
+        transaction(&self.system, &self.stack, requests, &Context::default())
+    }
+
+    /// Executes, and answers the steps and the frames pushed.
+    fn ok(&mut self, requests: &[Request<'_>]) -> (Vec<String>, Vec<FrameId>) {
+        let transaction = self.ask(requests).unwrap_or_else(|r| panic!("{r:?}"));
+        let steps = transaction.steps.iter().map(|s| s.step.to_string()).collect();
+        for s in &transaction.steps {
+            step::apply(&s.step, &mut self.system).unwrap();
+        }
+        (steps, self.stack.commit(transaction))
+    }
+
+    fn codes(&self, requests: &[Request<'_>]) -> Vec<&'static str> {
+        self.ask(requests).expect_err("it is refused").findings.iter().map(|f| f.code.0).collect()
+    }
+
+    fn value(&self, property: &str) -> f64 {
+        let m = member(property);
+        self.system.component(m.component).unwrap().value(m.member).unwrap().as_f64().unwrap()
+    }
+}
+
+#[test]
+fn alternatives_never_pass_through_what_was_before_both() {
+    let mut bench = Bench::new(64);
+    let stopped = [("A", RunState::Stopped)];
+    let running = [("A", RunState::Running)];
+    let eight = conf("eight", Some("dof"), &stopped, vec![set("A.mass", 8.0), set("A.gain", 1.0)], &running);
+    let five = conf("five", Some("dof"), &stopped, vec![set("A.mass", 5.0)], &running);
+    assert_eq!(bench.ok(&[push(&eight)]).0.len(), 4);
+    let (steps, _) = bench.ok(&[push(&five)]);
+    assert_eq!(steps, ["property_set A.gain = 0.0", "stop A", "property_set A.mass = 5.0", "start A"]);
+    assert_eq!(bench.stack.len(), 1);
+    // The new frame remembers what was before both.
+    bench.ok(&[Request::UndoTop]);
+    assert_eq!((bench.value("A.mass"), bench.value("A.gain")), (0.0, 0.0));
+    // The same one again changes nothing at all.
+    bench.ok(&[push(&eight)]);
+    assert!(bench.ok(&[push(&eight)]).0.is_empty());
+    assert_eq!(bench.stack.len(), 1);
+}
+
+#[test]
+fn a_group_that_cannot_be_replaced_refuses_and_changes_nothing() {
+    let mut bench = Bench::new(64);
+    let one = conf("one", Some("g"), &[], vec![call("A.open")], &[]);
+    let above = conf("above", None, &[], vec![call("A.open")], &[]);
+    let two = conf("two", Some("g"), &[], vec![], &[]);
+    bench.ok(&[push(&one)]);
+    bench.ok(&[push(&above)]);
+    let before = bench.system.revision();
+    assert_eq!(bench.codes(&[push(&two)]), ["stack::group", "stack::shared"]);
+    assert_eq!((bench.system.revision(), bench.stack.len()), (before, 2));
+    // In one batch the frame above goes first.
+    bench.ok(&[Request::UndoTop, push(&two)]);
+    assert_eq!(bench.stack.len(), 1);
+}
+
+#[test]
+fn undo_does_not_pass_a_floor() {
+    let mut bench = Bench::new(64);
+    bench.ok(&[push(&conf("below", None, &[], vec![set("A.gain", 1.0)], &[]))]);
+    let below = bench.stack.top().unwrap().id;
+    bench.ok(&[push(&conf("weld", None, &[], vec![call("A.weld")], &[]))]);
+    let above = conf("above", None, &[], vec![set("B.gain", 1.0)], &[]);
+    bench.ok(&[push(&above)]);
+    assert_eq!(bench.codes(&[Request::UndoTo(0)]), ["stack::floor"]);
+    assert_eq!(bench.codes(&[Request::Undo(below)]), ["stack::floor"]);
+    bench.ok(&[Request::UndoTop]);
+    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+    bench.stack.make_floor();
+    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+    assert!(bench.stack.is_buried(ConfigId::new("weld").unwrap(), None));
+    bench.stack.discard();
+    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::empty"]);
+    assert_eq!(bench.codes(&[Request::Undo(below)]), ["stack::no_frame"]);
+}
+
+#[test]
+fn values_are_handed_over_and_what_blocks_is_named() {
+    let mut bench = Bench::new(64);
+    let first = bench.ok(&[push(&conf("first", None, &[], vec![set("A.gain", 1.0)], &[]))]).1[0];
+    bench.ok(&[push(&conf("second", None, &[], vec![set("A.gain", 2.0)], &[]))]);
+    assert!(bench.ok(&[Request::Undo(first)]).0.is_empty(), "nothing is sent");
+    assert_eq!(bench.value("A.gain"), 2.0);
+    bench.ok(&[Request::UndoTop]);
+    assert_eq!(bench.value("A.gain"), 0.0, "what was before the first");
+    // A demand that was true already counts as a write, and takes the value over.
+    let first = bench.ok(&[push(&conf("first", None, &[], vec![set("A.gain", 1.0)], &[]))]).1[0];
+    bench.ok(&[push(&conf("second", None, &[], vec![set("A.gain", 1.0)], &[]))]);
+    bench.ok(&[Request::Undo(first)]);
+    assert_eq!(bench.value("A.gain"), 1.0);
+    assert_eq!(bench.ok(&[Request::UndoTop]).0, ["property_set A.gain = 0.0"]);
+    // A state that a frame above demanded by name blocks, though no step was needed.
+    let stop = bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![], &[]))]).1[0];
+    bench.ok(&[push(&conf("needs", None, &[("A", RunState::Stopped)], vec![], &[]))]);
+    let refusal = bench.ask(&[Request::Undo(stop)]).unwrap_err();
+    assert_eq!(refusal.findings[0].message, "`stop` cannot be undone before `needs`, which needs the run state of `A`");
+}
+
+#[test]
+fn frames_of_active_states_are_never_squashed() {
+    let mut bench = Bench::new(3);
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    let scoped = of(1);
+    let request = Request::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), active: true };
+    let kept = bench.ok(&[request]).1[0];
+    for n in 2..9 {
+        bench.ok(&[push(&of(n))]);
+    }
+    assert_eq!(bench.stack.len(), 3);
+    assert!(bench.stack.frame(kept).is_some_and(|f| !f.is_squashed()));
+    let squashed = &bench.stack.frames()[1];
+    assert_eq!((squashed.parts.len(), squashed.configuration.as_str()), (6, "c7"));
+    assert!(bench.stack.is_buried(ConfigId::new("c3").unwrap(), Some(Requester::Operator)));
+    // Left: popped from the bottom; the squashed frame takes its value over.
+    bench.ok(&[Request::Undo(kept)]);
+    bench.ok(&[Request::UndoTo(0)]);
+    assert_eq!(bench.value("A.gain"), 0.0);
+    // Nothing but active frames: refused.
+    let mut bench = Bench::new(2);
+    for n in 0..2 {
+        let conf = of(n);
+        bench.ok(&[Request::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), active: true }]);
+    }
+    assert_eq!(bench.codes(&[push(&of(3))]), ["stack::full"]);
+}
+
+#[test]
+fn calls_that_pile_up_become_a_floor() {
+    let mut bench = Bench::new(2);
+    for n in 0..crate::limits::SQUASHED_CALLS + 4 {
+        bench.ok(&[push(&conf(&format!("c{}", n % 8), None, &[], vec![call("A.open")], &[]))]);
+    }
+    let oldest = &bench.stack.frames()[0];
+    assert!(oldest.floor.as_ref().is_some_and(|why| why.contains("operation calls")));
+    bench.ok(&[Request::UndoTop]);
+    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+}
+
+#[test]
+fn a_switch_to_and_fro_stays_bounded_when_squashed() {
+    let mut bench = Bench::new(2);
+    let (stopped, running) = ([("A", RunState::Stopped)], [("A", RunState::Running)]);
+    for n in 0..200 {
+        bench.ok(&[push(&conf("c", None, &stopped, vec![set("A.mass", f64::from(n % 3))], &running))]);
+    }
+    let super::Inverse::List(list) = &bench.stack.frames()[0].inverse else { panic!("it is squashed") };
+    assert_eq!(
+        list.iter().map(|i| i.step.to_string()).collect::<Vec<_>>(),
+        ["stop A", "property_set A.mass = 0.0", "start A"]
+    );
+}
+
+#[test]
+fn a_failed_component_is_taken_down_without_being_started() {
+    let mut bench = Bench::new(64);
+    let a = ComponentName::new("C").unwrap();
+    let create = ChangeKind::Create {
+        component: a,
+        ty: TypeName::new("t.Arm").unwrap(),
+        activity: None,
+        properties: BTreeMap::new(),
+    };
+    bench.ok(&[push(&conf("more", None, &[], vec![create], &[("C", RunState::Running)]))]);
+    bench.system.set_state(a, RunState::Faulted);
+    assert_eq!(bench.ok(&[Request::UndoTop]).0, ["destroy C"]);
+    // Where it stays, it goes from the fault to where the inverse wants it.
+    bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![set("A.mass", 3.0)], &[]))]);
+    bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
+    let (steps, _) = bench.ok(&[Request::UndoTop]);
+    assert_eq!(steps, ["cleanup A", "property_set A.mass = 0.0", "configure A", "start A"]);
+}
