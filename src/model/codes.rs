@@ -204,9 +204,6 @@ codes! {
         "A state list is applied in its order, but the named entries of a Lua table have none: with two or more keys, \
          chance would decide which component changes first. Write them as a list: `{ 'compA:running', \
          '_default:stopped' }`. One key alone is fine, and comes after the entries.";
-    CONF_DEFAULT_TWICE = "conf::default_twice", "`_default` stands twice in a state list",
-        "`_default` stands for every component that the list does not name, so it can be brought to one state only. \
-         Keep one of the entries, or name the components.";
     CONF_BAD_STATE = "conf::bad_state", "this is not a run state that can be demanded",
         "Run states are `unconfigured`, `stopped` and `running`; the names of RTT, ROS 2 and microblx are understood as \
          well. `faulted` cannot be demanded: components get there by themselves. An entry of a state list is written \
@@ -320,8 +317,8 @@ codes! {
         "Two states or connectors of one name in the same state",
         "Within a state every child has its own name, or references to it would be ambiguous. Rename one of them.";
     CHART_RESERVED = "chart::reserved_name",
-        "A state has a name that rFSM uses itself",
-        "rFSM keeps its own fields beside the children of a state (`type`, `new`, `rfsm`; in the root also `err`, `warn`, `info`, `dbg`, `getevents`, `idle_hook`). A child of that name is overwritten or breaks the model there, so it is refused here. Choose another name.";
+        "A state has a name that means something else",
+        "The words `entry`, `exit`, `doo`, `config` and `doc` are keys of a state's table, and rFSM keeps its own fields beside the children of a state (`type`, `new`, `rfsm`; in the root also `err`, `warn`, `info`, `dbg`, `getevents`, `idle_hook`). A child of that name is overwritten or breaks the model there, so it is refused here. Choose another name.";
     CHART_DOO_IN_COMPOSITE = "chart::doo_in_composite",
         "A composite state has an activity",
         "Only leaves run an activity (`doo`). rFSM reports this as an error and then never runs it. Move the activity into a state inside.";
@@ -389,9 +386,6 @@ codes! {
     CHART_UNNAMED = "chart::unnamed", "a state has no name",
         "A state inside a state is written `name = state { … }`: transitions refer to it by that name. Without one it \
          could never be entered.";
-    CHART_RESERVED_NAME = "chart::reserved_name", "a state has a name that means something else",
-        "The words entry, exit, doo, config, doc, type, new and rfsm have a meaning in a state's table, so a state of \
-         that name could not be told from it, or breaks references in rFSM. Choose another name.";
     COORD_UNKNOWN_REQUEST = "coord::unknown_request", "the coordinator asks for a configuration that there is not",
         "A name that a coordinator raises is a request when it is a configuration's name, `NAME.undo` or `undo`; else it \
          must be listed under `emits` in the deployment. This one is neither, so nobody would hear it. Correct the name, \

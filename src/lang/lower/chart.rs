@@ -141,7 +141,7 @@ fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
     let reserved = RESERVED.contains(&&*entry.key);
     if reserved {
         let origin = cx.part(entry.origin, &entry.key);
-        let finding = Finding::error(codes::CHART_RESERVED_NAME, format!("a state cannot be called `{}`", entry.key));
+        let finding = Finding::error(codes::CHART_RESERVED, format!("a state cannot be called `{}`", entry.key));
         cx.report(finding.at(origin).help("the word means something else in a state's table: take another name"));
     }
     let ident = name::<Ident>(cx, &key, "a state's name", "idle = state {}");

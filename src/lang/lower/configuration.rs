@@ -174,7 +174,7 @@ fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
     }
     let mut defaults = out.iter().filter(|e| e.target == Target::Default);
     if let (Some(first), Some(second)) = (defaults.next(), defaults.next()) {
-        let finding = Finding::error(codes::CONF_DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
+        let finding = Finding::error(codes::DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
             .at(second.origin)
             .also(first.origin, "first here")
             .help("it stands for every component not named in the list, so it can only have one state: keep one");
