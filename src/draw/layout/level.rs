@@ -198,14 +198,17 @@ impl<'a> Levels<'a> {
         }
         // What an item takes across beside its own box: the loop to itself.
         let mut beside = vec![0.0f64; items.len()];
+        let mut tall = vec![0.0f64; items.len()];
         for (e, node) in &loops {
-            beside[index[node]] += label_size(&picture.edges[*e].label).0 + 30.0;
+            let (w, h) = label_size(&picture.edges[*e].label);
+            beside[index[node]] += w + 30.0;
+            tall[index[node]] = tall[index[node]].max(h);
         }
         let own: Vec<Vertex> = vertices.clone();
-        for (v, extra) in vertices.iter_mut().zip(&beside) {
+        for (v, (extra, tall)) in vertices.iter_mut().zip(beside.iter().zip(&tall)) {
             match picture.direction {
-                Direction::Down => v.wide += extra,
-                Direction::Right => v.len += extra,
+                Direction::Down => (v.wide, v.len) = (v.wide + extra, v.len.max(*tall)),
+                Direction::Right => (v.len, v.wide) = (v.len + extra, v.wide.max(*tall)),
             }
         }
 
@@ -361,7 +364,7 @@ impl<'a> Levels<'a> {
             let v = vertices[i];
             let along = match picture.direction {
                 // In the middle of a rank of states; columns of components begin at one line.
-                Direction::Down => f64::midpoint(start[v.layer], end[v.layer]) - v.len / 2.0,
+                Direction::Down => f64::midpoint(start[v.layer], end[v.layer]) - own[i].len / 2.0,
                 Direction::Right => start[v.layer],
             };
             let across = middles[i] - v.wide / 2.0 + offset;
@@ -419,23 +422,24 @@ impl<'a> Levels<'a> {
             });
             laid.parts.push(Part { edge: chain.edge, stage: chain.stage, runs, label, looped: None });
         }
+        // Several loops of one node: their labels stand side by side.
+        let mut taken: BTreeMap<usize, f64> = BTreeMap::new();
         for (e, node) in loops {
             let slot = laid.items[index[&node]].1;
             let (w, h) = label_size(&picture.edges[e].label);
+            let taken = taken.entry(node).or_insert(24.0);
             let label = match picture.direction {
                 Direction::Down => Slot {
                     along: slot.along + slot.len / 2.0 - h / 2.0,
-                    across: slot.across + slot.wide + 24.0,
+                    across: slot.across + slot.wide + *taken,
                     len: h,
                     wide: w,
                 },
-                Direction::Right => Slot {
-                    along: slot.along + slot.len + 24.0,
-                    across: slot.across + slot.wide / 2.0 - h / 2.0,
-                    len: w,
-                    wide: h,
-                },
+                Direction::Right => {
+                    Slot { along: slot.along + slot.len + *taken, across: slot.across, len: w, wide: h }
+                }
             };
+            *taken += w + 6.0;
             laid.parts.push(Part { edge: e, stage: 0, runs: Vec::new(), label: Some(label), looped: Some(node) });
         }
         self.laid[slot_of(level)] = laid;
