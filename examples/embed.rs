@@ -7,8 +7,8 @@
 use davit::configurator::{Batch, Configurator, Request, Requester, Setup};
 use davit::lang::{LoadOptions, Sources, load_configurations};
 use davit::model::{
-    Ask, Catalogue, ComponentName, ComponentSnapshot, ComponentType, ConfigId, DeploymentLimits, PropertyType, RequestId,
-    Snapshot, Step, Tunable, Value, ValueType,
+    Ask, Catalogue, ComponentName, ComponentSnapshot, ComponentType, ConfigId, DeploymentLimits, PropertyType,
+    RequestId, Snapshot, Step, Tunable, Value, ValueType,
 };
 use davit::platform::simulated::{Options, Simulated};
 use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform};
