@@ -2,6 +2,7 @@
 
 use super::AnswerSink;
 use super::control::{Busy, Command, View};
+use super::fast::Fast;
 use super::inbox::{Counts, Mail};
 use super::log::{Log, Progress, ProgressSink, StepName, What};
 use super::pool::{Pool, Reply, Ticket};
@@ -72,6 +73,8 @@ pub(super) struct Engine {
     pub suspects: Vec<ComponentName>,
     /// A component came back: a broken system may be mended.
     pub returned: bool,
+    /// Prepared switches.
+    pub switches: FxHashMap<ConfigId, Fast>,
     pub confirming: Vec<Confirming>,
     /// Confirming events that came since the request under way began.
     pub heard: Vec<EventName>,
@@ -132,6 +135,7 @@ impl Engine {
             quarantined: Vec::new(),
             suspects: Vec::new(),
             returned: false,
+            switches: FxHashMap::default(),
             confirming: Vec::new(),
             heard: Vec::new(),
             allowed: Duration::ZERO,

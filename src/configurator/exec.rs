@@ -12,6 +12,7 @@ use crate::platform::{Cause, Execution, Outcome};
 use crate::system::{View as _, Violation, step};
 use crate::time::Time;
 use smallvec::SmallVec;
+use std::time::Duration;
 
 /// A call that is out.
 pub(super) struct Flight {
@@ -84,6 +85,12 @@ impl Run {
 impl Engine {
     /// Carries out what of `work` is not over.
     pub(super) fn carry_out(&mut self, work: &[Item], run: &mut Run) -> End {
+        if !self.settle_unread(work, run) {
+            return End::GaveWay;
+        }
+        if run.stops() {
+            return End::Failed;
+        }
         let items = work;
         // As long as every step is immediate the list's own order serves, and nothing needs to be counted.
         let mut at = 0;
@@ -278,7 +285,7 @@ impl Engine {
     }
 
     /// Draws the conclusion from an outcome; an unknown one waits to be settled.
-    fn conclude(&mut self, work: &[Item], i: u32, outcome: Outcome, run: &mut Run) {
+    pub(super) fn conclude(&mut self, work: &[Item], i: u32, outcome: Outcome, run: &mut Run) {
         let step = &work[i as usize].step;
         match outcome {
             Outcome::Done(_) => self.happened(work, i, run),
@@ -423,12 +430,16 @@ impl Engine {
         }
     }
 
-    fn tell_ended(&self, step: &Step, outcome: &Outcome, took: std::time::Duration, undoing: bool) {
+    fn tell_ended(&self, step: &Step, outcome: &Outcome, took: Duration, undoing: bool) {
         self.tell(StepName::of(step), StepEnd::from(outcome), took, undoing);
     }
 
-    fn tell(&self, step: StepName, end: StepEnd, took: std::time::Duration, undoing: bool) {
-        self.log.write(self.clock.now(), What::Step { step, end, took, undoing });
+    fn tell(&self, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
+        self.tell_at(self.clock.now(), step, end, took, undoing);
+    }
+
+    pub(super) fn tell_at(&self, at: Time, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
+        self.log.write(at, What::Step { step, end, took, undoing });
         if let Some(progress) = &self.progress {
             progress(&Progress::Ended { step, end, took, undoing });
         }

@@ -90,13 +90,17 @@ impl Engine {
     /// The stack takes over what was done.
     pub(super) fn commit(&mut self, planned: Planned) {
         self.stack.commit(planned.0);
+        self.forget_confirmations();
+        self.changed();
+    }
+
+    pub(super) fn forget_confirmations(&mut self) {
         // A frame that is gone needs no confirmation any more.
         let stack = &self.stack;
         self.confirming.retain(|waiting| match waiting.request.ask {
             Ask::Apply(id) => stack.newest_of(id, Some(waiting.request.requester)).is_some(),
             _ => false,
         });
-        self.changed();
     }
 
     /// The newest frame of `id` that `by` may undo and that is not among `taken`. None: there is no frame of it.

@@ -10,11 +10,12 @@
 //!
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`log`]: what happened.
 //! * `engine`: the thread. `requests`: the table of §6. `transaction`: whole or not at all. `exec`: carrying out steps.
-//!   `safe`: what goes first. `teardown`: to nothing. `pool`, `inbox`, `work`, `touched`: their tools.
+//!   `fast`: prepared switches. `safe`: what goes first. `teardown`: to nothing. `pool`, `inbox`, `work`, `touched`: their tools.
 
 pub mod control;
 mod engine;
 mod exec;
+mod fast;
 mod frames;
 mod inbox;
 pub mod log;

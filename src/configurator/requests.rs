@@ -11,9 +11,9 @@ use smallvec::SmallVec;
 
 /// What a request comes to, once its names are looked up.
 #[derive(Debug, Clone, Copy)]
-struct Part {
-    request: Request,
-    op: Op,
+pub(super) struct Part {
+    pub request: Request,
+    pub op: Op,
 }
 
 impl Engine {
@@ -30,6 +30,11 @@ impl Engine {
             && self.is_safe(&request)
         {
             return self.handle_safe(request);
+        }
+        if let [request] = batch.requests[..]
+            && self.handle_fast(request)
+        {
+            return;
         }
         let (mut undos, mut pushes) = (SmallVec::<[Part; 4]>::new(), SmallVec::<[Part; 4]>::new());
         let mixed = batch.requests.iter().any(|r| matches!(r.ask, Ask::UndoOf(_)))
@@ -177,7 +182,12 @@ impl Engine {
         };
         let spec = self.spec([part.op]);
         match self.carry(part.request, planned, spec) {
-            Ended::Applied if failed == Verdict::Failed => self.applied(part),
+            Ended::Applied if failed == Verdict::Failed => {
+                self.applied(part);
+                if let Op::Push(id, ..) = part.op {
+                    self.prepare(id);
+                }
+            }
             Ended::Applied => self.answer(part.request, Verdict::Undone, None),
             Ended::Undone(reason) => self.answer(part.request, failed, Some(reason)),
             Ended::Broken(residual) => {
@@ -192,7 +202,7 @@ impl Engine {
         if part.op.is_push() { Verdict::Broken } else { Verdict::UndoBroken }
     }
 
-    fn blame(&mut self, part: &Part) {
+    pub(super) fn blame(&mut self, part: &Part) {
         if let (Op::Push(id, by, _), Some(broken)) = (part.op, &mut self.broken) {
             broken.culprit = Some((id, by));
         }
@@ -235,7 +245,7 @@ impl Engine {
         spec
     }
 
-    fn applied(&mut self, part: Part) {
+    pub(super) fn applied(&mut self, part: Part) {
         let Op::Push(id, ..) = part.op else { return };
         if let Some(confirm) = self.configurations.get(&id).and_then(|c| c.confirm)
             && !self.heard.contains(&confirm.event)

@@ -64,9 +64,13 @@ impl Engine {
     /// Carries out `work` as a whole.
     pub(super) fn transact(&mut self, work: &[Item], spec: Spec) -> Ended {
         let until = spec.timeout.map_or(Time::NEVER, |limit| self.clock.now() + limit);
+        self.transact_from(work, Run::new(work, false, true, until), spec)
+    }
+
+    /// The same from where `run` stands.
+    pub(super) fn transact_from(&mut self, work: &[Item], mut run: Run, spec: Spec) -> Ended {
         self.allowed = spec.timeout.unwrap_or_default();
         self.patience = spec.patience;
-        let mut run = Run::new(work, false, true, until);
         let carried = catch_unwind(AssertUnwindSafe(|| self.carry_out(work, &mut run)));
         let end = match carried {
             Ok(End::All) => return Ended::Applied,
@@ -281,6 +285,8 @@ impl Engine {
     pub(super) fn adopt(&mut self, seen: &Snapshot) -> Result<(), system::UnknownType> {
         if self.system.snapshot() != *seen {
             self.system = System::from_snapshot(seen, self.system.catalogue().clone())?;
+            // They hold handles into the picture that was.
+            self.switches.clear();
             self.changed();
         }
         Ok(())

@@ -290,6 +290,7 @@ pub fn scenario() -> Vec<Configuration> {
         configuration("five", "", "set A.k 5; set B.k 5", ""),
         configuration("drop", "", "disconnect A.y B.u; disconnect B.y C.u; destroy A; destroy B; destroy C", ""),
         configuration("quiet", "", "", "_default:stopped"),
+        configuration("quick", "B:stopped", "set B.s 2; set B.k 3; write C.w 4", "B:running"),
         configuration("bad", "", "set Z.k 1", ""),
     ];
     for configuration in &mut all {
