@@ -319,7 +319,8 @@ impl Engine {
     }
 
     fn made_faulted(&mut self, component: ComponentName, run: &mut Run) {
-        if let Some(node) = self.system.component(component) {
+        // The state before the first fault: a second one is none of that.
+        if let Some(node) = self.system.component(component).filter(|node| node.state != RunState::Faulted) {
             run.faulted.push((component, node.state));
             self.system.set_state(component, RunState::Faulted);
         }
