@@ -9,6 +9,7 @@ pub mod hub;
 mod life;
 pub mod log;
 pub mod place;
+mod routes;
 pub mod rpc;
 pub mod service;
 pub mod socket;

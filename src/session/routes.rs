@@ -1,0 +1,171 @@
+//! The ways between coordinator, configurator and platform: names raised become requests, answers and reports become
+//! events. Called in the threads of those who raise; nothing here waits.
+
+use super::hub::{Hub, Meaning};
+use super::log::{Answered, Happening, StepTime};
+use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, StepEnd};
+use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
+use crate::limits;
+use crate::model::{EventName, Verdict};
+use crate::platform::PlatformEvent;
+use crate::statechart::{Chart, NodeId, RaiseSite, Raised, When};
+use rustc_hash::FxHashSet;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What the coordinator's and the configurator's threads need of each other: filled once both exist. Weak, so that
+/// neither keeps the other alive.
+#[derive(Default)]
+pub(super) struct Junction {
+    pub coordinator: Mutex<Option<Coordinator>>,
+    pub configurator: Mutex<Option<ConfiguratorHandle>>,
+}
+
+/// Hears the coordinator: names become requests, and what moves is written down.
+pub(super) struct ToConfigurator {
+    pub hub: Arc<Hub>,
+    pub junction: Weak<Junction>,
+    pub name: Requester,
+    /// Names that a state raises because of its state-scoped configurations.
+    pub scoped: FxHashSet<(EventName, NodeId)>,
+}
+
+pub(super) fn scoped(chart: &Chart) -> FxHashSet<(EventName, NodeId)> {
+    let of = |site: &RaiseSite| match site.when {
+        When::Entry(state) if site.scoped => Some((site.name, state)),
+        _ => None,
+    };
+    chart.raises().iter().filter_map(of).collect()
+}
+
+impl Listener for ToConfigurator {
+    fn raised(&mut self, _: &Chart, batch: &[Raised]) {
+        let mut requests = Batch::default();
+        for raised in batch {
+            match self.hub.meaning(raised.name) {
+                Meaning::Request(ask) => {
+                    let id = self.hub.request(ask, &self.name.to_string());
+                    let tag = (raised.owner.index() as u64, u64::from(raised.visit));
+                    let scoped = self.scoped.contains(&(raised.name, raised.owner));
+                    requests.requests.push(Request { id, ask, requester: self.name, scoped, tag });
+                }
+                Meaning::Emitted(event) => self.hub.note(Happening::Emitted { event: event.to_string() }),
+                Meaning::UnknownUndo(name) => {
+                    // There is no such ID: answered at once, as the table of requests says.
+                    let event = EventName::new(&format!("{name}.failed")).expect("an event with a suffix is one");
+                    self.hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned() });
+                    self.deliver(Incoming::answer(event, Tag::from(*raised)));
+                }
+                Meaning::Unknown(name) => self.hub.note(Happening::Forced {
+                    note: format!("`{name}` was raised: no configuration, and not declared under `emits`"),
+                }),
+            }
+        }
+        let configurator = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone());
+        if let Some(configurator) = configurator {
+            // A full queue answers every request itself.
+            let _ = configurator.submit(requests);
+        }
+    }
+
+    fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
+        self.hub.note(Happening::State { active: active.iter().map(|n| chart.fqn(*n).to_string()).collect() });
+    }
+
+    fn stale(&mut self, _: &Chart, event: EventName, _: Tag) {
+        self.hub.note(Happening::Stale { event: event.to_string() });
+    }
+
+    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+        self.hub.note(Happening::Forced { note: trouble.finding(chart).message });
+    }
+}
+
+impl ToConfigurator {
+    fn deliver(&self, incoming: Incoming) {
+        if let Some(coordinator) = self.junction.upgrade().and_then(|j| lock(&j.coordinator).clone()) {
+            let _ = coordinator.deliver(incoming);
+        }
+    }
+}
+
+/// Steps carried out since the last answer.
+pub(super) type Steps = Mutex<Vec<StepTime>>;
+
+pub(super) fn on_progress(steps: &Steps, progress: &Progress) {
+    match progress {
+        Progress::Begun { .. } => lock(steps).clear(),
+        Progress::Ended { step, end, took, undoing } => {
+            let mut steps = lock(steps);
+            if steps.len() < limits::STEPS_LOGGED {
+                let outcome = match end {
+                    StepEnd::Done => "done",
+                    StepEnd::NotDone => "not done",
+                    StepEnd::Unknown => "unknown",
+                };
+                let step = if *undoing { format!("undo: {step}") } else { step.to_string() };
+                steps.push(StepTime { step, outcome: outcome.to_owned(), took_us: took.as_secs_f64() * 1e6 });
+            }
+        }
+        Progress::Started(_) | Progress::Answered(_) | Progress::Recovered => {}
+    }
+}
+
+/// An answer becomes an event for whoever asked.
+pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &Answer) {
+    let event = answer.event();
+    let reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
+    hub.answered(Answered {
+        request: answer.request.id.0,
+        ask: answer.request.ask.to_string(),
+        answer: event.to_string(),
+        ok: matches!(answer.verdict, Verdict::Ok | Verdict::Undone),
+        by: answer.request.requester.to_string(),
+        took_us: answer.took.as_secs_f64() * 1e6,
+        reasons,
+        steps: std::mem::take(&mut *lock(steps)),
+    });
+    if let Requester::Coordinator(_) = answer.request.requester
+        && let Some(coordinator) = lock(&junction.coordinator).clone()
+    {
+        let (owner, visit) = answer.request.tag;
+        let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
+        let incoming = match (owner, u32::try_from(visit)) {
+            (Some(owner), Ok(visit)) => Incoming::answer(event, Tag { owner, visit }),
+            _ => Incoming::control(event),
+        };
+        let _ = coordinator.deliver(incoming);
+    }
+    // Only now: who sees that all is answered also sees that the coordinator has something to react to.
+    hub.settled(answer.request.id);
+}
+
+/// What the platform reports becomes an event; a fault is told as `COMPONENT.faulted`.
+pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent) {
+    let configurator = lock(&junction.configurator).clone();
+    if let Some(configurator) = configurator {
+        configurator.platform_event(event);
+    }
+    let (event, from) = match event {
+        PlatformEvent::Raised { event, component, .. } => (*event, component.to_string()),
+        PlatformEvent::Faulted { component, reason, .. } => {
+            hub.fault(component.as_str(), reason);
+            let event = EventName::new(&format!("{component}.faulted")).expect("a name with a suffix is one");
+            (event, component.to_string())
+        }
+        PlatformEvent::Returned { component, .. } => {
+            hub.clear_fault(component.as_str());
+            hub.note(Happening::Returned { component: component.to_string() });
+            return;
+        }
+    };
+    hub.note(Happening::Event { event: event.to_string(), from });
+    let coordinator = lock(&junction.coordinator).clone();
+    if let Some(coordinator) = coordinator {
+        // A full lane counts what it drops.
+        let _ = coordinator.deliver(Incoming::report(event));
+    }
+}
