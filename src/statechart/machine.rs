@@ -3,62 +3,11 @@
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
 use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
+use super::outcome::{Ended, Mode, Step, Stepped};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
 use crate::limits;
 use crate::time::Time;
-
-/// The mode of the active leaf.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// Its activity goes on.
-    Active,
-    /// It has none, or it is through.
-    Done,
-}
-
-/// What one turn of the step loop did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Step {
-    /// The chart was entered.
-    Entered,
-    /// The chart could not be entered; the events are lost.
-    NotEntered,
-    /// A transition was taken.
-    Taken,
-    /// There were events, and no transition for them.
-    Unmatched,
-    /// There were no events; the leaf's activity was resumed, if it has one.
-    Quiet {
-        /// Nothing left to do.
-        idle: bool,
-    },
-}
-
-/// What [`Machine::step`] and [`Machine::run`] did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Stepped {
-    /// What rFSM's `step` returns: nothing is left to do. `false`: the number of steps was used up, or entering failed.
-    pub idle: bool,
-    /// At least one transition was taken, the first entry counted.
-    pub transition: bool,
-    /// Why it ended.
-    pub ended: Ended,
-}
-
-/// Why stepping ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ended {
-    /// Nothing left to do.
-    Idle,
-    /// As many steps as asked for.
-    Steps,
-    /// The chart could not be entered.
-    NotEntered,
-    /// It did not come to rest within [`limits::CHART_RUN`] turns (rFSM would never return).
-    Endless,
-}
 
 /// The state of one run of a chart. All of its methods must be given the chart it was made for.
 #[derive(Debug, Clone)]

@@ -1,8 +1,9 @@
 //! A coordinator alone, stepped line by line: what `davit sim` does (design §16). Pure: lines in, observations out.
 
+use super::Machine;
 use super::chart::{Chart, NodeId};
 use super::hook::{Hook, Raised};
-use super::machine::{Ended, Machine, Mode, Stepped};
+use super::outcome::{Ended, Mode, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
 use crate::model::names::{EventName, NameError};
