@@ -2,8 +2,8 @@
 
 use super::chart::{Chart, EventId, Kind, NONE};
 use super::hook::Nobody;
-use super::machine::{Machine, Step};
 use super::{EdgeId, NodeId};
+use super::{Machine, Step};
 use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{Finding, Findings};
