@@ -4,6 +4,9 @@
 //! `cargo bench --bench ports`. Every figure is the median of several runs; the slope is fitted through the origin and a
 //! constant by least squares over N = 10 to 10,000. Nothing is asserted: machines differ.
 
+// What is measured here is real time.
+#![allow(clippy::disallowed_methods)]
+
 use davit::libraries::standard;
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;

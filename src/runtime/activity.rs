@@ -66,6 +66,9 @@ struct Counters {
     duration_max: AtomicU64,
 }
 
+/// What is done with a component that was put in quarantine and has come back.
+pub(crate) type Late = Box<dyn Fn(&Arc<Cell>) + Send + Sync>;
+
 pub(crate) struct Activity {
     pub(crate) name: Ident,
     spec: Spec,
@@ -80,12 +83,11 @@ pub(crate) struct Activity {
     busy_since: AtomicU64,
     counters: Counters,
     complaint: Mutex<Option<String>>,
-    /// Called with a component that was put in quarantine and has come back.
-    late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>,
+    late: Late,
 }
 
 impl Activity {
-    pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: Box<dyn Fn(&Arc<Cell>) + Send + Sync>) -> Self {
+    pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: Late) -> Self {
         Self {
             name,
             spec,
@@ -283,9 +285,10 @@ impl Activity {
         self.busy_since.store(self.clock.now().0, Ordering::Release);
         match cell.enter_for_operation() {
             Ok(mut inside) => {
-                let fault = inside.operation(&self.clock, operation, &args, call).err();
+                let mut ended = inside.operation(&self.clock, operation, &args, call);
                 stage.returned();
-                self.leave(&cell, inside, fault);
+                self.leave(&cell, inside, ended.fault.take());
+                ended.answer();
             }
             Err(closed) => {
                 let text = match closed {

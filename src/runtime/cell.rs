@@ -5,7 +5,7 @@ use super::component::{Call, Context, HookResult, Reply};
 use super::guard;
 use super::library::{Body, Kind};
 use crate::model::{ComponentName, RunState, Transition, Value};
-use crate::time::{Clock, Time};
+use crate::time::{Clock, Sender, Time};
 use std::cell::UnsafeCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -180,7 +180,26 @@ impl Cell {
     /// Forgets the last update.
     pub(crate) fn restart(&self) {
         self.last.store(Time::NEVER.0, Ordering::Relaxed);
-        self.beat.wake_at.store(Time::NEVER.0, Ordering::Relaxed);
+        if self.beat.is_event_driven() {
+            self.beat.wake_at.store(Time::NEVER.0, Ordering::Relaxed);
+        }
+    }
+}
+
+/// How the call of an operation ended.
+pub(crate) struct Ended {
+    /// Why the component is faulted, if it is.
+    pub(crate) fault: Option<String>,
+    /// None: the answer comes later.
+    reply: Option<Reply>,
+    to: Sender<Reply>,
+}
+
+impl Ended {
+    pub(crate) fn answer(self) {
+        if let Some(reply) = self.reply {
+            let _ = self.to.try_send(reply);
+        }
     }
 }
 
@@ -251,34 +270,25 @@ impl<'a> Inside<'a> {
         }
     }
 
-    /// Calls an operation and sends its answer, unless it comes later. The fault, if there is one.
-    pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Call) -> Result<(), String> {
+    /// Calls an operation. Its answer is sent by [`Ended::answer`], after leaving: who hears it may call again at once.
+    pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Call) -> Ended {
         let cell = self.cell;
         cell.beat.set_now(clock.now());
         let mut cx = Context::new(clock, &cell.beat, 0.0, false);
-        let reply = call.reply.clone();
+        let to = call.reply.clone();
         cx.call = Some(call);
-        let Some(body) = self.body() else {
-            let _ = reply.try_send(Reply::Refused("the component is gone".to_owned()));
-            return Ok(());
+        let result = match self.body() {
+            None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
+            Some(body) => guard::call(|| body.operation(index, args, &mut cx)),
         };
-        match guard::call(|| body.operation(index, args, &mut cx)) {
-            Err(panic) => {
-                let _ = reply.try_send(Reply::Panicked(panic.clone()));
-                return Err(panic);
-            }
-            Ok(Some(answer)) => {
-                let _ = reply.try_send(answer);
-            }
+        let (reply, fault) = match result {
+            Err(panic) => (Some(Reply::Panicked(panic.clone())), Some(panic)),
             Ok(None) if cx.call.is_some() => {
-                let _ = reply.try_send(Reply::Failed("it answered `Pending` without taking a ticket".to_owned()));
+                (Some(Reply::Failed("it answered `Pending` without taking a ticket".to_owned())), cx.fault.take())
             }
-            Ok(None) => {}
-        }
-        match cx.fault.take() {
-            None => Ok(()),
-            Some(reason) => Err(reason),
-        }
+            Ok(reply) => (reply, cx.fault.take()),
+        };
+        Ended { fault, reply, to }
     }
 
     /// Leaves, in another state if one is given.

@@ -35,7 +35,7 @@ record! {
     }
 }
 
-#[allow(dead_code)]
+#[allow(dead_code, clippy::type_complexity)]
 struct Plant {
     inputs: (In<f64>, In<f64>, In<f64>, In<[f64; 3]>, In<i64>, In<f64>, In<EventName>),
     outputs: (Out<f64>, Out<f64>, Out<[f64; 3]>),

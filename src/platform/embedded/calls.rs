@@ -182,12 +182,13 @@ impl Inner {
             if !stage.begin() {
                 return;
             }
-            let fault = inside.operation(&clock, index, &args, call).err();
+            let mut ended = inside.operation(&clock, index, &args, call);
             stage.returned();
-            let left = inside.leave(fault.is_some().then_some(RunState::Faulted));
-            if let Some(reason) = fault {
+            let left = inside.leave(ended.fault.is_some().then_some(RunState::Faulted));
+            if let Some(reason) = ended.fault.take() {
                 cell.beat.faulted(reason, clock.now());
             }
+            ended.answer();
             if left.quarantined
                 && let Some(inner) = inner.upgrade()
             {

@@ -5,6 +5,7 @@ use crate::limits;
 use crate::model::{ComponentType, Direction, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Value};
 use crate::platform::Cause;
 use crate::runtime::builder::PortEnd;
+use crate::runtime::guard;
 use crate::time::Time;
 
 impl Registry {
@@ -130,7 +131,9 @@ impl Registry {
         if !ty.tunable.allows(state) {
             return refused(format!("{}.{name} may not be set while it is {state}", entry.cell.name));
         }
-        if !entry.ends.properties[index].as_mut().is_some_and(|end| end.set(value)) {
+        // Turning a value into the Rust type is the component's own code as well.
+        let end = entry.ends.properties[index].as_mut();
+        if !end.is_some_and(|end| guard::call(|| end.set(value)).unwrap_or(false)) {
             return refused(format!("{value} does not fit {}.{name}", entry.cell.name));
         }
         entry.values[index].clone_from(value);
@@ -185,7 +188,7 @@ impl Registry {
             return refused(format!("{value} does not fit {}.{name}", entry.cell.name));
         }
         let written = match &mut entry.ends.ports[index] {
-            Some(PortEnd::In(end)) => end.write(value, now),
+            Some(PortEnd::In(end)) => guard::call(|| end.write(value, now)).unwrap_or(false),
             _ => false,
         };
         if !written {
