@@ -55,6 +55,12 @@ macro_rules! name {
             pub fn as_str(&self) -> &'static str {
                 self.0.as_str()
             }
+
+            /// Where the text is kept: the same for the same name, and known without looking at the text. To hash names
+            /// by where it matters; it differs from run to run, so nothing may be ordered by it.
+            pub fn address(&self) -> usize {
+                self.0.as_char_ptr() as usize
+            }
         }
 
         impl fmt::Display for $name {

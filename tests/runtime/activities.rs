@@ -162,7 +162,9 @@ fn no_thread_is_left_behind() {
                 assert_eq!(threads("davit-lonely"), 0, "there is none before something runs");
             }
             run(Step::State { component, transition: Transition::Start });
-            clock.sleep(MS * 3);
+            while platform.activities()[0].cycles == 0 {
+                clock.sleep(MS);
+            }
             assert!(threads("davit-lonely") >= 1);
             run(Step::State { component, transition: Transition::Stop });
             run(Step::State { component, transition: Transition::Cleanup });

@@ -93,6 +93,7 @@ impl Registry {
             let edges: Vec<(usize, usize)> = self
                 .connections
                 .keys()
+                .map(|ends| ends.0)
                 .filter_map(|(from, to)| Some((*place.get(&from.component)?, *place.get(&to.component)?)))
                 .filter(|(from, to)| from != to)
                 .collect();

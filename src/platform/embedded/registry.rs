@@ -8,6 +8,7 @@ use crate::runtime::cell::Cell;
 use crate::time::Join;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -15,14 +16,34 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(super) struct Registry {
     pub(super) slots: Vec<Option<Entry>>,
     free: Vec<u32>,
-    names: FxHashMap<ComponentName, u32>,
-    pub(super) connections: FxHashMap<(MemberRef, MemberRef), Connection>,
+    names: FxHashMap<ByAddress<ComponentName>, u32>,
+    pub(super) connections: FxHashMap<ByAddress<(MemberRef, MemberRef)>, Connection>,
     numbers: u64,
     pub(super) crews: FxHashMap<Ident, Crew>,
     /// Threads of activities that are gone.
     pub(super) ending: Vec<Join>,
     /// Components whose call never returned; also those that are not there any more but for that call.
     pub(super) quarantined: FxHashSet<ComponentName>,
+}
+
+/// A name as a key that is hashed by its address: hashing the text would fetch it from memory, which among thousands of
+/// components costs more than the rest of a look-up.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) struct ByAddress<N>(pub(super) N);
+
+impl Hash for ByAddress<ComponentName> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        state.write_usize(self.0.address());
+    }
+}
+
+impl Hash for ByAddress<(MemberRef, MemberRef)> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        for end in [self.0.0, self.0.1] {
+            state.write_usize(end.component.address());
+            state.write_usize(end.member.address());
+        }
+    }
 }
 
 /// A component.
@@ -73,7 +94,7 @@ impl Entry {
 impl Registry {
     /// The component of that name.
     pub(super) fn find(&self, name: ComponentName) -> Result<u32, Cause> {
-        match self.names.get(&name) {
+        match self.names.get(&ByAddress(name)) {
             Some(slot) => Ok(*slot),
             None if self.quarantined.contains(&name) => Err(Cause::Quarantined),
             None => refused(format!("there is no component `{name}`")),
@@ -81,7 +102,7 @@ impl Registry {
     }
 
     pub(super) fn is_free(&self, name: ComponentName) -> Result<(), Cause> {
-        if self.names.contains_key(&name) {
+        if self.names.contains_key(&ByAddress(name)) {
             refused(format!("`{name}` is there already"))
         } else if self.quarantined.contains(&name) {
             Err(Cause::Quarantined)
@@ -132,7 +153,7 @@ impl Registry {
         }
         let mut ports = Vec::with_capacity(ends.ports.len());
         ports.resize_with(ends.ports.len(), PortUse::default);
-        self.names.insert(cell.name, slot);
+        self.names.insert(ByAddress(cell.name), slot);
         self.slots[slot as usize] =
             Some(Entry { cell, ends, values, ports, connections: 0, asked, crew, place, number });
     }
@@ -147,6 +168,7 @@ impl Registry {
         let mut named: Vec<String> = self
             .connections
             .keys()
+            .map(|ends| ends.0)
             .filter(|(from, to)| from.component == name || to.component == name)
             .map(|(from, to)| format!("{from} -> {to}"))
             .collect();
@@ -158,7 +180,7 @@ impl Registry {
     pub(super) fn remove(&mut self, slot: u32) -> Entry {
         let entry = self.slots[slot as usize].take().expect("a slot found under this lock is taken");
         self.free.push(slot);
-        self.names.remove(&entry.cell.name);
+        self.names.remove(&ByAddress(entry.cell.name));
         if let Some(crew) = self.crews.get_mut(&entry.crew) {
             crew.members[entry.place as usize] = None;
             crew.holes += 1;
@@ -178,8 +200,8 @@ impl Registry {
         let mut own: Vec<(MemberRef, MemberRef)> = self
             .connections
             .keys()
+            .map(|ends| ends.0)
             .filter(|(from, to)| from.component == name || to.component == name)
-            .copied()
             .collect();
         own.sort_unstable();
         for (from, to) in own {
@@ -213,8 +235,8 @@ impl Registry {
     }
 
     pub(super) fn snapshot(&self) -> Snapshot {
-        let components = self.names.iter().map(|(name, slot)| (*name, self.component(*slot))).collect();
-        let connections = self.connections.iter().map(|(ends, connection)| (*ends, connection.policy)).collect();
+        let components = self.names.iter().map(|(name, slot)| (name.0, self.component(*slot))).collect();
+        let connections = self.connections.iter().map(|(ends, connection)| (ends.0, connection.policy)).collect();
         let mut ports = BTreeMap::new();
         for entry in self.slots.iter().flatten() {
             for (port, used) in entry.cell.kind.ports.iter().zip(&entry.ports) {
@@ -232,7 +254,7 @@ impl Registry {
         let mut list: Vec<_> = self
             .connections
             .iter()
-            .filter_map(|(ends, connection)| Some((*ends, connection.lost.as_ref()?.load(Ordering::Relaxed))))
+            .filter_map(|(ends, connection)| Some((ends.0, connection.lost.as_ref()?.load(Ordering::Relaxed))))
             .collect();
         list.sort_unstable();
         list

@@ -1,6 +1,6 @@
 //! Ports and properties as the configurator's side has them: connecting, setting, writing.
 
-use super::registry::{Connection, Registry, refused};
+use super::registry::{ByAddress, Connection, Registry, refused};
 use crate::limits;
 use crate::model::{ComponentType, Direction, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Value};
 use crate::platform::Cause;
@@ -47,7 +47,7 @@ impl Registry {
         if used.data || (used.connections > 0 && carried == Policy::Data) {
             return refused(format!("{to} is connected already"));
         }
-        if self.connections.contains_key(&(from, to)) {
+        if self.connections.contains_key(&ByAddress((from, to))) {
             return refused(format!("{from} -> {to} is connected already"));
         }
         let number = self.next_number();
@@ -65,7 +65,7 @@ impl Registry {
         }
         entry.ports[out_port].connections += 1;
         entry.connections += 1;
-        self.connections.insert((from, to), Connection { number, policy, lost });
+        self.connections.insert(ByAddress((from, to)), Connection { number, policy, lost });
         let (writer, reader) = (self.entry(writer), self.entry(reader));
         if writer.crew == reader.crew && writer.place > reader.place {
             let name = writer.crew;
@@ -81,7 +81,7 @@ impl Registry {
     pub(super) fn disconnect(&mut self, from: MemberRef, to: MemberRef) -> Result<(), Cause> {
         let (writer, reader) = (self.find(from.component)?, self.find(to.component)?);
         let (out_port, in_port) = (self.port(writer, from.member)?.0, self.port(reader, to.member)?.0);
-        let Some(connection) = self.connections.remove(&(from, to)) else {
+        let Some(connection) = self.connections.remove(&ByAddress((from, to))) else {
             return refused(format!("{from} -> {to} is not connected"));
         };
         let entry = self.entry_mut(writer);
