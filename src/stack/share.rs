@@ -19,13 +19,14 @@ pub(super) struct HandOver {
 }
 
 /// Whether the frame at `at` may be popped.
-pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Finding> {
+pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Finding>> {
     let frame = &frames[at];
     for above in &frames[at..] {
         if let Some(reason) = &above.floor {
             let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
-            return Err(Finding::error(codes::STACK_FLOOR, message)
-                .help("apply a configuration that leads to the wanted state instead"));
+            let finding = Finding::error(codes::STACK_FLOOR, message)
+                .help("apply a configuration that leads to the wanted state instead");
+            return Err(Box::new(finding));
         }
     }
     let mut hand = HandOver::default();
@@ -54,8 +55,9 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Find
                 "`{}` cannot be undone before `{}`, which {did} {}",
                 frame.configuration, other.configuration, touch.slot
             );
-            return Err(Finding::error(codes::STACK_SHARED, message)
-                .help(format!("undo `{}` first, or undo down to `{}`", other.configuration, frame.configuration)));
+            let finding = Finding::error(codes::STACK_SHARED, message)
+                .help(format!("undo `{}` first, or undo down to `{}`", other.configuration, frame.configuration));
+            return Err(Box::new(finding));
         }
     }
     Ok(hand)

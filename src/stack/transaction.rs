@@ -151,7 +151,7 @@ impl Work<'_, '_, '_> {
     }
 
     fn pop(&mut self, at: usize) -> Result<(), Refusal> {
-        let hand = share::examine(&self.frames, at).map_err(Refusal::one)?;
+        let hand = share::examine(&self.frames, at).map_err(|finding| Refusal::one(*finding))?;
         let frame = self.frames[at].clone();
         self.take_back(&frame, &hand).map_err(|found| drifted(&found))?;
         share::remove(&mut self.frames, at, hand);

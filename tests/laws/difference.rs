@@ -30,6 +30,7 @@ proptest! {
         left in generate::configs(0..3),
         right in generate::configs(0..3),
         faults in any::<(u8, u8)>(),
+        written in prop::collection::vec(any::<(bool, u8, u8)>(), 0..4),
     ) {
         let catalogue = generate::catalogue(&types, true);
         let grow = |more: &[generate::ConfigGene], fault: u8| {
@@ -38,7 +39,12 @@ proptest! {
             if fault % 2 == 1 {
                 system.set_state(generate::name(fault / 2), RunState::Faulted);
             }
-            system
+            // Written values, also under connections: written before they were made.
+            let mut now = system.snapshot();
+            for (_, port, value) in written.iter().filter(|(first, ..)| *first == (fault == faults.0)) {
+                generate::write_under(&mut now, &catalogue, *port, *value);
+            }
+            System::from_snapshot(&now, catalogue.clone()).unwrap()
         };
         let (a, b) = (grow(&left, faults.0), grow(&right, faults.1));
         prop_assert!(diff(&a, &a).is_empty());

@@ -68,7 +68,7 @@ fn value_type(n: u8) -> ValueType {
 fn value(ty: &ValueType, n: u8) -> Value {
     let small = f64::from(n % 3);
     match ty {
-        ValueType::Bool => Value::Bool(n % 2 == 0),
+        ValueType::Bool => Value::Bool(n.is_multiple_of(2)),
         ValueType::Int => Value::Int(i64::from(n % 3)),
         ValueType::Float if n % 7 == 6 => Value::Int(i64::from(n % 3)),
         ValueType::Float => Value::Float(small),
@@ -280,7 +280,7 @@ impl Reader<'_> {
     }
 
     fn connect(&mut self, a: u8, b: u8, c: u8) {
-        let policy = if c % 3 == 0 { Policy::Buffer(u32::from(c % 2) + 1) } else { Policy::Data };
+        let policy = if c.is_multiple_of(3) { Policy::Buffer(u32::from(c % 2) + 1) } else { Policy::Data };
         let careless = c % 32 == 31;
         let mut pairs = Vec::new();
         for (from, source) in self.ports(Direction::Out) {
@@ -330,7 +330,7 @@ impl Reader<'_> {
         let wrong = if c % 32 == 31 { Value::Float(1e9) } else { value(&ty.ty, b) };
         self.push(ChangeKind::PropertySet { property, value: wrong });
         let state = self.system.component(property.component).map(|n| n.state);
-        if let Some(state) = state.filter(|s| !ty.tunable.allows(*s) && c % 16 != 0) {
+        if let Some(state) = state.filter(|s| !ty.tunable.allows(*s) && !c.is_multiple_of(16)) {
             let state_for = if ty.tunable == Tunable::Stopped { RunState::Stopped } else { RunState::Unconfigured };
             let target = Target::Component(property.component);
             self.conf.pre.push(StateEntry { target, state: state_for, origin: Origin::NONE });
@@ -346,9 +346,26 @@ impl Reader<'_> {
             .collect();
         let Some((operation, ty)) = pick(&all, a) else { return };
         let call = Call { operation, args: ty.args.iter().map(|t| value(t, b)).collect() };
-        let undo = pick(&all, b).filter(|_| c % 3 == 0);
+        let undo = pick(&all, b).filter(|_| c.is_multiple_of(3));
         let undo = undo.map(|(operation, ty)| Call { operation, args: ty.args.iter().map(|t| value(t, c)).collect() });
         self.push(ChangeKind::OperationCall { call, undo });
+    }
+}
+
+/// Records a written value on an in-port that can have one, or that it was never written.
+pub fn write_under(is: &mut Snapshot, types: &Catalogue, port: u8, n: u8) {
+    let ports = is.components.iter().flat_map(|(c, it)| {
+        let ty = types.get(it.ty).unwrap();
+        ty.ports.iter().map(|(p, t)| (c.member(*p), t))
+    });
+    let can = |t: &PortType| t.direction == Direction::In && !t.is_event() && !t.buffered;
+    let ports: Vec<_> = ports.filter(|(_, t)| can(t)).collect();
+    if let Some((port, ty)) = pick(&ports, port) {
+        if n % 4 == 3 {
+            is.ports.remove(&port);
+        } else {
+            is.ports.insert(port, value(&ty.ty, n).fit(&ty.ty).unwrap());
+        }
     }
 }
 

@@ -82,7 +82,7 @@ impl Subject {
 
     fn push(id: FrameId, both: &Both, conf: &Configuration) -> InForce {
         let frame = both.stack.frame(id).expect("the newest frame is never squashed at once");
-        InForce { id, did: record(frame.steps(), &frame.saved), group: conf.group, squashed: false }
+        InForce { id, did: record(conf, frame.steps(), &both.system), group: conf.group, squashed: false }
     }
 
     /// Drops from the record what is no longer on the stack, and marks what was squashed.

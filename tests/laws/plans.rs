@@ -3,9 +3,9 @@
 use crate::generate::{self, ConfigGene, TypeGene, context, read};
 use crate::plain::Plain;
 use crate::settings;
-use davit::plan::{PlannedStep, plan};
+use davit::plan::{PlannedStep, plan, plan_on};
 use davit::stack::{Request, Requester, Stack, transaction};
-use davit::system::{Reversibility, step};
+use davit::system::{Overlay, Reversibility, View, step};
 use davit::time::Time;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -120,7 +120,9 @@ proptest! {
         let mut plain = Plain::new(system.snapshot(), &catalogue);
         for gene in genes.iter().chain([&last]) {
             let conf = read(gene, &system);
-            let Ok(plan) = plan(&system, &conf, &context()) else { continue };
+            let before = system.clone();
+            let mut overlay = Overlay::new(&before);
+            let Ok(plan) = plan_on(&mut overlay, &conf, &context()) else { continue };
             let planned = plan.steps.clone();
             for s in &planned {
                 prop_assert!(plain.allows(&s.step), "{} is not allowed", s.step);
@@ -134,6 +136,21 @@ proptest! {
                 plain.make(&s.step);
                 step::effect(&s.step, &mut system);
                 prop_assert_eq!(&plain.is, &system.snapshot());
+            }
+            // The overlay that was planned on shows the same, also in what is counted and not observed.
+            prop_assert_eq!(overlay.snapshot(), system.snapshot());
+            for (name, component) in &plain.is.components {
+                let degree = plain.is.connections.keys().filter(|(a, b)| a.component == *name || b.component == *name).count();
+                prop_assert_eq!(overlay.component(*name).unwrap().degree as usize, degree);
+                prop_assert_eq!(system.component(*name).unwrap().degree as usize, degree);
+                for port in catalogue.get(component.ty).unwrap().ports.keys() {
+                    let port = name.member(*port);
+                    let links = plain.is.connections.iter().filter(|((_, to), _)| *to == port);
+                    let data = links.clone().filter(|(_, policy)| **policy == davit::model::Policy::Data).count();
+                    for driven in [overlay.driven(port), system.driven(port)] {
+                        prop_assert_eq!((driven.links as usize, driven.data as usize), (links.clone().count(), data));
+                    }
+                }
             }
         }
         let again = davit::system::System::from_snapshot(&plain.is, catalogue).unwrap();

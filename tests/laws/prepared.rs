@@ -1,6 +1,6 @@
 //! A prepared switch does what the plan of its configuration does, and its undo what the pop of its frame does.
 
-use crate::generate::{self, context, read};
+use crate::generate::{self, read};
 use crate::plans::operator;
 use crate::settings;
 use crate::stacks::Both;

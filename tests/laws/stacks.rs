@@ -4,11 +4,10 @@ use crate::generate::{self, ConfigGene, TypeGene, context, read};
 use crate::plain::Plain;
 use crate::plans::{every_order, operator, show};
 use crate::settings;
-use davit::model::{Catalogue, Snapshot, Step};
-use davit::plan::footprint::{Saved, Slot};
-use davit::plan::{PlannedStep, Refusal};
+use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
+use davit::plan::{PlannedStep, Refusal, Stage};
 use davit::stack::{FrameId, Request, Stack, Transaction, transaction};
-use davit::system::{System, step};
+use davit::system::{System, View, step};
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -42,44 +41,48 @@ impl Both {
         Ok(self.execute(transaction))
     }
 
-    /// Pushes what is accepted of `genes`, without groups, and answers the system before each.
-    fn grow(&mut self, genes: &[ConfigGene]) -> Vec<Snapshot> {
+    /// Pushes what is accepted of `genes`, without groups, and answers the system before each, and what each did.
+    fn grow(&mut self, genes: &[ConfigGene]) -> Vec<(Snapshot, Vec<Step>)> {
         let mut before = Vec::new();
         for gene in genes {
             let mut conf = read(gene, &self.system);
             conf.group = None;
             let now = self.system.snapshot();
             if self.make(&[operator(&conf)]).is_ok() {
-                before.push(now);
+                let frame = self.stack.top().expect("it was just pushed");
+                before.push((now, record(&conf, frame.steps(), &self.system)));
             }
         }
         before
     }
 }
 
-/// What a frame did, as plain writes: its steps, and the demands that were true already (a write counts as one).
-pub fn record(steps: &[PlannedStep], saved: &[davit::plan::SavedValue]) -> Vec<Step> {
-    let kept = saved.iter().filter(|s| !s.step).filter_map(|s| match (s.slot, &s.value) {
-        (Slot::Property(property), Saved::Property(value)) => {
-            Some(Step::PropertySet { property, value: value.clone() })
+/// What a configuration did, as plain writes: the steps it was expanded to, and its demands for values that were there
+/// already, read from the configuration itself (a write counts as one). `system` is the one after it.
+pub fn record(conf: &Configuration, steps: &[PlannedStep], system: &System) -> Vec<Step> {
+    let done = |step: &Step| {
+        steps.iter().any(|s| match (&s.step, step) {
+            (Step::PropertySet { property: a, .. }, Step::PropertySet { property: b, .. }) => a == b,
+            (Step::PortWrite { port: a, .. }, Step::PortWrite { port: b, .. }) => a == b,
+            (Step::Create { component, .. }, step) => *component == step.component(),
+            _ => false,
+        })
+    };
+    let demands = conf.changes.iter().filter_map(|change| match &change.kind {
+        ChangeKind::PropertySet { property, value } => {
+            let declared = system.component(property.component)?.property(property.member)?.1;
+            Some(Step::PropertySet { property: *property, value: declared.fit(value.clone()).unwrap() })
         }
-        (Slot::Port(port), Saved::Port(value)) => Some(Step::PortWrite { port, value: value.clone() }),
+        ChangeKind::PortWrite { port, value } => {
+            let declared = system.component(port.component)?.port(port.member)?.1;
+            Some(Step::PortWrite { port: *port, value: Some(value.clone().fit(&declared.ty).unwrap()) })
+        }
         _ => None,
     });
-    // What a demand found was there before the steps of its stage; property and port writes of one frame are of
-    // different slots, and a demand needs the run state that the list brought about, so it stands where it was made.
-    let mut list: Vec<Step> = Vec::new();
-    let mut kept: Vec<(u32, Step)> = saved.iter().filter(|s| !s.step).map(|s| s.at).zip(kept).collect();
-    kept.sort_by_key(|(at, _)| *at);
-    let mut kept = kept.into_iter().peekable();
-    for s in steps {
-        while let Some((_, write)) = kept.next_if(|(at, _)| *at <= s.id) {
-            list.push(write);
-        }
-        list.push(s.step.clone());
-    }
-    list.extend(kept.map(|(_, write)| write));
-    list
+    let kept: Vec<Step> = demands.filter(|step| !done(step)).collect();
+    let post = steps.iter().filter(|s| s.stage != Stage::Post).count();
+    let all = steps.iter().map(|s| s.step.clone());
+    all.clone().take(post).chain(kept).chain(all.skip(post)).collect()
 }
 
 pub fn world(n: std::ops::Range<usize>) -> impl Strategy<Value = (Vec<TypeGene>, Vec<ConfigGene>)> {
@@ -103,9 +106,9 @@ proptest! {
         prop_assert_eq!(&jump.system.snapshot(), &reached.is);
         prop_assert_eq!(jump.stack.len(), depth);
         if depth < before.len() {
-            prop_assert_eq!(&reached.is, &before[depth]);
+            prop_assert_eq!(&reached.is, &before[depth].0);
         }
-        for earlier in before.iter().rev() {
+        for (earlier, _) in before.iter().rev() {
             both.make(&[Request::UndoTop]).unwrap();
             prop_assert_eq!(&both.system.snapshot(), earlier);
         }
@@ -117,11 +120,10 @@ proptest! {
     #[test]
     fn selective_undo((types, genes) in world(2..7), pick in any::<prop::sample::Index>()) {
         let mut both = Both::new(generate::catalogue(&types, false), 64);
-        both.grow(&genes);
+        let records: Vec<Vec<Step>> = both.grow(&genes).into_iter().map(|(_, did)| did).collect();
         if both.stack.is_empty() {
             return Ok(());
         }
-        let records: Vec<Vec<Step>> = both.stack.frames().iter().map(|f| record(f.steps(), &f.saved)).collect();
         let at = pick.index(records.len());
         let id = both.stack.frames()[at].id;
         let before = both.system.snapshot();
