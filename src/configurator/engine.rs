@@ -15,7 +15,7 @@ use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::{Requester, Stack};
 use crate::system::System;
-use crate::time::{Clock, Receiver, RecvError, Time, TryRecvError};
+use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::VecDeque;
@@ -196,11 +196,8 @@ impl Engine {
 
     /// Takes in what has come, without waiting.
     pub fn glance(&mut self) {
-        loop {
-            match self.inbox.try_recv() {
-                Ok(mail) => self.take_in(mail),
-                Err(TryRecvError::Empty | TryRecvError::Closed) => break,
-            }
+        while let Ok(mail) = self.inbox.try_recv() {
+            self.take_in(mail);
         }
         if self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.clear();

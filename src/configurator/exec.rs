@@ -78,7 +78,7 @@ impl Run {
     }
 
     fn stops(&self) -> bool {
-        !self.undoing && !(self.failures.is_empty() && self.unsettled.is_empty())
+        !(self.undoing || self.failures.is_empty() && self.unsettled.is_empty())
     }
 }
 

@@ -375,9 +375,9 @@ pub fn prepared_steps_do_what_executed_ones_do(bed: &dyn Bed) {
     let Some(mut prepared) = made.platform.prepare(&steps) else {
         return; // A platform need not support it.
     };
-    for index in 0..3 {
+    for (index, step) in steps.iter().enumerate().take(3) {
         let outcome = prepared.execute(index, None, made.deadline());
-        assert!(matches!(outcome, Outcome::Done(_)), "{}: {outcome:?}", steps[index]);
+        assert!(matches!(outcome, Outcome::Done(_)), "{step}: {outcome:?}");
     }
     let seen = made.see();
     assert_eq!(seen.components[&name("a")].properties[&ident("gains")], Value::floats(&[0.1, 0.2, 0.3]));

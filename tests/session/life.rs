@@ -46,8 +46,7 @@ fn up_and_down(file: &str) -> Vec<String> {
     assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");
     assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
     clock.shutdown();
-    let heard = heard.lock().unwrap().clone();
-    heard
+    std::mem::take(&mut *heard.lock().unwrap())
 }
 
 #[test]

@@ -99,7 +99,7 @@ impl Component for Peer {
         )
         .on_configure(|c, _| {
             let script = c.read_script()?;
-            c.world = Box::new(World::new(c.q_start.get(), script, c.seed.get().unsigned_abs()));
+            *c.world = World::new(c.q_start.get(), script, c.seed.get().unsigned_abs());
             Ok(())
         });
         b.doc("The other robot begins anew: another epoch.").no_effect().operation("restart", |c, _, (): ()| {
