@@ -71,6 +71,7 @@ fn reserve(count: &AtomicUsize, wanted: usize, bound: usize) -> bool {
 }
 
 impl Post {
+    #[allow(clippy::result_large_err)] // The batch is given back: it still has to be answered.
     /// Puts a batch in; `safe` of its requests ask for safe configurations. Gives it back when there is no room.
     pub fn batch(&self, batch: Batch, safe: usize) -> Result<(), Batch> {
         let plain = batch.requests.len() - safe;

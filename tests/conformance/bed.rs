@@ -19,12 +19,15 @@ pub enum Trouble {
     Hang(Option<Duration>),
 }
 
+/// Lets the component of that name raise that event.
+pub type Raise = Box<dyn Fn(&str, &str)>;
+
 /// A platform under test.
 pub struct Made {
     pub platform: Arc<dyn Platform>,
     pub clock: Clock,
     /// Lets the component of that name raise that event.
-    pub raise: Box<dyn Fn(&str, &str)>,
+    pub raise: Raise,
     /// Whatever must live as long.
     #[allow(dead_code)]
     pub keep: Vec<Box<dyn std::any::Any>>,
