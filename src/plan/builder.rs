@@ -93,6 +93,11 @@ impl Builder<'_, '_, '_> {
             self.refuse(&what, found, origin);
             return None;
         }
+        Some(self.allowed(what, undo, origin, after))
+    }
+
+    /// Plans one step whose precondition was looked at.
+    pub(super) fn allowed(&mut self, what: Step, undo: Option<&Call>, origin: Origin, after: &[StepId]) -> StepId {
         let inverse = step::inverse(&what, undo, self.view);
         self.touch(&what, &inverse);
         step::effect(&what, self.view);
@@ -107,7 +112,7 @@ impl Builder<'_, '_, '_> {
             step: what,
             origin,
         });
-        Some(id)
+        id
     }
 
     pub(super) fn refuse(&mut self, what: &Step, found: Vec<Violation>, origin: Origin) {

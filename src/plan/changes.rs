@@ -68,6 +68,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
     if classes[2].len() + classes[4].len() > 64 {
         b.view.reserve(classes[2].len(), classes[4].len());
     }
+    b.footprint.touches.reserve(classes[2].len() + 2 * classes[4].len());
     let mut waits = Waits::default();
     waits.create.reserve(classes[2].len());
     for i in classes.iter().flatten() {
@@ -364,7 +365,7 @@ fn connect(
         }
     }
     if found.is_empty() {
-        b.step(what, None, change.origin, &after);
+        b.allowed(what, None, change.origin, &after);
     } else {
         b.refuse(&what, found, change.origin);
     }

@@ -119,6 +119,8 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, 
     };
     let moves = order::data_flow(b.view, moving, key);
     let from = b.steps.len();
+    b.steps.reserve(2 * moves.len());
+    b.footprint.touches.reserve(2 * moves.len());
     // The number of the start or stop of each move; a move without one (never running) is waited for by nobody.
     let mut keys: Vec<Option<StepId>> = Vec::with_capacity(moves.len());
     for Move { component, after } in &moves {
