@@ -47,7 +47,7 @@ ConfiguratorConf {
 
   hold           = Configuration { operation_call("arm.close_brakes") },
   park           = Configuration { operation_call("arm.lower") },
-  stop_control   = Configuration { pre_conf_state = { "arm:running", "_default:stopped" } },
+  stop_control   = Configuration { pre_conf_state = { "arm:running", "cart:stopped", "_default:stopped" } },
   stop_all       = Configuration { post_conf_state = { "arm:stopped" } },
   cleanup_all    = Configuration { post_conf_state = { "arm:unconfigured", "_default:unconfigured" } },
   disconnect_all = Configuration {
