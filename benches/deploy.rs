@@ -3,6 +3,9 @@
 //!
 //! `cargo bench --bench deploy`; `cargo bench --bench deploy -- 10 100 1000` for other sizes.
 
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc; // as in the program
+
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
@@ -20,21 +23,24 @@ activities:
   loop: { period_ms: 1000.0 }
 configurations: [configurations.lua]
 coordinator: coordinator.lua
-deploy:   { event: e_start, up: up,   failed: [failed], within_s: 600 }
+deploy:   { event: e_start, up: up,   failed: [failed], within_s: 60 }
 shutdown: { event: e_stop,  down: idle, within_s: 600 }
 limits:   { step_timeout_s: 60.0 }
 ";
 
 const COORDINATOR: &str = r#"
 return state {
-  idle = state {},
-  up = state { config = "chain" },
-  failed = state {},
-  trans { src = "initial", tgt = "idle" },
-  trans { src = "idle",    tgt = "up",     events = { "e_start" } },
-  trans { src = "up",      tgt = "failed", events = { "chain.failed", "chain.broken" } },
-  trans { src = "up",      tgt = "idle",   events = { "e_stop" } },
-  trans { src = "failed",  tgt = "idle",   events = { "e_stop" } },
+  idle     = state {},
+  up       = state { entry = "chain" },
+  stopping = state { entry = "chain.undo" },
+  failed   = state {},
+  trans { src = "initial",  tgt = "idle" },
+  trans { src = "idle",     tgt = "up",       events = { "e_start" } },
+  trans { src = "up",       tgt = "failed",   events = { "chain.failed", "chain.broken" } },
+  trans { src = "up",       tgt = "stopping", events = { "e_stop" } },
+  trans { src = "stopping", tgt = "idle",     events = { "chain.undone" } },
+  trans { src = "stopping", tgt = "failed",   events = { "chain.undo.failed" } },
+  trans { src = "failed",   tgt = "stopping", events = { "e_stop" } },
 }
 "#;
 

@@ -97,7 +97,7 @@ pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result
 /// [`Refused`] with everything that reading and checking found.
 pub fn check(read: Read) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, sources, findings: before } = read;
-    let Report { checked, mut findings, .. } = check::run(&deployment, &catalogue);
+    let Report { checked, mut findings, .. } = check::run(deployment, &catalogue);
     findings.extend(before);
     match checked {
         Some(deployment) => Ok(Checked { deployment, catalogue, libraries, sources, findings }),

@@ -51,7 +51,7 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
 pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -> Arc<Session> {
     let (chart, _) = statechart::compile(&checked.deployment.coordinator);
     Session::start(Setup {
-        deployment: Arc::new((*checked.deployment).clone()),
+        deployment: checked.deployment.share(),
         chart: Arc::new(chart.expect("a checked deployment has a coordinator that compiles")),
         catalogue: checked.catalogue.clone(),
         platform,

@@ -21,15 +21,16 @@ use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
 use serde::Serialize;
 use std::ops::Deref;
+use std::sync::Arc;
 
 /// Something in which `check` found nothing that refuses it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked<T>(T);
+pub struct Checked<T>(Arc<T>);
 
 impl<T> Checked<T> {
-    /// The thing itself, no longer known to be checked.
-    pub fn into_inner(self) -> T {
-        self.0
+    /// The thing itself, to be shared; no longer known to be checked.
+    pub fn share(&self) -> Arc<T> {
+        self.0.clone()
     }
 }
 
@@ -65,7 +66,9 @@ pub struct Report {
 }
 
 /// Checks a deployment against the component types it may use (those of its libraries and those it declares).
-pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
+pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Report {
+    let shared = deployment.into();
+    let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
     findings.extend(configurations::check(deployment, catalogue, &universe));
@@ -100,7 +103,7 @@ pub fn run(deployment: &Deployment, catalogue: &Catalogue) -> Report {
     }
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     let sound = chart.is_some() && !finding::has_errors(&findings);
-    Report { checked: sound.then(|| Checked(deployment.clone())), findings, explored, trace }
+    Report { checked: sound.then(|| Checked(shared.clone())), findings, explored, trace }
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system

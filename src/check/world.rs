@@ -251,12 +251,14 @@ pub fn apply(
         }
     }
     let mut world = World { system: world.system.clone(), stack: world.stack.clone() };
-    let transaction = transaction(&world.system, &world.stack, &requests, context)
+    let mut transaction = transaction(&world.system, &world.stack, &requests, context)
         .map_err(|refusal| Refusal { request: places.get(refusal.request).copied().unwrap_or(0), ..refusal })?;
     for planned in &transaction.steps {
         step::effect(&planned.step, &mut world.system);
     }
-    let (steps, warnings) = (transaction.steps.clone(), transaction.warnings.clone());
+    // Taken out, not copied: the stack commits frames, not steps.
+    let steps = std::mem::take(&mut transaction.steps);
+    let warnings = std::mem::take(&mut transaction.warnings);
     world.stack.commit(transaction);
     Ok(Change { world, steps, warnings })
 }

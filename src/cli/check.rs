@@ -38,7 +38,7 @@ impl Run for Args {
                 return Ok(exit);
             }
         };
-        let report = check::run(&read.deployment, &read.catalogue);
+        let report = check::run(read.deployment.clone(), &read.catalogue);
         let findings: Vec<Finding> = report.findings.into_iter().chain(read.findings).collect();
         let ok = !finding::has_errors(&findings);
         let exit = if ok { Exit::Done } else { Exit::No };

@@ -175,7 +175,7 @@ pub fn driven(read: &Read, until: Until) -> Result<Vec<Planned>, Findings> {
 pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>), Findings> {
     let deployment = &read.deployment;
     let Some(drive) = check::drive(deployment, &read.catalogue, until) else {
-        return Err(check::run(deployment, &read.catalogue).findings);
+        return Err(check::run(deployment.clone(), &read.catalogue).findings);
     };
     let (code, what, key, goal) = match until {
         Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.deploy.up),

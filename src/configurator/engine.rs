@@ -4,8 +4,8 @@ use super::AnswerSink;
 use super::control::{Busy, Command, View};
 use super::fast::Fast;
 use super::inbox::{Counts, Mail};
-use super::log::{Log, Progress, ProgressSink, StepName, What};
 use super::pool::{Pool, Reply, Ticket};
+use super::progress::{Progress, ProgressSink, StepName};
 use super::request::{Answer, Batch, Reason, Request, Residual};
 use super::transaction::{Interruption, Left};
 use crate::model::{
@@ -56,7 +56,6 @@ pub(super) struct Engine {
     pub counts: Arc<Counts>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
-    pub log: Log,
     /// Batches that have not begun.
     pub queue: VecDeque<Batch>,
     /// Commands that wait.
@@ -105,7 +104,6 @@ pub(super) struct Parts {
     pub counts: Arc<Counts>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
-    pub log: Log,
 }
 
 impl Engine {
@@ -124,7 +122,6 @@ impl Engine {
             counts: parts.counts,
             answers: parts.answers,
             progress: parts.progress,
-            log: parts.log,
             queue: VecDeque::new(),
             commands: VecDeque::new(),
             replies: Vec::new(),
@@ -240,14 +237,11 @@ impl Engine {
     }
 
     fn reported(&mut self, event: PlatformEvent) {
-        let now = self.clock.now();
         match event {
             PlatformEvent::Faulted { component, .. } => {
-                self.log.write(now, What::Faulted(component));
                 self.suspects.push(component);
             }
             PlatformEvent::Returned { component, .. } => {
-                self.log.write(now, What::Returned(component));
                 self.suspects.push(component);
                 self.returned = true;
                 self.note_quarantine();
@@ -378,8 +372,7 @@ impl Engine {
     pub fn tell_answer(&mut self, request: Request, verdict: Verdict, reason: Option<Arc<Reason>>, begun: Time) {
         let at = self.clock.now();
         let took = at.since(begun);
-        let answer = Answer { request, verdict, at, took, reason: reason.clone() };
-        self.log.write(at, What::Answer { request, verdict, took, reason });
+        let answer = Answer { request, verdict, at, took, reason };
         self.changed();
         if let Some(progress) = &self.progress {
             progress(&Progress::Answered(answer.clone()));
@@ -426,7 +419,9 @@ impl Engine {
 
     /// After a panic: what is owed is answered *broken*, and the picture is read back from the platform.
     fn start_anew(&mut self, text: &str) {
-        self.log.write(self.clock.now(), What::Note(format!("the configurator itself failed: {text}")));
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Survived(text.to_owned()));
+        }
         let expected = self.expected.take().unwrap_or_else(|| self.system.clone());
         let reason = Reason::Panic(text.to_owned());
         let mut between = Interruption::closed();

@@ -2,8 +2,8 @@
 //! outcome settled before it is believed.
 
 use super::engine::Engine;
-use super::log::{Progress, StepEnd, StepName, What};
 use super::pool::{self, Call, Reply, Ticket};
+use super::progress::{Progress, StepEnd, StepName};
 use super::request::Reason;
 use super::work::{Item, Order};
 use crate::limits;
@@ -146,7 +146,7 @@ impl Engine {
             if self.pool.has_room()
                 && let Some(i) = order.next_blocking()
             {
-                if let Some(reason) = self.forbidden(&work[i as usize].step, run) {
+                if let Some(reason) = self.forbidden(&work[i as usize].step, run, self.clock.now()) {
                     run.over[i as usize] = true;
                     run.failures.push((i, reason));
                     order.ended(i);
@@ -191,8 +191,8 @@ impl Engine {
     }
 
     /// Why `step` must not be given to the platform now, if so: its precondition on the live model, and the time.
-    fn forbidden(&mut self, step: &Step, run: &Run) -> Option<Reason> {
-        if run.until != Time::NEVER && self.clock.now() >= run.until {
+    fn forbidden(&mut self, step: &Step, run: &Run, now: Time) -> Option<Reason> {
+        if now >= run.until {
             return Some(Reason::Timeout(self.allowed));
         }
         self.false_precondition(step)
@@ -215,18 +215,23 @@ impl Engine {
 
     fn inline(&mut self, work: &[Item], i: u32, run: &mut Run) {
         let step = &work[i as usize].step;
-        if let Some(reason) = self.forbidden(step, run) {
+        let started = self.clock.now();
+        if let Some(reason) = self.forbidden(step, run, started) {
             run.over[i as usize] = true;
             run.failures.push((i, reason));
             return;
         }
-        let started = self.clock.now();
         self.tell_started(step);
         let deadline = (started + self.patience).min(run.until);
         let outcome = pool::execute(&*self.platform, step, deadline);
         let took = self.clock.now().since(started);
         self.tell_ended(step, &outcome, took, run.undoing);
-        self.conclude(work, i, outcome, run);
+        if let Outcome::Done(_) = outcome {
+            // In this thread, so nothing can have come between the look at the precondition and now.
+            self.took_effect(step, i, run);
+        } else {
+            self.conclude(work, i, outcome, run);
+        }
     }
 
     fn launch(&mut self, work: &[Item], i: u32, run: &mut Run) {
@@ -299,13 +304,18 @@ impl Engine {
 
     fn happened(&mut self, work: &[Item], i: u32, run: &mut Run) {
         let step = &work[i as usize].step;
-        run.over[i as usize] = true;
         // While the call was out, its component may have failed by itself; then the model's precondition is gone.
         if let Some(reason) = self.false_precondition(step) {
+            run.over[i as usize] = true;
             run.doubted = true;
             run.failures.push((i, reason));
             return;
         }
+        self.took_effect(step, i, run);
+    }
+
+    fn took_effect(&mut self, step: &Step, i: u32, run: &mut Run) {
+        run.over[i as usize] = true;
         step::effect(step, &mut self.system);
         run.done.push(i);
     }
@@ -435,12 +445,7 @@ impl Engine {
         self.tell(StepName::of(step), StepEnd::from(outcome), took, undoing);
     }
 
-    fn tell(&self, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
-        self.tell_at(self.clock.now(), step, end, took, undoing);
-    }
-
-    pub(super) fn tell_at(&self, at: Time, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
-        self.log.write(at, What::Step { step, end, took, undoing });
+    pub(super) fn tell(&self, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
         if let Some(progress) = &self.progress {
             progress(&Progress::Ended { step, end, took, undoing });
         }

@@ -7,7 +7,7 @@
 use super::engine::Engine;
 use super::exec::Run;
 use super::frames::Op;
-use super::log::{Progress, StepEnd, StepName};
+use super::progress::{Progress, StepEnd, StepName};
 use super::request::{Reason, Request};
 use super::requests::Part;
 use super::transaction::Ended;
@@ -119,7 +119,7 @@ impl Engine {
                 let outcome =
                     catch_unwind(call).unwrap_or_else(|_| Outcome::Unknown(Cause::Lost("a panic".to_owned())));
                 let now = self.clock.now();
-                self.tell_at(now, step, StepEnd::from(&outcome), now.since(begun), undoing);
+                self.tell(step, StepEnd::from(&outcome), now.since(begun), undoing);
                 begun = now;
                 if !matches!(outcome, Outcome::Done(_)) {
                     let steps = fast.switch.steps(fast.switch.acts());

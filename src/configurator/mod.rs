@@ -8,7 +8,7 @@
 //! model immediately before; no outcome *unknown* that is reported as done or not done without having been read back; no
 //! request that is dropped.
 //!
-//! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`log`]: what happened.
+//! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: the table of §6. `transaction`: whole or not at all. `exec`: carrying out steps.
 //!   `fast`: prepared switches. `safe`: what goes first. `teardown`: to nothing. `pool`, `inbox`, `work`, `touched`: their tools.
 
@@ -18,8 +18,8 @@ mod exec;
 mod fast;
 mod frames;
 mod inbox;
-pub mod log;
 mod pool;
+pub mod progress;
 pub mod request;
 mod requests;
 mod safe;
@@ -30,7 +30,7 @@ mod work;
 
 pub use crate::stack::Requester;
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
-pub use log::{Entry, Log, Progress, ProgressSink, StepEnd, StepName, What};
+pub use progress::{Progress, ProgressSink, StepEnd, StepName};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
 use crate::limits;
@@ -84,7 +84,6 @@ impl Configurator {
             setup.configurations.into_iter().map(|c| (c.id, c)).collect();
         let safe = configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
         let awaited = configurations.values().filter_map(|c| c.confirm.map(|confirm| confirm.event)).collect();
-        let log = Log::default();
         let parts = Parts {
             clock: setup.clock.clone(),
             platform: setup.platform.clone(),
@@ -96,19 +95,11 @@ impl Configurator {
             counts: post.counts.clone(),
             answers: setup.answers.clone(),
             progress: setup.progress,
-            log: log.clone(),
         };
         let engine = Engine::new(parts, System::new(Arc::new(setup.catalogue)));
         let thread = setup.clock.spawn("configurator", move || engine.live());
-        let inner = Inner {
-            post,
-            clock: setup.clock,
-            safe,
-            awaited,
-            answers: setup.answers,
-            log,
-            thread: Mutex::new(Some(thread)),
-        };
+        let inner =
+            Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };
         ConfiguratorHandle { inner: Arc::new(inner) }
     }
 }
@@ -125,7 +116,6 @@ struct Inner {
     safe: FxHashSet<ConfigId>,
     awaited: FxHashSet<EventName>,
     answers: AnswerSink,
-    log: Log,
     thread: Mutex<Option<Join>>,
 }
 
@@ -175,11 +165,6 @@ impl ConfiguratorHandle {
         if self.inner.awaited.contains(&event) {
             self.inner.post.report(Mail::Event(event));
         }
-    }
-
-    /// What happened so far.
-    pub fn log(&self) -> &Log {
-        &self.inner.log
     }
 
     /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.

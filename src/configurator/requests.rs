@@ -2,7 +2,7 @@
 
 use super::engine::{Confirming, Engine};
 use super::frames::{Op, Planned};
-use super::log::Progress;
+use super::progress::Progress;
 use super::request::{Batch, Reason, Request};
 use super::transaction::{Ended, Spec};
 use crate::model::{Ask, ConfigId, Configuration, OnFailure, Verdict};

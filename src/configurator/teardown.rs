@@ -4,7 +4,7 @@ use super::control::{Command, Drift, Recovery, TakenDown};
 use super::engine::{Broken, Engine};
 use super::exec::Run;
 use super::frames::Op;
-use super::log::{Progress, What};
+use super::progress::Progress;
 use super::request::{Reason, Residual};
 use super::transaction::{Ended, Interruption, Left};
 use super::work::{Item, item};
@@ -95,7 +95,6 @@ impl Engine {
         }
         if observed && system::diff::reached(&self.system, &broken.expected) {
             self.changed();
-            self.log.write(self.clock.now(), What::Note("recovered".to_owned()));
             if let Some(progress) = &self.progress {
                 progress(&Progress::Recovered);
             }

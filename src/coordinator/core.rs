@@ -45,6 +45,10 @@ pub trait Listener {
         let _ = (chart, event, tag);
     }
 
+    /// It has reacted to everything delivered so far and is about to wait. Whoever was told of an event before, and looked
+    /// while it was being reacted to, must look again now.
+    fn rested(&mut self) {}
+
     /// The chart behaved badly.
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
         let _ = (chart, trouble);

@@ -238,6 +238,7 @@ impl Shared {
                 None => false,
             });
             if !worked {
+                listener.rested();
                 self.bell.wait(core.next_deadline().unwrap_or(Time::NEVER));
             }
         }
@@ -310,6 +311,12 @@ impl<L: Listener> Listener for Told<'_, L> {
         self.shared.stale.fetch_add(1, Ordering::Relaxed);
         if !self.silent() {
             self.listener.stale(chart, event, tag);
+        }
+    }
+
+    fn rested(&mut self) {
+        if !self.silent() {
+            self.listener.rested();
         }
     }
 

@@ -180,6 +180,8 @@ impl<'o, 's> Script<'o, 's> {
     pub(crate) fn append(&mut self, planned: impl IntoIterator<Item = PlannedStep>) {
         let base = self.next_id();
         let wave = self.next_wave();
+        let planned = planned.into_iter();
+        self.steps.reserve(planned.size_hint().0);
         for mut step in planned {
             step.id += base;
             step.wave += wave;
@@ -239,6 +241,7 @@ pub fn undo(
     skip: &dyn Fn(Slot) -> bool,
 ) -> Result<(), Vec<Violation>> {
     let first_wave = script.next_wave();
+    script.steps.reserve(steps.len());
     let last_wave = steps.last().map_or(0, |s| s.wave);
     let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
     let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();

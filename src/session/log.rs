@@ -1,10 +1,13 @@
 //! What happened, in memory: a bounded ring of entries, oldest dropped first.
 
+use crate::configurator::{StepEnd, StepName};
 use crate::limits;
 use crate::model::Snapshot;
 use crate::time::Time;
-use serde::Serialize;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// One thing that happened.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -99,15 +102,34 @@ pub struct Answered {
     pub steps: Vec<StepTime>,
 }
 
-/// How long a step took.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// How long a step took. Put into words only when it is shown: it is written down in the configurator's thread.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepTime {
-    /// The step, in words.
-    pub step: String,
-    /// How it ended: `done`, or why not.
-    pub outcome: String,
-    /// In microseconds.
-    pub took_us: f64,
+    /// The step.
+    pub step: StepName,
+    /// Whether it took something back.
+    pub undoing: bool,
+    /// How it ended.
+    pub end: StepEnd,
+    /// How long it took.
+    pub took: Duration,
+}
+
+/// `{"step": "undo: start A", "outcome": "not done", "took_us": 1.5}`
+impl Serialize for StepTime {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        let outcome = match self.end {
+            StepEnd::Done => "done",
+            StepEnd::NotDone => "not done",
+            StepEnd::Unknown => "unknown",
+        };
+        let undo = if self.undoing { "undo: " } else { "" };
+        let mut fields = s.serialize_struct("StepTime", 3)?;
+        fields.serialize_field("step", &format_args!("{undo}{}", self.step))?;
+        fields.serialize_field("outcome", outcome)?;
+        fields.serialize_field("took_us", &(self.took.as_secs_f64() * 1e6))?;
+        fields.end()
+    }
 }
 
 /// Where a deployment is in its life.

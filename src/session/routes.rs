@@ -3,7 +3,7 @@
 
 use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
-use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, StepEnd};
+use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester};
 use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
 use crate::model::{EventName, Verdict};
@@ -79,6 +79,11 @@ impl Listener for ToConfigurator {
         self.hub.note(Happening::Stale { event: event.to_string() });
     }
 
+    fn rested(&mut self) {
+        // An event that moves nothing is written down nowhere: without this, who waits for "up" would not look again.
+        self.hub.wake();
+    }
+
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
         self.hub.note(Happening::Forced { note: trouble.finding(chart).message });
     }
@@ -95,22 +100,20 @@ impl ToConfigurator {
 /// Steps carried out since the last answer.
 pub(super) type Steps = Mutex<Vec<StepTime>>;
 
-pub(super) fn on_progress(steps: &Steps, progress: &Progress) {
+pub(super) fn on_progress(hub: &Hub, steps: &Steps, progress: &Progress) {
     match progress {
         Progress::Begun { .. } => lock(steps).clear(),
         Progress::Ended { step, end, took, undoing } => {
             let mut steps = lock(steps);
             if steps.len() < limits::STEPS_LOGGED {
-                let outcome = match end {
-                    StepEnd::Done => "done",
-                    StepEnd::NotDone => "not done",
-                    StepEnd::Unknown => "unknown",
-                };
-                let step = if *undoing { format!("undo: {step}") } else { step.to_string() };
-                steps.push(StepTime { step, outcome: outcome.to_owned(), took_us: took.as_secs_f64() * 1e6 });
+                steps.push(StepTime { step: *step, undoing: *undoing, end: *end, took: *took });
             }
         }
-        Progress::Started(_) | Progress::Answered(_) | Progress::Recovered => {}
+        Progress::Survived(text) => {
+            hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
+        }
+        Progress::Recovered => hub.note(Happening::Forced { note: "recovered".to_owned() }),
+        Progress::Started(_) | Progress::Answered(_) => {}
     }
 }
 

@@ -70,7 +70,10 @@ impl Session {
                 let (hub, junction, steps) = (hub.clone(), junction.clone(), steps.clone());
                 Arc::new(move |answer| on_answer(&hub, &junction, &steps, &answer))
             },
-            progress: Some(Arc::new(move |progress| on_progress(&steps, progress))),
+            progress: {
+                let hub = hub.clone();
+                Some(Arc::new(move |progress| on_progress(&hub, &steps, progress)))
+            },
         });
         *lock(&junction.configurator) = Some(configurator.clone());
         let listener = ToConfigurator {

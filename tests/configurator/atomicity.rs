@@ -59,7 +59,7 @@ fn judge(rig: &Rig, catalogue: &Catalogue, word: &str, faults: Faults, say: &str
         }
         Verdict::Failed | Verdict::UndoFailed => {
             let told = || -> Vec<String> {
-                rig.handle.log().newest(12).iter().map(|entry| format!("{:?}", entry.what)).collect()
+                rig.progress.lock().unwrap().iter().rev().take(12).map(|told| format!("{told:?}")).collect()
             };
             assert_eq!(seen, before, "{say}: failed, and as before: {:#?}", told());
             rig.in_step();

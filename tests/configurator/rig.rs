@@ -109,6 +109,7 @@ pub struct Rig {
     pub handle: ConfiguratorHandle,
     pub platform: Simulated,
     pub answers: Arc<Mutex<Vec<Answer>>>,
+    pub progress: Arc<Mutex<Vec<Progress>>>,
     pub submitted: Mutex<Vec<Request>>,
     pub clock: Clock,
     next: Mutex<u64>,
@@ -156,6 +157,8 @@ impl Rig {
         let platform = Simulated::new(catalogue.clone(), clock.clone(), options);
         let answers: Arc<Mutex<Vec<Answer>>> = Arc::default();
         let sink = answers.clone();
+        let progress: Arc<Mutex<Vec<Progress>>> = Arc::default();
+        let told = progress.clone();
         let handle = Configurator::start(Setup {
             configurations,
             catalogue,
@@ -165,11 +168,20 @@ impl Rig {
             limits,
             workers: 4,
             answers: Arc::new(move |answer| sink.lock().unwrap().push(answer)),
-            progress: None,
+            progress: Some(Arc::new(move |progress| told.lock().unwrap().push(progress.clone()))),
         });
         let told = handle.clone();
         platform.subscribe(Arc::new(move |event| told.platform_event(&event)));
-        Self { handle, platform, answers, submitted: Mutex::new(Vec::new()), clock, next: Mutex::new(1), _guard: guard }
+        Self {
+            handle,
+            platform,
+            answers,
+            progress,
+            submitted: Mutex::new(Vec::new()),
+            clock,
+            next: Mutex::new(1),
+            _guard: guard,
+        }
     }
 
     fn request(&self, word: &str, requester: Requester) -> Request {

@@ -237,23 +237,23 @@ fn a_panic_in_the_configurator_is_answered_and_survived() {
 }
 
 #[test]
-fn the_log_tells_what_happened_and_how_long_it_took() {
-    use davit::configurator::What;
+fn the_progress_tells_what_happened_and_how_long_it_took() {
+    use davit::configurator::Progress;
     let rig = up_with(vec![]);
     rig.platform.set_delays(Delays {
         of: vec![(StepPattern::new("property_set B.k"), Duration::from_millis(30))],
         ..Delays::default()
     });
     rig.ask("switch");
-    let log = rig.handle.log().newest(100);
-    let took = log.iter().find_map(|entry| match &entry.what {
-        What::Step { step, took, .. } if step.to_string() == "property_set B.k" => Some(*took),
+    let log = rig.progress.lock().unwrap().clone();
+    let took = log.iter().find_map(|told| match told {
+        Progress::Ended { step, took, .. } if step.to_string() == "property_set B.k" => Some(*took),
         _ => None,
     });
     assert_eq!(took, Some(Duration::from_millis(30)));
-    let answered = log.iter().any(|entry| {
-        matches!(&entry.what, What::Answer { verdict: Verdict::Ok, request, .. }
-        if request.ask == Ask::Apply(id("switch")))
+    let answered = log.iter().any(|told| {
+        matches!(told, Progress::Answered(answer)
+            if answer.verdict == Verdict::Ok && answer.request.ask == Ask::Apply(id("switch")))
     });
     assert!(answered);
 }

@@ -6,7 +6,7 @@ use davit::limits;
 use davit::model::names::EventName;
 use davit::statechart::{Chart, NodeId, Raised};
 use davit::time::{Clock, Time};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 fn event(text: &str) -> EventName {
@@ -320,4 +320,37 @@ fn a_listener_may_end_it_from_inside() {
     clock.sleep(Duration::from_secs(1));
     coordinator.stop(Time::NEVER).unwrap();
     assert_eq!(log.take(), ["1 names"]);
+}
+
+#[test]
+fn when_it_rests_it_is_seen_to_rest() {
+    // Whoever looked while an event was being reacted to, and saw no rest, is told when to look again: also after an
+    // event that moves nothing.
+    struct Rests {
+        coordinator: Arc<OnceLock<Coordinator>>,
+        seen: Arc<Mutex<Vec<bool>>>,
+    }
+    impl Listener for Rests {
+        fn raised(&mut self, _: &Chart, _: &[Raised]) {}
+        fn unmatched(&mut self, _: EventName) {
+            self.seen.lock().unwrap().push(self.coordinator.get().unwrap().is_settled());
+        }
+        fn rested(&mut self) {
+            if let Some(coordinator) = self.coordinator.get() {
+                self.seen.lock().unwrap().push(coordinator.is_settled());
+            }
+        }
+    }
+    let clock = Clock::simulated();
+    let _guard = clock.enter();
+    let (own, seen) = (Arc::new(OnceLock::new()), Arc::new(Mutex::new(Vec::new())));
+    let listener = Rests { coordinator: own.clone(), seen: seen.clone() };
+    let coordinator = Coordinator::start("coordinator", Arc::new(copying()), &clock, listener);
+    own.set(coordinator.clone()).unwrap();
+    clock.sleep(Duration::from_millis(1));
+    seen.lock().unwrap().clear();
+    coordinator.deliver(Incoming::control(event("e_unknown"))).unwrap();
+    clock.sleep(Duration::from_millis(1));
+    assert_eq!(*seen.lock().unwrap(), [false, true]);
+    coordinator.stop(Time::NEVER).unwrap();
 }

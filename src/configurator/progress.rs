@@ -1,13 +1,10 @@
-//! What happened, who asked, how long each step took: a bounded list in memory, and the progress of what is under way.
+//! What is told while requests are carried out: each step with how it ended and how long it took.
 
-use super::request::{Answer, Reason, Request};
-use crate::limits;
-use crate::model::{ComponentName, Ident, MemberRef, Step, Verdict};
+use super::request::{Answer, Request};
+use crate::model::{ComponentName, Ident, MemberRef, Step};
 use crate::platform::Outcome;
-use crate::time::{Time, lock};
 use serde::{Serialize, Serializer};
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A step in short: what it does and to what, without its values.
@@ -104,78 +101,9 @@ pub enum Progress {
     Answered(Answer),
     /// A broken system is whole again.
     Recovered,
+    /// The configurator itself failed, and goes on.
+    Survived(String),
 }
 
 /// Hears the progress, in the configurator's thread: must not block.
 pub type ProgressSink = Arc<dyn Fn(&Progress) + Send + Sync>;
-
-/// An entry of the log.
-#[derive(Debug, Clone)]
-pub struct Entry {
-    /// When it ended.
-    pub at: Time,
-    /// What.
-    pub what: What,
-}
-
-/// What an entry of the log tells.
-#[derive(Debug, Clone)]
-pub enum What {
-    /// A step ended.
-    Step {
-        /// The step.
-        step: StepName,
-        /// How.
-        end: StepEnd,
-        /// How long it took.
-        took: Duration,
-        /// Whether it took something back.
-        undoing: bool,
-    },
-    /// A request was answered.
-    Answer {
-        /// The request.
-        request: Request,
-        /// How it ended.
-        verdict: Verdict,
-        /// How long it took.
-        took: Duration,
-        /// Why, where it is not simply a success.
-        reason: Option<Arc<Reason>>,
-    },
-    /// A component failed by itself.
-    Faulted(ComponentName),
-    /// A component came out of quarantine.
-    Returned(ComponentName),
-    /// Something else worth knowing.
-    Note(String),
-}
-
-/// The log: the newest entries, bounded.
-#[derive(Debug, Clone)]
-pub struct Log {
-    entries: Arc<Mutex<VecDeque<Entry>>>,
-}
-
-impl Default for Log {
-    fn default() -> Self {
-        // All memory at once: writing allocates nothing.
-        Self { entries: Arc::new(Mutex::new(VecDeque::with_capacity(limits::LOG_ENTRIES))) }
-    }
-}
-
-impl Log {
-    pub(super) fn write(&self, at: Time, what: What) {
-        let mut entries = lock(&self.entries);
-        let old = if entries.len() == limits::LOG_ENTRIES { entries.pop_front() } else { None };
-        entries.push_back(Entry { at, what });
-        drop(entries);
-        drop(old);
-    }
-
-    /// The newest entries, oldest first; at most `most`.
-    pub fn newest(&self, most: usize) -> Vec<Entry> {
-        let entries = lock(&self.entries);
-        entries.iter().skip(entries.len().saturating_sub(most)).cloned().collect()
-    }
-}
