@@ -6,17 +6,14 @@
 use davit::configurator::{Answer, Batch, Configurator, Request, Requester, Setup};
 use davit::model::*;
 use davit::platform::Platform;
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::embedded::EmbeddedPlatform;
+use davit::runtime::{Builder, Component, In, Libraries, Library, Prop};
 use davit::time::{Clock, Time};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
 const ROUNDS: usize = 20_000;
-
-fn ident(text: &str) -> Ident {
-    Ident::new(text).expect("a name")
-}
 
 fn member(text: &str) -> MemberRef {
     MemberRef::new(text).expect("a member")
@@ -26,31 +23,22 @@ fn change(kind: ChangeKind) -> Change {
     Change { kind, origin: Origin::NONE }
 }
 
-fn catalogue() -> Catalogue {
-    let mut node = ComponentType::new("Node", "A controller with a gain of three and a reference.");
-    let gain = PropertyType {
-        ty: "float[3]".parse().expect("a type"),
-        default: Some(Value::floats(&[0.0; 3])),
-        min: Some(0.0),
-        max: Some(10.0),
-        tunable: Tunable::Stopped,
-        unit: None,
-        doc: String::new(),
-        origin: Origin::NONE,
-    };
-    node.properties.insert(ident("gain"), gain);
-    let mode = PortType {
-        direction: Direction::In,
-        ty: ValueType::Bool,
-        unit: None,
-        buffered: false,
-        doc: String::new(),
-        origin: Origin::NONE,
-    };
-    node.ports.insert(ident("mode"), mode);
-    let mut catalogue = Catalogue::new();
-    catalogue.insert(node);
-    catalogue
+/// A controller with a gain of three and a reference.
+#[allow(dead_code)]
+struct Node {
+    gain: Prop<[f64; 3]>,
+    mode: In<bool>,
+}
+
+impl Component for Node {
+    fn new(b: &mut Builder<Self>) -> Self {
+        let gain = b.range(0.0..=10.0).tunable(Tunable::Stopped).property("gain", [0.0; 3]);
+        Self { gain, mode: b.input("mode") }
+    }
+}
+
+fn libraries() -> Libraries {
+    Libraries::new().with(Library::new("bench").with::<Node>("Node"))
 }
 
 /// The switch: stop, a 3-vector, a port, start; and `others` components that have nothing to do with it.
@@ -64,8 +52,8 @@ fn configurations(others: usize) -> Vec<Configuration> {
     for n in 0..=others {
         make.changes.push(change(ChangeKind::Create {
             component: ComponentName::new(&format!("N{n}")).expect("a name"),
-            ty: TypeName::new("Node").expect("a type"),
-            activity: None,
+            ty: TypeName::new("bench.Node").expect("a type"),
+            activity: Some(Ident::new("loop").expect("a name")),
             properties: BTreeMap::new(),
         }));
     }
@@ -110,12 +98,16 @@ fn ping_pong(clock: &Clock) -> u64 {
 
 /// Nanoseconds from request to answer, and of the configurator's own time, for the switch and its undo in turn.
 fn switch(clock: &Clock, others: usize) -> (u64, u64) {
-    let platform: Arc<dyn Platform> = Arc::new(Simulated::new(catalogue(), clock.clone(), Options::default()));
+    let loop_ = Ident::new("loop").expect("a name");
+    // Idle: the time until a running activity has really stopped is another matter.
+    let activity = Activity { period: Some(Duration::from_secs(1000)), priority: 0, cpu: None, origin: Origin::NONE };
+    let activities = BTreeMap::from([(loop_, activity)]);
+    let platform: Arc<dyn Platform> = Arc::new(EmbeddedPlatform::new(clock, &libraries(), &activities));
     let (sink, answers) = clock.channel::<Answer>(16);
     let handle = Configurator::start(Setup {
         configurations: configurations(others),
-        catalogue: catalogue(),
-        activities: BTreeSet::new(),
+        catalogue: libraries().catalogue(),
+        activities: BTreeSet::from([loop_]),
         platform,
         clock: clock.clone(),
         limits: DeploymentLimits::default(),

@@ -50,13 +50,13 @@ pub const FINDINGS_SHOWN: usize = 50;
 
 /// Bytes of one text file. A generated deployment of 100,000 components takes about 10 MB; a file past this is refused
 /// by its size, before it is read.
-pub const FILE_BYTES: u64 = 32 * 1024 * 1024;
+pub const FILE_BYTES: u64 = 16 * 1024 * 1024;
 
 /// Levels of nesting of a text: values and statecharts written by people stay below ten.
 pub const TEXT_DEPTH: usize = 64;
 
 /// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
-pub const TEXT_NODES: usize = 1_500_000;
+pub const TEXT_NODES: usize = 1_000_000;
 
 /// Findings collected from the texts of one deployment; past it reading stops, since the rest follows from the first.
 pub const FINDINGS: usize = 1_000;

@@ -177,7 +177,7 @@ impl Report {
             return;
         };
         let span = to_miette(&first_line(sources, &location));
-        if home == Some(location.file) {
+        if home == Some(location.file) && self.is_near(&span, &location, sources) {
             self.labels.push(LabeledSpan::new_with_span(Some(text.to_owned()), span));
         } else {
             self.related.push(Self {
@@ -193,14 +193,25 @@ impl Report {
     }
 }
 
+impl Report {
+    /// Whether a second place can be shown in one picture with the first: all between places on neighbouring lines is
+    /// shown, however long these lines are.
+    fn is_near(&self, span: &SourceSpan, location: &Location, sources: &SourceMap) -> bool {
+        let Some(first) = self.labels.first().map(|label| label.offset()) else { return true };
+        let line = sources.file(location.file).line(location.line);
+        line.len() < LONG_LINE || first.abs_diff(span.offset()) < LONG_LINE
+    }
+}
+
 fn to_miette(span: &Range<usize>) -> SourceSpan {
     (span.start, span.end - span.start).into()
 }
 
 /// The part of a place that stands on its first line: a call of twenty lines is shown by its beginning.
 fn first_line(sources: &SourceMap, location: &Location) -> Range<usize> {
-    let line = sources.file(location.file).line(location.line);
-    location.span.start..location.span.end.min(line.end).max(location.span.start)
+    let file = sources.file(location.file);
+    let most = file.text.floor_char_boundary(location.span.start + LINE_MARGIN);
+    location.span.start..location.span.end.min(file.line(location.line).end).min(most).max(location.span.start)
 }
 
 impl fmt::Display for Report {
@@ -248,8 +259,11 @@ impl fmt::Debug for Window {
     }
 }
 
-/// Bytes shown on either side of a place in an overlong line.
+/// Bytes shown on either side of a place in an overlong line, and of a place that is itself longer.
 const LINE_MARGIN: usize = 120;
+
+/// Bytes from which a line is too long to be shown whole.
+const LONG_LINE: usize = 2_000;
 
 impl Window {
     fn new(sources: &SourceMap, file: FileId) -> Self {
@@ -337,6 +351,16 @@ mod tests {
         let at = map.exact(file, 1, 60_000, 1);
         let text = render(&[Finding::error(CODE, "x").at(at)], &map, false);
         assert!(text.len() < 5_000, "{}", text.len());
+    }
+
+    #[test]
+    fn long_places_and_places_far_apart_are_cut() {
+        let mut map = SourceMap::new();
+        let file = map.add_file("x.yaml", format!("a: \"{}\", a: 1", "é".repeat(100_000)), Language::Yaml);
+        let (long, far) = (map.exact(file, 1, 3, 100_002), map.exact(file, 1, 100_007, 1));
+        let text = render(&[Finding::error(CODE, "x").at(long).also(far, "and here")], &map, false);
+        assert!(text.len() < 5_000, "{}", text.len());
+        assert!(text.contains("and here"), "{text}");
     }
 
     #[test]

@@ -177,7 +177,8 @@ impl Reader<'_> {
         self.nodes += 1;
         self.budget(node.origin)?;
         if anchor > 0 {
-            self.nodes += nodes;
+            // The copy that is kept, and what parser and reader remember of its name.
+            self.nodes += nodes + 4;
             self.budget(node.origin)?;
             self.anchors.insert(anchor, (node.clone(), nodes));
         }

@@ -198,7 +198,8 @@ fn class_table(lua: &Lua, shared: &Shared, class: &'static str, keep: &Table) ->
             }
             return Ok(convert::poison());
         };
-        if recorder.count(1, line) {
+        // The table and the note of it, which outlives the table.
+        if recorder.count(2, line) {
             return Err(mlua::Error::runtime("the budget is used up"));
         }
         let sequence = u32::try_from(recorder.classed.len()).unwrap_or(u32::MAX - 1) + 1;

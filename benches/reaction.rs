@@ -1,0 +1,142 @@
+//! How soon the coordinator reacts to an event: while the configurator is idle, and while it waits for an operation that
+//! never returns. Both distributions in one run; they should be one.
+//!
+//! `cargo bench --bench reaction`
+
+use davit::app;
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::model::{Ask, ConfigId, EventName};
+use davit::runtime::{Answer, Builder, Component, Library};
+use davit::session::Happening;
+use davit::time::{Clock, Time};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+const EVENTS: usize = 20_000;
+
+/// Its operation never returns.
+struct Stuck;
+
+impl Component for Stuck {
+    fn new(b: &mut Builder<Self>) -> Self {
+        b.no_effect().operation("hang", |_, cx, (): ()| -> Answer { cx.clock().hang() });
+        Self
+    }
+}
+
+const DEPLOYMENT: &str = "\
+davit: 1
+name: reaction
+platform: embedded
+libraries: [bench]
+activities:
+  loop: { period_ms: 1000.0 }
+configurations: [configurations.lua]
+coordinator: coordinator.lua
+deploy:   { event: e_start, up: up,   within_s: 10 }
+shutdown: { event: e_stop,  down: idle, within_s: 10 }
+limits:   { step_timeout_s: 600.0 }
+";
+
+const CONFIGURATIONS: &str = r#"
+ConfiguratorConf {
+  make = Configuration {
+    create("stuck", "bench.Stuck", { activity = "loop" }),
+    post_conf_state = { "_default:running" },
+  },
+  hang = Configuration { operation_call("stuck.hang") },
+}
+"#;
+
+const COORDINATOR: &str = r#"
+return state {
+  idle = state {},
+  up = state {
+    a = state {},
+    b = state {},
+    trans { src = "initial", tgt = "a" },
+    trans { src = "a", tgt = "b", events = { "e_toggle" } },
+    trans { src = "b", tgt = "a", events = { "e_toggle" } },
+  },
+  trans { src = "initial", tgt = "idle" },
+  trans { src = "idle", tgt = "up", events = { "e_start" }, effect = "make" },
+  trans { src = "up", tgt = "idle", events = { "e_stop" }, effect = "make.undo" },
+}
+"#;
+
+#[allow(clippy::disallowed_methods)] // a benchmark measures real time
+fn now() -> Instant {
+    Instant::now()
+}
+
+fn percentile(sorted: &[u64], share: f64) -> f64 {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
+    let at = ((sorted.len() - 1) as f64 * share) as usize;
+    sorted[at] as f64 / 1000.0
+}
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, text) in
+        [("r.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)]
+    {
+        std::fs::write(folder.path().join(name), text).expect("a folder of ours");
+    }
+    let libraries = libraries::builtin().with(Library::new("bench").with::<Stuck>("Stuck"));
+    let clock = Clock::real();
+    let _me = clock.enter();
+    let read = app::read(&folder.path().join("r.yaml"), &LoadOptions::default(), &libraries)
+        .unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+    let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+    let session = app::start(&checked, &clock).expect("an embedded platform");
+    session.bring_up().expect("up");
+    // When the coordinator was last seen to have moved, in nanoseconds from the beginning.
+    let (begin, moved) = (now(), Arc::new(AtomicU64::new(0)));
+    let told = moved.clone();
+    #[allow(clippy::cast_possible_truncation)]
+    session.hub().observe(Arc::new(move |_: Time, what: &Happening| {
+        if let Happening::State { .. } = what {
+            told.store(begin.elapsed().as_nanos() as u64, Ordering::Release);
+        }
+    }));
+    let toggle = EventName::new("e_toggle").expect("an event");
+    #[allow(clippy::cast_possible_truncation)]
+    let measure = || {
+        let mut times: Vec<u64> = (0..EVENTS)
+            .map(|_| {
+                moved.store(0, Ordering::Release);
+                let raised = begin.elapsed().as_nanos() as u64;
+                session.raise(toggle, "bench");
+                loop {
+                    let at = moved.load(Ordering::Acquire);
+                    if at != 0 {
+                        return at - raised;
+                    }
+                    std::hint::spin_loop();
+                }
+            })
+            .collect();
+        times.sort_unstable();
+        times
+    };
+    measure();
+    let idle = measure();
+    session.request(Ask::Apply(ConfigId::new("hang").expect("a name")), "bench");
+    while session.hub().all_answered() {
+        std::hint::spin_loop();
+    }
+    clock.sleep(Duration::from_millis(100)); // the operation is out
+    let stuck = measure();
+    assert!(!session.hub().all_answered(), "the configurator is still stuck");
+    println!("event to reaction, µs ({EVENTS} events each)");
+    println!("{:>22} {:>9} {:>9} {:>9} {:>9}", "configurator", "median", "90 %", "99 %", "99.9 %");
+    for (what, times) in [("idle", &idle), ("in a hung operation", &stuck)] {
+        let of = |share| percentile(times, share);
+        println!("{what:>22} {:>9.2} {:>9.2} {:>9.2} {:>9.2}", of(0.5), of(0.9), of(0.99), of(0.999));
+    }
+    println!("ratio of the medians: {:.2}", percentile(&stuck, 0.5) / percentile(&idle, 0.5));
+    // The operation never returns, so neither would an orderly end.
+    std::process::exit(0);
+}
