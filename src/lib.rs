@@ -11,6 +11,7 @@ pub mod lang;
 pub mod libraries;
 pub mod limits;
 pub mod model;
+pub mod monitor;
 
 pub mod platform;
 pub mod runtime;

@@ -161,3 +161,7 @@ pub const CHECK_FRAMES: usize = 3;
 
 /// Forced steps told one by one; more are told by number, so that a line can be read.
 pub const FORCED_SHOWN: usize = 8;
+
+/// Pieces of a signal that one operator over time of a monitor keeps; past it neighbours are merged. A window keeps the
+/// extremes still to come, a few dozen for a signal that goes up and down; this many pieces are 100 kB.
+pub const MONITOR_PIECES: usize = 4096;

@@ -303,6 +303,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         activities: draft.activities,
         configurations,
         coordinator: chart?,
+        monitors: Vec::new(),
         emits: draft.emits,
         deploy: draft.deploy?,
         shutdown: draft.shutdown?,

@@ -3,6 +3,7 @@
 use super::component_type::ComponentType;
 use super::configuration::Configuration;
 use super::finding::Origin;
+use super::monitor::Monitor;
 use super::names::{ConfigId, EventName, Ident};
 use super::statechart::Statechart;
 use serde::Serialize;
@@ -26,6 +27,8 @@ pub struct Deployment {
     pub configurations: Vec<Configuration>,
     /// The coordinator.
     pub coordinator: Statechart,
+    /// Monitors in written order; names are unique.
+    pub monitors: Vec<Monitor>,
     /// Events that leave the deployment.
     pub emits: Vec<(EventName, Origin)>,
     /// How it is brought up.

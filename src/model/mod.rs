@@ -6,6 +6,7 @@ pub mod configuration;
 pub mod deployment;
 pub mod event;
 pub mod finding;
+pub mod monitor;
 pub mod names;
 pub mod run_state;
 pub mod snapshot;
@@ -20,6 +21,7 @@ pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFail
 pub use deployment::{Activity, BringUp, Deployment, DeploymentLimits, Durability, TakeDown};
 pub use event::{Ask, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
+pub use monitor::Monitor;
 pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
 pub use run_state::{RunState, Transition};
 pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};

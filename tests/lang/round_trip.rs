@@ -289,6 +289,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             activities,
             configurations,
             coordinator,
+            monitors: Vec::new(),
             emits: emits.into_iter().map(|event| (event, Origin::NONE)).collect(),
             deploy,
             shutdown,

@@ -1,0 +1,370 @@
+//! All monitors of a deployment, over inputs that are sampled once.
+
+use super::compile::{PIECES, compile};
+use super::program::Program;
+use crate::model::monitor::{Counter, Monitor, PortSignal, Sampling};
+use crate::model::{ComponentName, EventName, Ident, MemberRef, RunState};
+use crate::time::Time;
+use std::time::Duration;
+
+/// Something that monitors look at.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Input {
+    /// A number in what a port carries (bools as 0 and 1). With an empty path, also ports that carry no number: then only
+    /// when they were written matters.
+    Port(PortSignal),
+    /// The run state of a component, as [`state_value`].
+    State(ComponentName),
+    /// Whether a component is faulted: 1 or 0.
+    Faulted(ComponentName),
+    /// A counter of an activity.
+    Activity {
+        /// The activity.
+        activity: Ident,
+        /// Which.
+        counter: Counter,
+    },
+}
+
+impl Input {
+    /// The value of a port itself.
+    pub fn whole(member: MemberRef) -> Self {
+        Self::Port(PortSignal::whole(member))
+    }
+}
+
+/// The number that stands for a run state.
+pub fn state_value(state: RunState) -> f64 {
+    match state {
+        RunState::Unconfigured => 0.0,
+        RunState::Stopped => 1.0,
+        RunState::Running => 2.0,
+        RunState::Faulted => 3.0,
+    }
+}
+
+/// What an input holds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sample {
+    /// The value; NaN when what was written is no number.
+    pub value: f64,
+    /// When it was written last: from then on it counts, or from the last step on if that was later. Of states and
+    /// counters it does not matter; they count from the step that finds them.
+    pub at: Time,
+    /// How often it was written so far. Of states and counters it does not matter.
+    pub writes: u64,
+    /// Whether there is one: not when the port was never written, or its component or activity does not exist.
+    pub present: bool,
+}
+
+impl Sample {
+    /// The value, NaN when there is none.
+    pub(super) fn number(&self) -> f64 {
+        if self.present { self.value } else { f64::NAN }
+    }
+
+    /// The position from which the age counts: of the newest sample, or of the beginning when there is none.
+    pub(super) fn since(&self, begun: u64) -> u64 {
+        if self.present { self.at.as_nanos().saturating_mul(2) } else { begun }
+    }
+
+    /// Whether something else is there now.
+    fn differs(&self, other: &Self) -> bool {
+        self.present != other.present || self.writes != other.writes || self.value.to_bits() != other.value.to_bits()
+    }
+}
+
+/// What was not as it should be, counted since the beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Troubles {
+    /// Times that went backwards: of steps, and of samples (also those that lie in the future). The time before was taken.
+    pub backwards: u64,
+    /// Samples that are no number.
+    pub not_numbers: u64,
+    /// Pieces of signals that were merged because the memory of an operator was used up.
+    pub merged: u64,
+}
+
+/// All monitors of a deployment.
+#[derive(Debug, Clone)]
+pub struct Bank {
+    inputs: Vec<Input>,
+    samples: Vec<Sample>,
+    watches: Vec<Watch>,
+    last: Time,
+    troubles: Troubles,
+}
+
+/// One monitor at work.
+#[derive(Debug, Clone)]
+struct Watch {
+    program: Program,
+    /// Its inputs in the bank, and what they held when it was last evaluated.
+    slots: Box<[usize]>,
+    held: Box<[Sample]>,
+    /// Which of them are ports, whose samples tell their instant.
+    stamped: Box<[bool]>,
+    raise: EventName,
+    cleared: Option<EventName>,
+    repeat: Option<Duration>,
+    sampling: Sampling,
+    enabled: bool,
+    /// Since when it waits for its first evaluation.
+    waits: Time,
+    /// What it said last; none before it was evaluated.
+    verdict: Option<bool>,
+    /// Its next evaluation, when it runs at a rate.
+    tick: Time,
+    /// When its event is raised again.
+    again: Time,
+}
+
+impl Bank {
+    /// The monitors, with an empty history.
+    pub fn new(monitors: &[Monitor]) -> Self {
+        Self::with_memory(monitors, PIECES)
+    }
+
+    /// The same, with another number of pieces that each operator over time may keep (two at least).
+    pub fn with_memory(monitors: &[Monitor], pieces: usize) -> Self {
+        let mut inputs: Vec<Input> = Vec::new();
+        let mut known: rustc_hash::FxHashMap<Input, usize> = rustc_hash::FxHashMap::default();
+        let watches = monitors.iter().map(|monitor| {
+            let (program, own) = compile(&monitor.when, pieces);
+            let stamped = own.iter().map(|input| matches!(input, Input::Port(_))).collect();
+            let slots: Box<[usize]> = own
+                .into_iter()
+                .map(|input| {
+                    *known.entry(input).or_insert_with_key(|input| {
+                        inputs.push(input.clone());
+                        inputs.len() - 1
+                    })
+                })
+                .collect();
+            Watch {
+                program,
+                held: vec![Sample::default(); slots.len()].into(),
+                slots,
+                stamped,
+                raise: monitor.raise,
+                cleared: monitor.cleared,
+                repeat: monitor.repeat,
+                sampling: monitor.sampling,
+                enabled: monitor.enabled,
+                waits: Time::default(),
+                verdict: None,
+                tick: Time::default(),
+                again: Time::NEVER,
+            }
+        });
+        let watches = watches.collect();
+        let samples = vec![Sample::default(); inputs.len()];
+        Self { inputs, samples, watches, last: Time::default(), troubles: Troubles::default() }
+    }
+
+    /// What the monitors look at, each once; [`Bank::step`] reads them by their index here.
+    pub fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
+    /// Looks at every input and evaluates the monitors whose turn it is. `raise` is called with the index of a monitor and
+    /// its event, in the order in which things came to be, monitor by monitor.
+    ///
+    /// A time before the last one counts as that one. Nothing is allocated.
+    pub fn step(&mut self, now: Time, read: &mut dyn FnMut(usize) -> Sample, raise: &mut dyn FnMut(usize, EventName)) {
+        if now < self.last {
+            self.troubles.backwards += 1;
+        }
+        let now = now.max(self.last);
+        self.last = now;
+        if !self.watches.iter().any(|w| w.enabled) {
+            return;
+        }
+        for (i, known) in self.samples.iter_mut().enumerate() {
+            let mut fresh = read(i);
+            // Another component may stand behind the name now; its clock is the same.
+            let earliest = if fresh.writes > known.writes && known.present { known.at } else { Time::default() };
+            let at = fresh.at.min(now).max(earliest);
+            if fresh.present && at != fresh.at {
+                self.troubles.backwards += u64::from(fresh.differs(known));
+                fresh.at = at;
+            }
+            if fresh.present && fresh.value.is_nan() && fresh.differs(known) {
+                self.troubles.not_numbers += 1;
+            }
+            *known = fresh;
+        }
+        for (i, watch) in self.watches.iter_mut().enumerate().filter(|(_, w)| w.enabled) {
+            watch.step(now, &self.samples, &mut |event| raise(i, event));
+        }
+    }
+
+    /// Switches a monitor on or off. One that is switched on begins with an empty history at the next step; one that is
+    /// switched off says nothing more, not even that its condition is cleared. What is so already stays as it is.
+    ///
+    /// # Panics
+    /// When there is no monitor of that index.
+    pub fn enable(&mut self, monitor: usize, on: bool, now: Time) {
+        let watch = &mut self.watches[monitor];
+        if watch.enabled == on {
+            return;
+        }
+        watch.enabled = on;
+        watch.verdict = None;
+        watch.waits = now;
+        watch.again = Time::NEVER;
+        watch.program.clear();
+    }
+
+    /// Whether a monitor is switched on.
+    ///
+    /// # Panics
+    /// When there is no monitor of that index.
+    pub fn is_enabled(&self, monitor: usize) -> bool {
+        self.watches[monitor].enabled
+    }
+
+    /// What a monitor's condition was when last evaluated; none when it is off, or new.
+    ///
+    /// # Panics
+    /// When there is no monitor of that index.
+    pub fn is_true(&self, monitor: usize) -> Option<bool> {
+        self.watches[monitor].verdict
+    }
+
+    /// How far the condition was from the contrary when last evaluated; none when it is off, or new.
+    ///
+    /// # Panics
+    /// When there is no monitor of that index.
+    pub fn robustness(&self, monitor: usize) -> Option<f64> {
+        let watch = &self.watches[monitor];
+        watch.verdict.map(|_| watch.program.grade().robustness)
+    }
+
+    /// When a step is due though no sample comes: a time passes, a rate falls, an event is to be repeated, a monitor that
+    /// runs at a rate has its turn. Never before the last step.
+    pub fn next_wake(&self) -> Option<Time> {
+        let times = self.watches.iter().filter(|w| w.enabled).map(Watch::wake);
+        times.min().filter(|wake| *wake != Time::NEVER).map(|wake| wake.max(self.last))
+    }
+
+    /// What was not as it should be.
+    pub fn troubles(&self) -> Troubles {
+        let merged = self.watches.iter().map(|w| w.program.merged()).sum();
+        Troubles { merged, ..self.troubles }
+    }
+}
+
+/// The first instant that is not before a position.
+fn time_of(position: u64) -> Time {
+    if position == u64::MAX { Time::NEVER } else { Time(position / 2 + position % 2) }
+}
+
+impl Watch {
+    fn wake(&self) -> Time {
+        match (self.verdict, self.sampling) {
+            (None, _) => self.waits,
+            (_, Sampling::Every(_)) => self.tick,
+            (Some(_), Sampling::OnSample) => time_of(self.program.wake()).min(self.again),
+        }
+    }
+
+    fn step(&mut self, now: Time, samples: &[Sample], raise: &mut dyn FnMut(EventName)) {
+        let new = self.verdict.is_none();
+        match self.sampling {
+            Sampling::Every(period) => {
+                if !new && now < self.tick {
+                    return;
+                }
+                let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
+                let first = if new { now.as_nanos() } else { self.tick.as_nanos() };
+                let missed = (now.as_nanos() - first) / period;
+                self.tick = Time(first.saturating_add(period.saturating_mul(missed + 1)));
+            }
+            Sampling::OnSample => {
+                let changed = self.slots.iter().zip(&self.held).any(|(slot, held)| samples[*slot].differs(held));
+                if !new && !changed && now < self.wake() {
+                    return;
+                }
+            }
+        }
+        let mut target = now.as_nanos().saturating_mul(2);
+        if !new {
+            // A second look at one instant counts as the next nanosecond.
+            if target <= self.program.position() {
+                target = (self.program.position() | 1) + 1;
+            }
+            loop {
+                let position = self.program.next().min(self.pending(samples));
+                if position >= target {
+                    break;
+                }
+                self.arrive(position, samples);
+                self.program.evaluate(position, &self.held);
+                if self.sampling == Sampling::OnSample {
+                    self.repeat(time_of(position - 1), raise);
+                    self.observe(time_of(position), raise);
+                }
+            }
+        }
+        for (held, slot) in self.held.iter_mut().zip(&self.slots) {
+            *held = samples[*slot];
+        }
+        self.program.evaluate(target, &self.held);
+        if self.verdict == Some(true) && !self.program.grade().holds {
+            // What was due before it ended was due.
+            self.repeat(Time(now.as_nanos().saturating_sub(1)), raise);
+        }
+        self.observe(now, raise);
+        self.repeat(now, raise);
+    }
+
+    /// The position from which a sample counts that is not held yet: its own instant, but after what is evaluated already.
+    fn arrival(&self, i: usize, sample: &Sample) -> Option<u64> {
+        let news = self.stamped[i] && sample.present && sample.differs(&self.held[i]);
+        news.then(|| sample.at.as_nanos().saturating_mul(2).max(self.program.position() + 1))
+    }
+
+    /// The first position from which a sample counts that is not held yet.
+    fn pending(&self, samples: &[Sample]) -> u64 {
+        let arrivals = self.slots.iter().enumerate().filter_map(|(i, slot)| self.arrival(i, &samples[*slot]));
+        arrivals.min().unwrap_or(u64::MAX)
+    }
+
+    /// Takes the samples that count from `position` on.
+    fn arrive(&mut self, position: u64, samples: &[Sample]) {
+        for i in 0..self.slots.len() {
+            let sample = samples[self.slots[i]];
+            if self.arrival(i, &sample).is_some_and(|arrival| arrival <= position) {
+                self.held[i] = sample;
+            }
+        }
+    }
+
+    /// Raises what has changed.
+    fn observe(&mut self, at: Time, raise: &mut dyn FnMut(EventName)) {
+        let holds = self.program.grade().holds;
+        let before = self.verdict.replace(holds).unwrap_or(false);
+        if holds && !before {
+            raise(self.raise);
+            self.again = self.repeat.map_or(Time::NEVER, |period| at + period);
+        } else if before && !holds {
+            self.again = Time::NEVER;
+            if let Some(cleared) = self.cleared {
+                raise(cleared);
+            }
+        }
+    }
+
+    /// Raises the event again when that is due; several times that were missed count as one.
+    fn repeat(&mut self, now: Time, raise: &mut dyn FnMut(EventName)) {
+        if let Some(period) = self.repeat
+            && now >= self.again
+        {
+            raise(self.raise);
+            let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
+            let missed = (now.as_nanos() - self.again.as_nanos()) / period;
+            self.again = Time(self.again.as_nanos().saturating_add(period.saturating_mul(missed + 1)));
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Monitors: the evaluator, against a reference that evaluates the definitions over the whole history.
+
+mod events;
+mod support;
