@@ -49,10 +49,14 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
 
 /// The same, on a platform of the caller's.
 pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -> Arc<Session> {
-    let (chart, _) = statechart::compile(&checked.deployment.coordinator);
+    let beside = checked.deployment.beside.iter().map(|b| &b.chart);
+    let charts = std::iter::once(&checked.deployment.coordinator).chain(beside).map(|written| {
+        let (chart, _) = statechart::compile(written);
+        Arc::new(chart.expect("a checked deployment's coordinators compile"))
+    });
     Session::start(Setup {
         deployment: checked.deployment.share(),
-        chart: Arc::new(chart.expect("a checked deployment has a coordinator that compiles")),
+        charts: charts.collect(),
         catalogue: checked.catalogue.clone(),
         platform,
         clock: clock.clone(),

@@ -3,6 +3,7 @@
 //! Pure: no I/O, no clock, no platform. A [`Checked`] deployment can come only from here, and whoever starts something
 //! takes nothing else, so nothing runs that was not looked at.
 
+mod beside;
 mod configurations;
 mod coordinator;
 mod drive;
@@ -19,6 +20,7 @@ use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Sev
 use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
+use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -72,46 +74,102 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
     findings.extend(configurations::check(deployment, catalogue, &universe));
-    let (chart, problems) = crate::statechart::compile(&deployment.coordinator);
-    findings.extend(problems);
-    let mut explored = Explored::default();
-    let mut trace = Vec::new();
-    if let Some(chart) = &chart {
-        findings.extend(coordinator::check(deployment, chart));
-        // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
-        if !finding::has_errors(&findings) {
-            let mut product = drive::product(deployment, chart, catalogue);
-            let mut traced = ways(deployment, chart, &mut product);
-            let exploration = explore::explore(&mut product);
-            explored = exploration.explored;
-            findings.extend(unasked(deployment, &product));
-            traced.extend(exploration.findings);
-            traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
-            for (mut finding, way) in traced {
-                if !chart.is_pure() && finding.severity == Severity::Error {
-                    finding.severity = Severity::Warning;
+    let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
+    let mut charts = Vec::new();
+    let mut all = 0;
+    for chart in written {
+        let (chart, problems) = crate::statechart::compile(chart);
+        findings.extend(problems);
+        charts.extend(chart);
+        all += 1;
+    }
+    let mut looked = Looked {
+        charts: charts.iter().collect(),
+        entangled: false,
+        catalogue,
+        findings,
+        explored: Explored::default(),
+        trace: Vec::new(),
+    };
+    if charts.len() == all {
+        let together = beside::shared(deployment, &looked.charts);
+        looked.entangled = !together.is_empty();
+        looked.explored.complete = !looked.entangled;
+        looked.findings.extend(together);
+        if all == 1 {
+            looked.at(deployment, 0, "");
+        } else {
+            for (number, name) in deployment.coordinators().into_iter().enumerate() {
+                if let Some(seen) = beside::view(deployment, &looked.charts, number) {
+                    looked.at(&seen, number, &format!("{name}: "));
                 }
-                if findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
-                    continue;
-                }
-                if trace.is_empty() {
-                    trace = way;
-                }
-                findings.push(finding);
             }
         }
     }
+    let Looked { explored, trace, mut findings, .. } = looked;
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
-    let sound = chart.is_some() && !finding::has_errors(&findings);
+    let sound = charts.len() == all && !finding::has_errors(&findings);
     Report { checked: sound.then(|| Checked(shared.clone())), findings, explored, trace }
+}
+
+/// What following the coordinators found.
+struct Looked<'a> {
+    charts: Vec<&'a Chart>,
+    /// They touch the same components: what one alone leads to is not all there is to know.
+    entangled: bool,
+    catalogue: &'a Catalogue,
+    findings: Findings,
+    explored: Explored,
+    trace: Vec<String>,
+}
+
+impl Looked<'_> {
+    /// Looks at one coordinator and follows it. `name` is written before the lines of its trace.
+    fn at(&mut self, deployment: &Deployment, number: usize, name: &str) {
+        let (chart, findings) = (self.charts[number], &mut self.findings);
+        findings.extend(coordinator::check(deployment, chart));
+        // Another one may wait for what starts and ends the deployment, and tell this one.
+        beside::forgive_unheard(deployment, &self.charts, findings);
+        // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
+        if finding::has_errors(findings) {
+            self.explored.complete = false;
+            return;
+        }
+        let mut product = drive::product(deployment, chart, self.catalogue);
+        let mut traced = ways(deployment, chart, &mut product);
+        let exploration = explore::explore(&mut product);
+        self.explored.states += exploration.explored.states;
+        self.explored.transitions += exploration.explored.transitions;
+        self.explored.complete &= exploration.explored.complete;
+        // Said once, of what none of them asks for.
+        if number + 1 == self.charts.len() {
+            let others = self.charts[..number].iter().flat_map(|other| beside::asked(deployment, other));
+            findings.extend(unasked(deployment, &product, others.collect()));
+        }
+        traced.extend(exploration.findings);
+        traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
+        for (mut finding, way) in traced {
+            // What functions decide, or what the components of another coordinator would change, is not known here.
+            if (!chart.is_pure() || self.entangled) && finding.severity == Severity::Error {
+                finding.severity = Severity::Warning;
+            }
+            if findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
+                continue;
+            }
+            if self.trace.is_empty() {
+                self.trace = way.into_iter().map(|line| format!("{name}{line}")).collect();
+            }
+            findings.push(finding);
+        }
+    }
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system
 /// then is not known; what is wrong with them in any system is.
-fn unasked(deployment: &Deployment, product: &explore::Product<'_>) -> Findings {
+fn unasked(deployment: &Deployment, product: &explore::Product<'_>, mut asked: FxHashSet<ConfigId>) -> Findings {
     const ANYWHERE: [Code; 4] = [CLASH, PRE_ON_CREATED, POST_ON_DESTROYED, TOUCHES_DESTROYED];
     let mut findings = Vec::new();
-    let asked = product.worlds.asked();
+    asked.extend(product.worlds.asked());
     for configuration in deployment.configurations.iter().filter(|c| !asked.contains(&c.id)) {
         if let Err(refusal) = product.worlds.try_anywhere(configuration) {
             findings.extend(refusal.findings.into_iter().filter(|f| ANYWHERE.contains(&f.code)));

@@ -23,6 +23,9 @@ pub struct Args {
     /// The format.
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
+    /// Which coordinator, of a deployment with several.
+    #[arg(long, value_name = "NAME")]
+    of: Option<String>,
     /// Write to this file instead of printing.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -58,7 +61,7 @@ impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
         let picture = if what == What::Coordinator {
-            let read = coordinator(&self.file, &self.parameters)?;
+            let read = coordinator(&self.file, &self.parameters, self.of.as_deref())?;
             draw::coordinator(&format!("{}: coordinator", read.name), &read.chart, &[])
         } else {
             let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read(context)?;

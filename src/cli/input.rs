@@ -6,8 +6,9 @@ use super::{Context, Failure};
 use crate::app::{self, Checked, Read, Refused};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
-use crate::model::codes::CLI_BAD_SET;
-use crate::model::{Findings, Statechart};
+use crate::model::codes::{CLI_BAD_SET, CLI_WHICH_COORDINATOR};
+use crate::model::finding::did_you_mean;
+use crate::model::{Deployment, Findings, Ident, Statechart};
 use std::path::{Path, PathBuf};
 
 /// The file a command works on, and its parameters.
@@ -92,14 +93,17 @@ pub struct Coordinator {
 ///
 /// # Errors
 /// What is wrong with the texts.
-pub fn coordinator(path: &Path, parameters: &Parameters) -> Result<Coordinator, Failure> {
+///
+/// `of`: which one of a deployment with several.
+pub fn coordinator(path: &Path, parameters: &Parameters, of: Option<&str>) -> Result<Coordinator, Failure> {
     let options = parameters.options()?;
     let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     if is_deployment(path) {
         let loaded = lang::load(path, &options);
         return match loaded.deployment {
             Some(d) => {
-                Ok(Coordinator { name, chart: d.coordinator, sources: loaded.sources, findings: loaded.findings })
+                let chart = chosen(d, of)?;
+                Ok(Coordinator { name, chart, sources: loaded.sources, findings: loaded.findings })
             }
             None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
         };
@@ -109,6 +113,31 @@ pub fn coordinator(path: &Path, parameters: &Parameters) -> Result<Coordinator, 
         Some(chart) => Ok(Coordinator { name, chart, sources: loaded.sources, findings: loaded.findings }),
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }
+}
+
+/// The coordinator of that name; without one, the only one.
+fn chosen(deployment: Deployment, of: Option<&str>) -> Result<Statechart, Failure> {
+    let names = deployment.coordinators();
+    let number = match of {
+        None if names.len() == 1 => Some(0),
+        None => None,
+        Some(name) => names.iter().position(|n| n.as_str() == name),
+    };
+    let Some(number) = number else {
+        let known = || names.iter().map(Ident::as_str);
+        let (message, help) = match of {
+            None => (
+                format!("the deployment has {} coordinators", names.len()),
+                format!("say which one: `--of NAME`, with one of {}", known().collect::<Vec<_>>().join(", ")),
+            ),
+            Some(name) => (format!("there is no coordinator `{name}`"), did_you_mean(name, "coordinators", known())),
+        };
+        return Err(Failure::usage(CLI_WHICH_COORDINATOR, message, help));
+    };
+    Ok(match number.checked_sub(1) {
+        None => deployment.coordinator,
+        Some(at) => deployment.beside.into_iter().nth(at).map_or(deployment.coordinator, |own| own.chart),
+    })
 }
 
 fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {

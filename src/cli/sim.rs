@@ -22,6 +22,9 @@ pub struct Args {
     /// Lines of events from a file, or from standard input as `-`; without it, from the terminal.
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
+    /// Which coordinator, of a deployment with several.
+    #[arg(long, value_name = "NAME")]
+    of: Option<String>,
     /// Print one JSON object for each input line.
     #[arg(long)]
     json: bool,
@@ -31,7 +34,7 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let read = coordinator(&self.file, &self.parameters).map_err(|f| f.as_json(self.json))?;
+        let read = coordinator(&self.file, &self.parameters, self.of.as_deref()).map_err(|f| f.as_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
         let Some(chart) = chart else {

@@ -52,7 +52,15 @@ fn print(out: &Output, status: &Json) {
         status["at"].as_f64().unwrap_or_default()
     ));
     let active = status["coordinator"].as_array().and_then(|a| a.last()).map_or("(inactive)", |s| text(s));
-    out.line(format!("coordinator  {}", out.paint(Style::Name, active)));
+    match status["coordinators"].as_object().filter(|all| all.len() > 1) {
+        None => out.line(format!("coordinator  {}", out.paint(Style::Name, active))),
+        Some(all) => {
+            for (name, states) in all {
+                let active = states.as_array().and_then(|a| a.last()).map_or("(inactive)", text);
+                out.line(format!("coordinator  {name}: {}", out.paint(Style::Name, active)));
+            }
+        }
+    }
     if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();
         out.line(format!("waiting for  {}", names.join(", ")));

@@ -268,6 +268,9 @@ impl Engine {
             let reason = Reason::StillBroken(broken.residual.clone());
             return self.answer(request, Verdict::UndoFailed, Some(reason));
         }
+        if let Some(foreign) = self.stack.frames().last().and_then(|top| top.foreign_to(request.requester)) {
+            return self.answer(request, Verdict::UndoFailed, Some(Reason::Refused(vec![foreign])));
+        }
         self.alone(Part { request, op: Op::Top });
     }
 

@@ -4,7 +4,7 @@ use crate::limits;
 use crate::model::finding::Finding;
 use crate::model::names::EventName;
 use crate::model::{codes, finding};
-use crate::statechart::{Chart, Hook, Machine, NodeId, Raised, Step};
+use crate::statechart::{AtOnce, Chart, Hook, Machine, NodeId, Raised, Step};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -108,6 +108,7 @@ struct Collect<'a>(&'a mut Vec<Raised>);
 
 impl Hook for Collect<'_> {
     const TURNS: bool = false;
+    const WATCHES: bool = false;
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
         self.0.push(raised);
@@ -151,7 +152,17 @@ impl Core {
             listener.stale(&self.chart, event, tag);
             return Delivered::Stale;
         }
-        self.machine.send(self.chart.event(event));
+        let id = self.chart.event(event);
+        let at_once = self.machine.at_once(&self.chart, id, now, &mut Collect(&mut self.batch));
+        if at_once != AtOnce::No {
+            listener.moved(&self.chart, self.machine.active());
+            self.tell(listener);
+            if at_once == AtOnce::Goes {
+                self.settle(now, listener);
+            }
+            return Delivered::Taken;
+        }
+        self.machine.send(id);
         if matches!(self.settle(now, listener), Step::Taken | Step::Entered) {
             Delivered::Taken
         } else {
@@ -170,6 +181,14 @@ impl Core {
         self.machine.next_deadline(&self.chart)
     }
 
+    /// Hands on what the step raised.
+    fn tell(&mut self, listener: &mut (impl Listener + ?Sized)) {
+        if !self.batch.is_empty() {
+            listener.raised(&self.chart, &self.batch);
+            self.batch.clear();
+        }
+    }
+
     /// Turns until nothing is left to do; answers what the first one did.
     fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> Step {
         let mut first = None;
@@ -184,10 +203,7 @@ impl Core {
                 }
                 Step::Unmatched | Step::Quiet { .. } => (),
             }
-            if !self.batch.is_empty() {
-                listener.raised(&self.chart, &self.batch);
-                self.batch.clear();
-            }
+            self.tell(listener);
             let rests = match step {
                 Step::Taken | Step::Entered => self.machine.rest::<Collect<'_>>(&self.chart),
                 // A time event that came due in an idle turn waits inside for the next one.

@@ -1,7 +1,7 @@
 //! The entrances: a deployment with all its files, or one file alone.
 
 use super::files::{self, Sources};
-use super::lower::{chart, configuration, deployment};
+use super::lower::{beside, chart, configuration, deployment};
 use super::lua;
 use super::params::Params;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
@@ -290,11 +290,17 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         }
     }
     unique(cx, &mut configurations);
-    let chart = match &draft.coordinator {
-        Some((file, named_at)) => coordinator(cx, from, &folder.join(file), *named_at, &mut params),
-        None => None,
-    };
+    let mut charts = Vec::new();
+    for (name, file, named_at) in &draft.coordinators {
+        if let Some(chart) = coordinator(cx, from, &folder.join(file), *named_at, &mut params) {
+            charts.push((*name, chart, *named_at));
+        }
+    }
     params.finish(cx);
+    if charts.len() < draft.coordinators.len() {
+        return None;
+    }
+    let joined = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?)?;
     Some(Deployment {
         name: draft.name?,
         platform: draft.platform?,
@@ -302,11 +308,13 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         types: draft.types,
         activities: draft.activities,
         configurations,
-        coordinator: chart?,
+        coordinator: joined.coordinator,
+        first: joined.first,
+        beside: joined.beside,
         monitors: Vec::new(),
         emits: draft.emits,
-        deploy: draft.deploy?,
-        shutdown: draft.shutdown?,
+        deploy: joined.deploy,
+        shutdown: joined.shutdown,
         limits: draft.limits,
         durability: draft.durability,
         origin,

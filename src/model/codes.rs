@@ -295,6 +295,8 @@ codes! {
         "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
     STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",
         "Configurations of one group are alternatives: applying one pops the frame of the other first. That frame cannot be popped, for the reason given, so the new configuration is refused and nothing has changed. Undo what stands in the way first.";
+    STACK_FOREIGN = "stack::foreign", "the frame belongs to another coordinator",
+        "Each coordinator of a deployment undoes its own frames only, whatever the order. Popping the top, or replacing the frame of a group, would here have undone what another coordinator asked for and relies on. Let that coordinator undo it (send it an event), or undo it as an operator.";
     STACK_FULL = "stack::full", "the stack is full and nothing of it can be squashed",
         "Past its bound the stack squashes its oldest frames into one, but frames of states that are active are never squashed, and here no two others lie side by side. Undo or commit something, or raise `limits: { stack: … }` in the deployment.";
     STACK_SQUASHED = "stack::squashed", "the frame was squashed together with others",
@@ -429,6 +431,8 @@ codes! {
         "On the way shown the coordinator reaches the state that means down with components still there. The shutdown \
          would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \
          applied on the way up.";
+    COORD_SHARED = "coord::shared", "two coordinators touch the same component",
+        "Coordinators side by side are verified one by one, each as if the others were not there. That is all there is to know as long as the configurations of one touch no component that those of another touch. Here they do: at run time one of them may be refused where alone it was not (nothing is broken by that: a conflict is refused and named), and what follows from it, looked at alone, is a warning at most. Give each coordinator components of its own, or let one coordinator ask the other by an event.";
     COORD_STACK_GROWS = "coord::stack_grows", "going round makes the stack grow",
         "The coordinator can go round a circle of states that applies a configuration each time and never undoes it, \
          though elsewhere it undoes that configuration by name. Each round leaves a frame; past the limit the oldest are \
@@ -496,6 +500,8 @@ codes! {
     CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
          a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
+    CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
+        "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";

@@ -25,8 +25,12 @@ pub struct Deployment {
     pub activities: BTreeMap<Ident, Activity>,
     /// Configurations in written order; IDs are unique.
     pub configurations: Vec<Configuration>,
-    /// The coordinator.
+    /// The coordinator; the first one, if there are several.
     pub coordinator: Statechart,
+    /// The first coordinator's name, where it was given one; else it is called like the deployment.
+    pub first: Option<Ident>,
+    /// Coordinators that run beside the first one.
+    pub beside: Vec<Beside>,
     /// Monitors in written order; names are unique.
     pub monitors: Vec<Monitor>,
     /// Events that leave the deployment.
@@ -44,6 +48,24 @@ pub struct Deployment {
     /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
     /// about them.
     pub key_origins: BTreeMap<String, Origin>,
+}
+
+/// A coordinator beside the first one. It has its own state that means *up* and its own that means *down*: a deployment is
+/// up when all of its coordinators are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beside {
+    /// Its name, by which its frames are known.
+    pub name: Ident,
+    /// Its statechart.
+    pub chart: Statechart,
+    /// Its state that means *up*.
+    pub up: String,
+    /// Its states that mean that the bring-up failed.
+    pub failed: Vec<String>,
+    /// Its state that means *down*.
+    pub down: String,
+    /// Where it was named.
+    pub origin: Origin,
 }
 
 /// A thread of the embedded runtime that updates components.
@@ -114,6 +136,25 @@ impl Deployment {
     /// The configuration of that name.
     pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
         self.configurations.iter().find(|c| c.id == id)
+    }
+
+    /// The names of the coordinators, the first one's first.
+    pub fn coordinators(&self) -> Vec<Ident> {
+        std::iter::once(self.first.unwrap_or(self.name)).chain(self.beside.iter().map(|b| b.name)).collect()
+    }
+
+    /// The deployment as one of its coordinators sees it: that one alone, with its states. `None` for a number past the last.
+    pub fn seen_by(&self, number: usize) -> Option<Self> {
+        let mut seen = Self { beside: Vec::new(), ..self.clone() };
+        if let Some(number) = number.checked_sub(1) {
+            let own = self.beside.get(number)?;
+            seen.coordinator = own.chart.clone();
+            seen.first = Some(own.name);
+            seen.deploy.up.clone_from(&own.up);
+            seen.deploy.failed.clone_from(&own.failed);
+            seen.shutdown.down.clone_from(&own.down);
+        }
+        Some(seen)
     }
 
     /// Where the key of that path was written.

@@ -6,7 +6,7 @@ use crate::model::Snapshot;
 use crate::time::Time;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// One thing that happened.
@@ -224,6 +224,8 @@ pub struct StatusView {
     pub phase: Phase,
     /// Active states of the coordinator, root to leaf.
     pub coordinator: Vec<String>,
+    /// The same of every coordinator, by name; the one above is the first.
+    pub coordinators: BTreeMap<String, Vec<String>>,
     /// The system as the configurator knows it.
     pub system: Snapshot,
     /// Frames in force, newest last.

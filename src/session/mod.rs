@@ -8,6 +8,7 @@ pub mod client;
 pub mod hub;
 mod life;
 pub mod log;
+mod parts;
 pub mod place;
 mod routes;
 pub mod rpc;

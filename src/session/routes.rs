@@ -8,7 +8,7 @@ use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
 use crate::model::{EventName, Verdict};
 use crate::platform::PlatformEvent;
-use crate::statechart::{Chart, NodeId, RaiseSite, Raised, When};
+use crate::statechart::{Chart, EventId, NodeId, RaiseSite, Raised, When};
 use rustc_hash::FxHashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
@@ -16,19 +16,34 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the coordinator's and the configurator's threads need of each other: filled once both exist. Weak, so that
+/// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
 /// neither keeps the other alive.
 #[derive(Default)]
 pub(super) struct Junction {
-    pub coordinator: Mutex<Option<Coordinator>>,
+    /// With the names under which they ask.
+    pub coordinators: Mutex<Vec<(Requester, Coordinator)>>,
     pub configurator: Mutex<Option<ConfiguratorHandle>>,
 }
 
-/// Hears the coordinator: names become requests, and what moves is written down.
+impl Junction {
+    /// The coordinator that asks under that name.
+    pub fn coordinator(&self, name: Requester) -> Option<Coordinator> {
+        lock(&self.coordinators).iter().find(|(own, _)| *own == name).map(|(_, coordinator)| coordinator.clone())
+    }
+
+    /// All of them.
+    pub fn all(&self) -> Vec<Coordinator> {
+        lock(&self.coordinators).iter().map(|(_, coordinator)| coordinator.clone()).collect()
+    }
+}
+
+/// Hears a coordinator: names become requests, and what moves is written down.
 pub(super) struct ToConfigurator {
     pub hub: Arc<Hub>,
     pub junction: Weak<Junction>,
     pub name: Requester,
+    /// Written before the names of its states, where there are several coordinators.
+    pub prefix: String,
     /// Names that a state raises because of its state-scoped configurations.
     pub scoped: FxHashSet<(EventName, NodeId)>,
 }
@@ -52,7 +67,10 @@ impl Listener for ToConfigurator {
                     let scoped = self.scoped.contains(&(raised.name, raised.owner));
                     requests.requests.push(Request { id, ask, requester: self.name, scoped, tag });
                 }
-                Meaning::Emitted(event) => self.hub.note(Happening::Emitted { event: event.to_string() }),
+                Meaning::Emitted(event) => {
+                    self.hub.note(Happening::Emitted { event: event.to_string() });
+                    self.tell_others(event);
+                }
                 Meaning::UnknownUndo(name) => {
                     // There is no such ID: answered at once, as the table of requests says.
                     let event = EventName::new(&format!("{name}.failed")).expect("an event with a suffix is one");
@@ -72,7 +90,9 @@ impl Listener for ToConfigurator {
     }
 
     fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
-        self.hub.note(Happening::State { active: active.iter().map(|n| chart.fqn(*n).to_string()).collect() });
+        self.hub.note(Happening::State {
+            active: active.iter().map(|n| format!("{}{}", self.prefix, chart.fqn(*n))).collect(),
+        });
     }
 
     fn stale(&mut self, _: &Chart, event: EventName, _: Tag) {
@@ -90,8 +110,23 @@ impl Listener for ToConfigurator {
 }
 
 impl ToConfigurator {
+    /// What one coordinator emits is an event of the others that wait for it somewhere. It goes by the lane of reports, so
+    /// that two coordinators that answer each other for ever delay neither an operator nor an answer.
+    fn tell_others(&self, event: EventName) {
+        let Some(junction) = self.junction.upgrade() else { return };
+        let others: Vec<Coordinator> = lock(&junction.coordinators)
+            .iter()
+            .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
+            .map(|(_, other)| other.clone())
+            .collect();
+        for other in others {
+            // A full lane counts what it drops.
+            let _ = other.deliver(Incoming::report(event));
+        }
+    }
+
     fn deliver(&self, incoming: Incoming) {
-        if let Some(coordinator) = self.junction.upgrade().and_then(|j| lock(&j.coordinator).clone()) {
+        if let Some(coordinator) = self.junction.upgrade().and_then(|j| j.coordinator(self.name)) {
             let _ = coordinator.deliver(incoming);
         }
     }
@@ -131,9 +166,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
         reasons,
         steps: std::mem::take(&mut *lock(steps)),
     });
-    if let Requester::Coordinator(_) = answer.request.requester
-        && let Some(coordinator) = lock(&junction.coordinator).clone()
-    {
+    if let Some(coordinator) = junction.coordinator(answer.request.requester) {
         let (owner, visit) = answer.request.tag;
         let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
         let incoming = match (owner, u32::try_from(visit)) {
@@ -166,8 +199,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         }
     };
     hub.note(Happening::Event { event: event.to_string(), from });
-    let coordinator = lock(&junction.coordinator).clone();
-    if let Some(coordinator) = coordinator {
+    for coordinator in junction.all() {
         // A full lane counts what it drops.
         let _ = coordinator.deliver(Incoming::report(event));
     }

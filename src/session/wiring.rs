@@ -4,24 +4,26 @@ use super::Command;
 use super::hub::Hub;
 use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
-use super::routes::{Junction, ToConfigurator, lock, on_answer, on_platform, on_progress, scoped};
+use super::parts::{Part, between};
+use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
 use crate::configurator::{
     Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
 };
-use crate::coordinator::{Coordinator, Incoming};
+use crate::coordinator::Incoming;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::Clock;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// What a session is made of.
 pub struct Setup {
     /// The deployment; it has been checked.
     pub deployment: Arc<Deployment>,
-    /// Its coordinator, compiled.
-    pub chart: Arc<Chart>,
+    /// Its coordinators, compiled, in the order of [`Deployment::coordinators`].
+    pub charts: Vec<Arc<Chart>>,
     /// The component types it may use.
     pub catalogue: Catalogue,
     /// Where its components live.
@@ -36,25 +38,21 @@ pub struct Setup {
 /// thread, a participant of the clock. Everything else may be called from anywhere.
 pub struct Session {
     deployment: Arc<Deployment>,
-    chart: Arc<Chart>,
     clock: Clock,
     platform: Arc<dyn Platform>,
     hub: Arc<Hub>,
-    coordinator: Coordinator,
+    parts: Vec<Part>,
     configurator: ConfiguratorHandle,
     junction: Arc<Junction>,
     commands: Mutex<Vec<Command>>,
     ended: Mutex<Option<Ended>>,
-    up: Option<NodeId>,
-    failed: Vec<(NodeId, String)>,
-    down: Option<NodeId>,
 }
 
 impl Session {
     /// Starts the threads of a deployment; nothing happens until it is brought up.
     pub fn start(setup: Setup) -> Arc<Self> {
-        let Setup { deployment, chart, catalogue, platform, clock } = setup;
-        let emits = deployment.emits.iter().map(|(event, _)| *event);
+        let Setup { deployment, charts, catalogue, platform, clock } = setup;
+        let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
         let steps = Arc::new(Mutex::new(Vec::new()));
@@ -76,29 +74,17 @@ impl Session {
             },
         });
         *lock(&junction.configurator) = Some(configurator.clone());
-        let listener = ToConfigurator {
-            hub: hub.clone(),
-            junction: Arc::downgrade(&junction),
-            name: Requester::Coordinator(deployment.name.into()),
-            scoped: scoped(&chart),
-        };
-        let coordinator = Coordinator::start("coordinator", chart.clone(), &clock, listener);
-        *lock(&junction.coordinator) = Some(coordinator.clone());
+        let parts = Part::start_all(&deployment, charts, &clock, &hub, &junction);
         {
             let (hub, junction) = (hub.clone(), junction.clone());
             platform.subscribe(Arc::new(move |event| on_platform(&hub, &junction, &event)));
         }
-        let state = |name: &str| chart.find(name).ok();
         Arc::new(Self {
-            up: state(&deployment.deploy.up),
-            failed: deployment.deploy.failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
-            down: state(&deployment.shutdown.down),
             deployment,
-            chart,
             clock,
             platform,
             hub,
-            coordinator,
+            parts,
             configurator,
             junction,
             commands: Mutex::new(Vec::new()),
@@ -131,23 +117,25 @@ impl Session {
         self.deployment.configurations.iter().map(|c| c.id).collect()
     }
 
-    /// Events that its coordinator knows, by name.
+    /// Events that its coordinators know, by name.
     pub fn events(&self) -> Vec<EventName> {
-        let mut events = self.chart.events().to_vec();
+        let mut events: Vec<EventName> = self.parts.iter().flat_map(|part| part.chart.events()).copied().collect();
         events.extend(self.deployment.configurations.iter().filter_map(|c| c.confirm.map(|confirm| confirm.event)));
         events.sort_unstable();
         events.dedup();
         events
     }
 
-    /// Gives an event to the coordinator, in the name of `from`.
+    /// Gives an event to all coordinators, in the name of `from`.
     pub fn raise(&self, event: EventName, from: &str) {
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator.event(event);
-        if self.coordinator.deliver(Incoming::control(event)).is_err() {
-            self.hub.note(Happening::Forced {
-                note: format!("`{event}` was not delivered: the coordinator is full or gone"),
-            });
+        for part in &self.parts {
+            if part.coordinator.deliver(Incoming::control(event)).is_err() {
+                self.hub.note(Happening::Forced {
+                    note: format!("`{event}` was not delivered: the coordinator is full or gone"),
+                });
+            }
         }
     }
 
@@ -160,14 +148,15 @@ impl Session {
         id
     }
 
-    /// Whether the coordinator has a state of that name.
+    /// Whether a coordinator has a state of that name (`STATE`, or `COORDINATOR:STATE`).
     pub fn knows_state(&self, state: &str) -> bool {
-        self.chart.find(state).is_ok()
+        self.parts.iter().any(|part| part.find(state).is_some())
     }
 
-    /// Whether a state is active.
+    /// Whether a state is active: in all coordinators that have one of that name.
     pub fn in_state(&self, state: &str) -> bool {
-        self.chart.find(state).is_ok_and(|id| self.coordinator.is_active(id))
+        let mut found = self.parts.iter().filter_map(|part| Some((part, part.find(state)?))).peekable();
+        found.peek().is_some() && found.all(|(part, id)| part.coordinator.is_active(id))
     }
 
     /// Leaves a command for whoever drives the session.
@@ -211,7 +200,8 @@ impl Session {
         StatusView {
             name: self.deployment.name.to_string(),
             phase,
-            coordinator: self.coordinator.active(),
+            coordinator: self.parts[0].coordinator.active(),
+            coordinators: self.active(),
             system: view.and_then(|v| v.system.as_deref().cloned()).unwrap_or_default(),
             stack,
             faults: self.hub.faults(),
@@ -230,26 +220,34 @@ impl Session {
         }
     }
 
-    /// Whether the coordinator is at rest and nothing asked is unanswered: what is seen between two equal epochs was so
-    /// at one moment.
-    fn at_rest(&self, state: Option<NodeId>) -> bool {
+    /// Each coordinator's active states, root to leaf, by its name.
+    fn active(&self) -> BTreeMap<String, Vec<String>> {
+        self.parts.iter().map(|part| (part.name.to_string(), part.coordinator.active())).collect()
+    }
+
+    /// Whether every coordinator is at rest in that state of its own and nothing asked is unanswered: what is seen between
+    /// two equal epochs was so at one moment.
+    fn at_rest(&self, state: impl Fn(&Part) -> Option<NodeId>) -> bool {
         let before = self.hub.epoch();
         let rest = self.hub.all_answered()
-            && self.coordinator.is_settled()
-            && state.is_some_and(|id| self.coordinator.is_active(id));
+            && self.parts.iter().all(|part| {
+                part.coordinator.is_settled() && state(part).is_some_and(|id| part.coordinator.is_active(id))
+            })
+            // One that was looked at first may have been told something by one looked at later.
+            && self.parts.iter().all(|part| part.coordinator.is_settled());
         rest && self.hub.epoch() == before
     }
 
     pub(super) fn is_up(&self) -> bool {
-        self.at_rest(self.up)
+        self.at_rest(|part| part.up)
     }
 
     pub(super) fn is_down(&self) -> bool {
-        self.at_rest(self.down)
+        self.at_rest(|part| part.down)
     }
 
     pub(super) fn failed_state(&self) -> Option<&str> {
-        self.failed.iter().find(|(id, _)| self.coordinator.is_active(*id)).map(|(_, name)| name.as_str())
+        self.parts.iter().find_map(Part::failed_state)
     }
 
     /// Why requests failed since the deployment began to come up, one line each.
@@ -263,7 +261,7 @@ impl Session {
     }
 
     pub(super) fn detach_coordinator(&self) {
-        self.coordinator.detach();
+        self.parts.iter().for_each(|part| part.coordinator.detach());
     }
 
     /// Pops everything; answers what had to be forced, one line each.
@@ -300,13 +298,15 @@ impl Session {
         self.configurator.discard_stack();
         let deadline = self.clock.now() + limits::VIEW;
         self.configurator.stop(deadline);
-        let _ = self.coordinator.stop(deadline);
+        for part in &self.parts {
+            let _ = part.coordinator.stop(deadline);
+        }
         self.part();
     }
 
     /// The threads' handles hold each other through the junction; without it they end.
     fn part(&self) {
-        lock(&self.junction.coordinator).take();
+        lock(&self.junction.coordinators).clear();
         lock(&self.junction.configurator).take();
     }
 }
@@ -314,7 +314,7 @@ impl Session {
 /// A session that is dropped without having been taken down leaves its components to the platform, but no thread behind.
 impl Drop for Session {
     fn drop(&mut self) {
-        self.coordinator.detach();
+        self.detach_coordinator();
         self.part();
     }
 }

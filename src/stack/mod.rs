@@ -15,7 +15,7 @@ mod transaction;
 pub use net::reduce;
 pub use transaction::{Request, Transaction, transaction};
 
-use crate::model::{ComponentName, ConfigId, Ident};
+use crate::model::{ComponentName, ConfigId, Finding, Ident, codes};
 use crate::plan::footprint::Footprint;
 use crate::plan::prepare::Act;
 use crate::plan::undo::Item;
@@ -112,6 +112,18 @@ impl Frame {
     /// Whether several frames were squashed into it.
     pub fn is_squashed(&self) -> bool {
         !self.parts.is_empty()
+    }
+
+    /// Why `by` must leave the frame alone: it was asked for by another coordinator. An operator may undo anybody's, and
+    /// anybody an operator's.
+    pub fn foreign_to(&self, by: Requester) -> Option<Finding> {
+        let foreign = matches!((self.requester, by), (Requester::Coordinator(a), Requester::Coordinator(b)) if a != b);
+        foreign.then(|| {
+            let message =
+                format!("`{}` is a frame of the coordinator `{}`, not of `{by}`", self.configuration, self.requester);
+            Finding::error(codes::STACK_FOREIGN, message)
+                .help(format!("only `{}` or an operator undoes it: ask it by an event", self.requester))
+        })
     }
 
     fn part(&self) -> Part {

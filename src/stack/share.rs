@@ -51,12 +51,15 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
                 Access::Need => "needs",
                 Access::Join | Access::Write => "changes",
             };
-            let message = format!(
-                "`{}` cannot be undone before `{}`, which {did} {}",
-                frame.configuration, other.configuration, touch.slot
-            );
+            let (mine, theirs) = (frame.configuration, other.configuration);
+            let whose = if other.requester == frame.requester {
+                String::new()
+            } else {
+                format!(" (a frame of {})", other.requester)
+            };
+            let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
             let finding = Finding::error(codes::STACK_SHARED, message)
-                .help(format!("undo `{}` first, or undo down to `{}`", other.configuration, frame.configuration));
+                .help(format!("undo `{theirs}` first, or undo down to `{mine}`"));
             return Err(Box::new(finding));
         }
     }

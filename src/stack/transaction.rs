@@ -192,7 +192,7 @@ impl Work<'_, '_, '_> {
         context: &Context,
     ) -> Result<(), Refusal> {
         if let Some(group) = configuration.group {
-            self.replace(group, configuration)?;
+            self.replace(group, configuration, requester)?;
         }
         let plan = plan_on(self.script.view_mut(), configuration, context)?;
         let Plan { configuration, group, steps, footprint, saved, warnings, .. } = plan;
@@ -221,8 +221,13 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Pops the group's frame.
-    fn replace(&mut self, group: crate::model::Ident, configuration: &Configuration) -> Result<(), Refusal> {
+    /// Pops the group's frame, unless another coordinator asked for it.
+    fn replace(
+        &mut self,
+        group: crate::model::Ident,
+        configuration: &Configuration,
+        requester: Requester,
+    ) -> Result<(), Refusal> {
         let refused = |cause: Findings, old: &str| {
             let message = format!("`{}` would replace `{old}` of the group `{group}`", configuration.id);
             let mut findings = vec![
@@ -235,6 +240,9 @@ impl Work<'_, '_, '_> {
         };
         if let Some(at) = self.frames.iter().rposition(|f| f.group == Some(group)) {
             let old = self.frames[at].configuration;
+            if let Some(cause) = self.frames[at].foreign_to(requester) {
+                return Err(refused(vec![cause], old.as_str()));
+            }
             return self.pop(at).map_err(|refusal| refused(refusal.findings, old.as_str()));
         }
         let buried = self.frames.iter().flat_map(|f| &f.parts).find(|p| p.group == Some(group));

@@ -1,5 +1,6 @@
 //! The compiled chart: flat tables, indexed by small numbers.
 
+use super::reactions::Reactions;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
 use crate::model::statechart::FunctionId;
@@ -188,6 +189,8 @@ pub struct Chart {
     pub(super) pure: bool,
     /// The event of the first entry.
     pub(super) init: EventId,
+    /// What is known beforehand of what events do.
+    pub(super) reactions: Reactions,
 }
 
 /// Why a text names no state.

@@ -6,6 +6,7 @@
 mod tables;
 
 use super::chart::{Chart, EventId, Kind, NONE, Op, RaiseSite};
+use super::reactions::Reactions;
 use super::resolve::Names;
 use super::{Machine, checks};
 use crate::limits;
@@ -35,6 +36,7 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
     chart.connector_edges =
         chart.nodes.iter().filter(|node| node.kind == Kind::Connector).map(|node| node.out.len).sum();
     mark_settling(&mut chart);
+    chart.reactions = Reactions::of(&chart);
     checks::doubts(&chart, &mut builder.findings);
     (Some(chart), builder.findings)
 }

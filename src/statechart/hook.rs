@@ -66,6 +66,11 @@ pub trait Hook {
     /// turns of which it is known that they do nothing (a completion that triggers nothing, and the idle turn after it).
     const TURNS: bool = true;
 
+    /// Whether the hook wants to hear of more than names raised: it implements [`entered`](Self::entered),
+    /// [`exited`](Self::exited), [`taking`](Self::taking) or [`conflict`](Self::conflict). If not (and if it has no hand in
+    /// single turns), whole reactions that are known beforehand are taken at once.
+    const WATCHES: bool = true;
+
     /// A state is active now; its entry actions follow.
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         let _ = (chart, state);
@@ -156,4 +161,5 @@ pub struct Nobody;
 
 impl Hook for Nobody {
     const TURNS: bool = false;
+    const WATCHES: bool = false;
 }

@@ -13,18 +13,18 @@ use crate::time::Time;
 #[derive(Debug, Clone)]
 pub struct Machine {
     /// Active states from the root inwards; also while a transition is under way.
-    path: Vec<NodeId>,
+    pub(super) path: Vec<NodeId>,
     /// rFSM's active leaf: on exit still the old one, on entry none.
-    leaf: Option<NodeId>,
-    mode: Mode,
-    queue: Queue,
+    pub(super) leaf: Option<NodeId>,
+    pub(super) mode: Mode,
+    pub(super) queue: Queue,
     events: Vec<EventId>,
     added: Vec<EventId>,
     /// By node: how often it was entered.
-    visits: Vec<u32>,
+    pub(super) visits: Vec<u32>,
     /// By time event: when its state was entered, and whether it was raised since.
     timers: Vec<(Time, bool)>,
-    search: Search,
+    pub(super) search: Search,
     chain: Vec<NodeId>,
 }
 
@@ -426,7 +426,7 @@ impl Machine {
         }
     }
 
-    fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time) {
+    pub(super) fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time) {
         if let Some(timer) = self.timers.get_mut(chart.nodes[state.index()].timer as usize) {
             *timer = (now, false);
         }
@@ -434,7 +434,7 @@ impl Machine {
 
     /// After a turn: time events of the active states that are due, from the leaf outwards, each once a visit. What is
     /// raised here is seen in the next turn, even if this one was idle.
-    fn check_timers(&mut self, chart: &Chart, now: Time) {
+    pub(super) fn check_timers(&mut self, chart: &Chart, now: Time) {
         if chart.timers.is_empty() {
             return;
         }

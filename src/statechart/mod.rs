@@ -6,7 +6,8 @@
 //!
 //! What is absent: threads, a clock (the time is an argument), configurations (a state-scoped configuration is here only
 //! two names, raised on entry and on exit), and Lua. A step of a pure chart allocates nothing, and what it costs grows
-//! with the depth and the outgoing transitions of the active states, not with the size of the chart.
+//! with the depth and the outgoing transitions of the active states, not with the size of the chart. Where a pure chart's
+//! reaction to an event is always the same, it is worked out at compile time (`reactions.rs`).
 
 mod chart;
 mod checks;
@@ -16,6 +17,7 @@ mod machine;
 mod order;
 mod outcome;
 mod queue;
+mod reactions;
 mod resolve;
 mod search;
 mod sim;
@@ -26,4 +28,5 @@ pub use hook::{Doo, Hook, Nobody, Place, Raised, View};
 pub use machine::Machine;
 pub use outcome::{Ended, Mode, Step, Stepped};
 pub use queue::Queue;
+pub use reactions::AtOnce;
 pub use sim::{Observation, Sim, SimError};

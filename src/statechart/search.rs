@@ -88,6 +88,11 @@ impl Search {
         self.work
     }
 
+    /// Counts what was looked at elsewhere.
+    pub fn looked_at(&mut self, transitions: u64) {
+        self.work += transitions;
+    }
+
     /// A new step: other events.
     pub fn begin(&mut self) {
         self.ways.clear();

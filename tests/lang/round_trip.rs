@@ -280,8 +280,14 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     });
     let limits = (1_usize..100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
     let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, any::<bool>());
-    (vec(ident(), 2..5), configurations(), chart(), parts).prop_map(
-        |(names, configurations, coordinator, (types, activities, emits, deploy, shutdown, limits, full))| Deployment {
+    let beside = vec((ident(), chart(), path(), vec(path(), 0..2), path()), 0..2);
+    (vec(ident(), 2..5), configurations(), (chart(), proptest::option::of(ident()), beside), parts).prop_map(
+        |(
+            names,
+            configurations,
+            (coordinator, first, beside),
+            (types, activities, emits, deploy, shutdown, limits, full),
+        )| Deployment {
             name: names[0],
             platform: names[1],
             libraries: names[2..].to_vec(),
@@ -289,6 +295,14 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             activities,
             configurations,
             coordinator,
+            first,
+            beside: {
+                let mut taken = BTreeSet::from([first.unwrap_or(names[0])]);
+                let named = beside.into_iter().filter(|(name, ..)| taken.insert(*name));
+                let made =
+                    |(name, chart, up, failed, down)| Beside { name, chart, up, failed, down, origin: Origin::NONE };
+                named.map(made).collect()
+            },
             monitors: Vec::new(),
             emits: emits.into_iter().map(|event| (event, Origin::NONE)).collect(),
             deploy,

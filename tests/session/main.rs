@@ -1,5 +1,6 @@
 //! A deployment alive: control socket, bring-up, shutdown, faults on the way.
 
+mod beside;
 mod bringup;
 mod life;
 mod socket;

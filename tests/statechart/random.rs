@@ -3,9 +3,10 @@
 use crate::naive::Naive;
 use crate::support::raise;
 use davit::model::finding::Origin;
-use davit::model::names::{ConfigId, Ident};
+use davit::model::names::{ConfigId, EventName, Ident};
 use davit::model::statechart::{Connector, Node, State, Statechart, Transition, Trigger};
-use davit::statechart::{Sim, compile};
+use davit::statechart::{AtOnce, Chart, Ended, Hook, Machine, Raised, Sim, compile};
+use davit::time::Time;
 use proptest::prelude::*;
 use std::cell::Cell;
 
@@ -132,6 +133,90 @@ pub fn chart(bytes: &[u8]) -> Statechart {
     let mut root = tree(&mut choices, "root", "root", 0, &mut all);
     transitions(&mut choices, &mut root, "root", &all);
     Statechart::new(root)
+}
+
+/// Notes what is raised, and lets whole reactions be taken at once.
+#[derive(Default)]
+struct Names(Vec<Raised>);
+
+impl Hook for Names {
+    const TURNS: bool = false;
+    const WATCHES: bool = false;
+
+    fn raised(&mut self, _: &Chart, raised: Raised) {
+        self.0.push(raised);
+    }
+}
+
+/// The same, but one that watches: it is always served the general way.
+#[derive(Default)]
+struct Watched(Vec<Raised>);
+
+impl Hook for Watched {
+    const TURNS: bool = false;
+
+    fn raised(&mut self, _: &Chart, raised: Raised) {
+        self.0.push(raised);
+    }
+}
+
+/// Events one by one, each to rest: once by what is known beforehand, once step by step. Answers how many were taken at once.
+fn at_once_or_step_by_step(bytes: &[u8], script: &[u8]) -> Result<usize, TestCaseError> {
+    let (Some(chart), _) = compile(&chart(bytes)) else { return Ok(0) };
+    let (mut quick, mut general) = (Machine::new(&chart), Machine::new(&chart));
+    let (mut names, mut all) = (Names::default(), Watched::default());
+    let (mut now, mut at_once) = (Time::default(), 0);
+    let completion = EventName::new("e_done@root.a").unwrap();
+    quick.run(&chart, now, &mut names);
+    general.run(&chart, now, &mut all);
+    for byte in script {
+        now = Time(now.as_nanos() + u64::from(byte >> 4) * 100_000_000);
+        let event = match byte % 8 {
+            0..=5 => chart.event(EventName::new(EVENTS[usize::from(byte % 4)]).unwrap()),
+            6 => chart.event(completion),
+            _ => davit::statechart::EventId::OTHER,
+        };
+        at_once += usize::from(quick.clone().at_once(&chart, event, now, &mut Names::default()) != AtOnce::No);
+        let one = quick.react(&chart, event, now, &mut names);
+        general.send(event);
+        let other = general.run(&chart, now, &mut all);
+        if one.ended == Ended::Endless && other.ended == Ended::Endless {
+            // Both were stopped somewhere on the way round.
+            return Ok(at_once);
+        }
+        prop_assert_eq!(one, other, "{:#?}", chart);
+        prop_assert_eq!(&names.0, &all.0);
+        prop_assert_eq!(quick.active(), general.active());
+        prop_assert_eq!((quick.leaf(), quick.mode()), (general.leaf(), general.mode()));
+        prop_assert_eq!(quick.queue().events(), general.queue().events());
+        prop_assert_eq!(quick.next_deadline(&chart), general.next_deadline(&chart));
+        for node in chart.nodes() {
+            prop_assert_eq!(quick.visit(node), general.visit(node), "visits of {}", chart.fqn(node));
+        }
+    }
+    Ok(at_once)
+}
+
+#[test]
+fn a_reaction_taken_at_once_is_the_one_taken_step_by_step() {
+    let (taken, all) = (Cell::new(0), Cell::new(0));
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: cases(),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let bytes = proptest::collection::vec(any::<u8>(), 0..220);
+    let script = proptest::collection::vec(any::<u8>(), 1..24);
+    let result = runner.run(&(bytes, script), |(bytes, script)| {
+        taken.set(taken.get() + at_once_or_step_by_step(&bytes, &script)?);
+        all.set(all.get() + 1);
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+    println!("{} reactions taken at once in {} charts", taken.get(), all.get());
+    assert!(taken.get() * 10 > all.get(), "only {} in {} charts: the test has become empty", taken.get(), all.get());
 }
 
 fn cases() -> u32 {

@@ -1,10 +1,9 @@
 //! Deployment files: the keys of design §16. The files they name are read by the caller.
 
+use super::beside::{self, Fall, Rise};
 use super::{Unit, choice, name, one_or_more, text, time, types, whole};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::{
-    Activity, BringUp, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Origin, TakeDown, codes,
-};
+use crate::model::{Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Origin, codes};
 use std::collections::BTreeMap;
 
 /// A deployment file, before the files that it names are read.
@@ -21,16 +20,16 @@ pub struct Draft {
     pub activities: BTreeMap<Ident, Activity>,
     /// `configurations`: paths and where they are named; none when the key is missing.
     pub configurations: Option<Vec<(String, Origin)>>,
-    /// `coordinator`
-    pub coordinator: Option<(String, Origin)>,
+    /// `coordinator` and `coordinators`, in written order: names (none: called like the deployment), paths, and where.
+    pub coordinators: Vec<(Option<Ident>, String, Origin)>,
     /// `with`: parameters of the Lua files.
     pub with: Vec<Entry>,
     /// `emits`
     pub emits: Vec<(EventName, Origin)>,
     /// `deploy`
-    pub deploy: Option<BringUp>,
+    pub deploy: Option<Rise>,
     /// `shutdown`
-    pub shutdown: Option<TakeDown>,
+    pub shutdown: Option<Fall>,
     /// `limits`
     pub limits: DeploymentLimits,
     /// `durability`
@@ -97,10 +96,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     let configurations = fields
         .required(cx, "configurations", "configurations: [configurations.lua]")
         .map(|node| files(cx, node, "`configurations`", "configurations: [configurations.lua]"));
-    let coordinator = fields.required(cx, "coordinator", "coordinator: coordinator.lua").and_then(|node| {
-        let path = text(cx, &node, "`coordinator`", "coordinator: coordinator.lua")?;
-        Some((path, node.origin))
-    });
+    let coordinators = beside::coordinators(cx, &mut fields);
     if let Some(node) = fields.take("monitors") {
         let named = files(cx, node, "`monitors`", "monitors: [monitors.lua]");
         if let Some((path, origin)) = named.first() {
@@ -118,8 +114,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         }
     };
     let emits = fields.take("emits").map(|node| emits(cx, node)).unwrap_or_default();
-    let deploy = fields.required(cx, "deploy", DEPLOY).and_then(|node| bring_up(cx, node));
-    let shutdown = fields.required(cx, "shutdown", SHUTDOWN).and_then(|node| take_down(cx, node));
+    let deploy = fields.required(cx, "deploy", DEPLOY).and_then(|node| beside::rise(cx, node));
+    let shutdown = fields.required(cx, "shutdown", SHUTDOWN).and_then(|node| beside::fall(cx, node));
     let limits = fields.take("limits").map(|node| limits(cx, node)).unwrap_or_default();
     let durability = fields.take("durability").and_then(|node| {
         choice(cx, &node, "`durability`", &[("full", Durability::Full), ("relaxed", Durability::Relaxed)])
@@ -132,7 +128,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         types: types.unwrap_or_default(),
         activities,
         configurations,
-        coordinator,
+        coordinators,
         with,
         emits,
         deploy,
@@ -143,8 +139,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     })
 }
 
-const DEPLOY: &str = "deploy: { event: e_start, up: operational, within_s: 20 }";
-const SHUTDOWN: &str = "shutdown: { event: e_shutdown, down: idle, within_s: 20 }";
+pub(super) const DEPLOY: &str = "deploy: { event: e_start, up: operational, within_s: 20 }";
+pub(super) const SHUTDOWN: &str = "shutdown: { event: e_shutdown, down: idle, within_s: 20 }";
 
 fn libraries(cx: &mut Cx, node: Node) -> Vec<Ident> {
     one_or_more(node).iter().filter_map(|node| name(cx, node, "a library", "libraries: [standard]")).collect()
@@ -202,44 +198,6 @@ fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
         }
     }
     out
-}
-
-/// The name or path of a coordinator's state.
-fn state(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<String> {
-    let path = text(cx, node, what, example)?;
-    let bad = path.split('.').find_map(|part| Ident::new(part).err());
-    if let Some(error) = bad {
-        let finding = Finding::error(codes::TEXT_BAD_NAME, format!("`{path}` is not the name of a state"));
-        cx.report(finding.at(node.origin).labelled(error.reason).help(format!("write it like `{example}`")));
-        return None;
-    }
-    Some(path)
-}
-
-fn bring_up(cx: &mut Cx, node: Node) -> Option<BringUp> {
-    let mut fields = Fields::of(cx, node, "`deploy`", DEPLOY)?;
-    let event = fields.required(cx, "event", "event: e_start");
-    let event = event.and_then(|node| name::<EventName>(cx, &node, "`deploy.event`", "event: e_start"));
-    let up = fields.required(cx, "up", "up: operational");
-    let up = up.and_then(|node| state(cx, &node, "`deploy.up`", "up: operational"));
-    let failed = fields.take("failed").map(one_or_more).unwrap_or_default();
-    let failed = failed.iter().filter_map(|node| state(cx, node, "`deploy.failed`", "failed: [fault]")).collect();
-    let within = fields.required(cx, "within_s", "within_s: 20");
-    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
-    fields.finish(cx);
-    Some(BringUp { event: event?, up: up?, failed, within: within? })
-}
-
-fn take_down(cx: &mut Cx, node: Node) -> Option<TakeDown> {
-    let mut fields = Fields::of(cx, node, "`shutdown`", SHUTDOWN)?;
-    let event = fields.required(cx, "event", "event: e_shutdown");
-    let event = event.and_then(|node| name::<EventName>(cx, &node, "`shutdown.event`", "event: e_shutdown"));
-    let down = fields.required(cx, "down", "down: idle");
-    let down = down.and_then(|node| state(cx, &node, "`shutdown.down`", "down: idle"));
-    let within = fields.required(cx, "within_s", "within_s: 20");
-    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
-    fields.finish(cx);
-    Some(TakeDown { event: event?, down: down?, within: within? })
 }
 
 /// Most frames a deployment may ask for: each holds its inverse in memory.

@@ -1,5 +1,6 @@
 //! Loose tree → model: every name, type, time and choice is checked here, once, for both languages.
 
+pub mod beside;
 pub mod chart;
 pub mod configuration;
 pub mod deployment;

@@ -8,7 +8,7 @@ pub use lua::{configurations_lua, coordinator_lua};
 pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
 
 use crate::diagnostics::Language;
-use crate::model::{Configuration, Deployment, Statechart};
+use crate::model::{Configuration, Deployment, Ident, Statechart};
 use std::time::Duration;
 
 /// Configurations in a language.
@@ -27,19 +27,28 @@ pub fn coordinator(chart: &Statechart, language: Language) -> String {
     }
 }
 
-/// A deployment as files, by name: itself first (always YAML), then its configurations and its coordinator in the
+/// A deployment as files, by name: itself first (always YAML), then its configurations and its coordinators in the
 /// language given.
 pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, String)> {
     let ending = match language {
         Language::Lua => "lua",
         Language::Yaml => "yaml",
     };
-    let (c, k) = (format!("configurations.{ending}"), format!("coordinator.{ending}"));
-    vec![
-        (format!("{}.deployment.yaml", deployment.name), deployment_yaml(deployment, &[&c], &k)),
+    let c = format!("configurations.{ending}");
+    let one = deployment.first.is_none() && deployment.beside.is_empty();
+    let file =
+        |name: &Ident| if one { format!("coordinator.{ending}") } else { format!("{name}.coordinator.{ending}") };
+    let coordinators: Vec<String> = deployment.coordinators().iter().map(file).collect();
+    let texts: Vec<String> = std::iter::once(&deployment.coordinator)
+        .chain(deployment.beside.iter().map(|b| &b.chart))
+        .map(|chart| coordinator(chart, language))
+        .collect();
+    let mut files = vec![
+        (format!("{}.deployment.yaml", deployment.name), deployment_yaml(deployment, &[&c], &coordinators)),
         (c, configurations(&deployment.configurations, language)),
-        (k, coordinator(&deployment.coordinator, language)),
-    ]
+    ];
+    files.extend(coordinators.into_iter().zip(texts));
+    files
 }
 
 /// A float that reads back as the same float, and as a float in every reader of YAML: with a point.

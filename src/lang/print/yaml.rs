@@ -3,8 +3,8 @@
 use super::{float, milliseconds, seconds};
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
 use crate::model::{
-    Call, ChangeKind, ComponentType, Configuration, Deployment, Direction, Durability, Effect, OnFailure, Origin,
-    Policy, StateEntry, Statechart, Tunable, Value,
+    Call, ChangeKind, ComponentType, Configuration, Deployment, Direction, Durability, Effect, Ident, OnFailure,
+    Origin, Policy, StateEntry, Statechart, Tunable, Value,
 };
 use std::fmt::{Display, Write as _};
 
@@ -312,8 +312,8 @@ fn component_type(out: &mut String, ty: &ComponentType) {
     out.push_str(&body);
 }
 
-/// The deployment file, with the names of the files of its configurations and its coordinator.
-pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinator: &str) -> String {
+/// The deployment file, with the names of the files of its configurations and its coordinators.
+pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinators: &[String]) -> String {
     let mut out = format!("davit: 1\nname: {}\nplatform: {}\n", t(&d.name), t(&d.platform));
     _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
     if !d.types.is_empty() {
@@ -338,18 +338,36 @@ pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinator: &st
         _ = writeln!(out, "  {}: {parts}", t(name));
     }
     _ = writeln!(out, "configurations: {}", list(configurations.iter().map(|file| text(file))));
-    _ = writeln!(out, "coordinator: {}", text(coordinator));
+    let named = d.coordinators().into_iter().zip(coordinators);
+    for (_, file) in named.clone().take(usize::from(d.first.is_none())) {
+        _ = writeln!(out, "coordinator: {}", text(file));
+    }
+    let named: Vec<String> = named
+        .skip(usize::from(d.first.is_none()))
+        .map(|(name, file)| format!("{}: {}", t(&name), text(file)))
+        .collect();
+    if !named.is_empty() {
+        _ = writeln!(out, "coordinators: {{ {} }}", named.join(", "));
+    }
     if !d.emits.is_empty() {
         _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));
     }
-    let (event, up, within) = (t(&d.deploy.event), text(&d.deploy.up), seconds(d.deploy.within));
-    let failed = if d.deploy.failed.is_empty() {
-        String::new()
-    } else {
-        format!(", failed: {}", list(d.deploy.failed.iter().map(|s| text(s))))
+    let first = (d.coordinators()[0], &d.deploy, &d.shutdown.down);
+    // With one coordinator its states need no name before them; with several each has its own.
+    let own = |name: Ident, state: &String| {
+        text(&if d.beside.is_empty() { state.clone() } else { format!("{name}:{state}") })
     };
+    let each = |states: Vec<String>| if d.beside.is_empty() { states.concat() } else { list(states) };
+    let ups = std::iter::once((first.0, &first.1.up)).chain(d.beside.iter().map(|b| (b.name, &b.up)));
+    let up = each(ups.map(|(name, state)| own(name, state)).collect());
+    let downs = std::iter::once((first.0, first.2)).chain(d.beside.iter().map(|b| (b.name, &b.down)));
+    let down = each(downs.map(|(name, state)| own(name, state)).collect());
+    let (event, within) = (t(&d.deploy.event), seconds(d.deploy.within));
+    let failed = std::iter::once((first.0, &first.1.failed)).chain(d.beside.iter().map(|b| (b.name, &b.failed)));
+    let failed: Vec<String> = failed.flat_map(|(name, all)| all.iter().map(move |state| own(name, state))).collect();
+    let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", list(failed)) };
     _ = writeln!(out, "deploy: {{ event: {event}, up: {up}{failed}, within_s: {within} }}");
-    let (event, down, within) = (t(&d.shutdown.event), text(&d.shutdown.down), seconds(d.shutdown.within));
+    let (event, within) = (t(&d.shutdown.event), seconds(d.shutdown.within));
     _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within} }}");
     let (stack, timeout) = (d.limits.stack, seconds(d.limits.step_timeout));
     _ = writeln!(out, "limits: {{ stack: {stack}, step_timeout_s: {timeout} }}");

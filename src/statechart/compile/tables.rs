@@ -6,6 +6,7 @@ use crate::model::finding::{self, Finding, Origin};
 use crate::model::names::EventName;
 use crate::model::statechart::{Action, FunctionId, ROOT, Since, Trigger};
 use crate::statechart::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When};
+use crate::statechart::reactions::Reactions;
 use crate::statechart::{EdgeId, NodeId, order};
 use rustc_hash::FxHashMap;
 
@@ -37,6 +38,7 @@ impl Builder<'_> {
             unguarded: true,
             pure,
             init: self.event("e_init_fsm").unwrap_or(EventId::INIT),
+            reactions: Reactions::default(),
         };
         for (node, out) in outgoing.iter_mut().enumerate() {
             order::sort(out, |index| self.edges[*index].pn);

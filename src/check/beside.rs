@@ -1,0 +1,135 @@
+//! Several coordinators side by side: what each of them is checked as, and when that is all there is to know.
+//!
+//! Each coordinator is followed alone, with the events that the others emit counted among those that can come at any time
+//! (which is more than can happen). As long as the configurations of one touch no component that those of another touch,
+//! no request of the one is ever answered otherwise because of the other: their frames share nothing, and steps on
+//! different components commute. So what holds of each alone holds of them together. Where they do touch the same
+//! component, that is said.
+
+use super::coordinator::ask_of;
+use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
+use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Target};
+use crate::statechart::{Chart, EventId};
+use std::collections::BTreeSet;
+
+/// The deployment as its `number`-th coordinator alone sees it. `charts` are all of them, compiled.
+pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option<Deployment> {
+    let mut seen = deployment.seen_by(number)?;
+    let own = charts[number];
+    let others = || charts.iter().enumerate().filter(move |(other, _)| *other != number).map(|(_, chart)| *chart);
+    let raises = |chart: &Chart, name| chart.raises().iter().any(|site| site.name == name);
+    // What nobody raises is said once, of the first.
+    seen.emits.retain(|(event, _)| raises(own, *event) || (number == 0 && !others().any(|c| raises(c, *event))));
+    let between = own.raises().iter().filter(|site| others().any(|other| other.event(site.name) != EventId::OTHER));
+    seen.emits.extend(between.map(|site| (site.name, site.origin)));
+    // A failed state without a coordinator's name is meant of those that have it; of the first, if none does.
+    seen.deploy
+        .failed
+        .retain(|state| own.find(state).is_ok() || (number == 0 && !others().any(|other| other.find(state).is_ok())));
+    Some(seen)
+}
+
+/// Components that a configuration names, or may touch by `_default`.
+fn touched(configuration: &Configuration) -> (BTreeSet<ComponentName>, bool) {
+    let mut components = BTreeSet::new();
+    for change in &configuration.changes {
+        match &change.kind {
+            ChangeKind::Create { component, .. } | ChangeKind::Destroy { component } => {
+                _ = components.insert(*component)
+            }
+            ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
+                components.extend([from.component, to.component]);
+            }
+            ChangeKind::PropertySet { property, .. } => _ = components.insert(property.component),
+            ChangeKind::PortWrite { port, .. } => _ = components.insert(port.component),
+            ChangeKind::OperationCall { call, undo } => {
+                components.insert(call.operation.component);
+                components.extend(undo.iter().map(|undo| undo.operation.component));
+            }
+        }
+    }
+    let mut everything = false;
+    for entry in configuration.pre.iter().chain(&configuration.post) {
+        match entry.target {
+            Target::Component(component) => _ = components.insert(component),
+            Target::Default => everything = true,
+        }
+    }
+    (components, everything)
+}
+
+/// Configurations that a coordinator asks for.
+pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
+    let asks = chart.raises().iter().filter_map(|site| ask_of(deployment, site.name));
+    asks.filter_map(|ask| match ask {
+        Ask::Apply(id) => Some(id),
+        _ => None,
+    })
+    .collect()
+}
+
+/// What the configurations of different coordinators touch together: one finding for each pair of coordinators.
+pub fn shared(deployment: &Deployment, charts: &[&Chart]) -> Findings {
+    if charts.len() < 2 {
+        return Vec::new();
+    }
+    let names = deployment.coordinators();
+    let of = |chart: &Chart| -> Vec<(&Configuration, BTreeSet<ComponentName>, bool)> {
+        let ids = asked(deployment, chart);
+        let configurations = deployment.configurations.iter().filter(|c| ids.contains(&c.id));
+        configurations.map(|c| (c, touched(c).0, touched(c).1)).collect()
+    };
+    let all: Vec<_> = charts.iter().map(|chart| of(chart)).collect();
+    let mut findings = Vec::new();
+    for (chart, name) in charts.iter().zip(&names) {
+        if let Some(site) = chart.raises().iter().find(|site| site.name.as_str() == "undo") {
+            let message = format!("`undo` of `{name}` is refused when the newest frame is another coordinator's");
+            findings.push(
+                Finding::warning(COORD_SHARED, message)
+                    .at(site.origin)
+                    .help("name the configuration to undo: `ID.undo` undoes one's own newest frame of it"),
+            );
+        }
+    }
+    for (a, mine) in all.iter().enumerate() {
+        for (b, theirs) in all.iter().enumerate().skip(a + 1) {
+            let found = mine.iter().find_map(|(one, components, everything)| {
+                theirs.iter().find_map(|(other, touches, all)| {
+                    let what = match components.intersection(touches).next() {
+                        Some(component) => format!("`{component}`"),
+                        None if one.id == other.id || *everything || *all => {
+                            "every component, by `_default`".to_owned()
+                        }
+                        None if one.group.is_some() && one.group == other.group => {
+                            format!("the group `{}`", one.group.map_or("", |g| g.as_str()))
+                        }
+                        None => return None,
+                    };
+                    Some((*one, *other, what))
+                })
+            });
+            if let Some((one, other, what)) = found {
+                let message = format!(
+                    "`{}` of the coordinator `{}` and `{}` of `{}` touch {what}: what they do together is not verified",
+                    one.id, names[a], other.id, names[b]
+                );
+                findings.push(
+                    Finding::warning(COORD_SHARED, message)
+                        .at(one.origin)
+                        .also(other.origin, "the other one")
+                        .help("give each coordinator components of its own, or let one ask the other by an event"),
+                );
+            }
+        }
+    }
+    findings
+}
+
+/// Takes back that a coordinator does not wait for the event that starts or ends the deployment, if another one does.
+pub fn forgive_unheard(deployment: &Deployment, charts: &[&Chart], findings: &mut Findings) {
+    for (key, event) in [("deploy.event", deployment.deploy.event), ("shutdown.event", deployment.shutdown.event)] {
+        if charts.iter().any(|chart| chart.event(event) != EventId::OTHER) {
+            findings.retain(|f| f.code != DEPLOY_EVENT_UNHEARD || f.path != key);
+        }
+    }
+}

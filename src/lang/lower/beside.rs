@@ -1,0 +1,212 @@
+//! The coordinators of a deployment, and which of their states mean *up*, *failed* and *down*.
+//!
+//! A state is written `STATE`, or `COORDINATOR:STATE` where there are several coordinators. A state without a coordinator's
+//! name is meant of every coordinator that is not named with one of its own.
+
+use super::deployment::{DEPLOY, SHUTDOWN};
+use super::{Unit, name, one_or_more, text, time};
+use crate::lang::tree::{Cx, Fields, Kind, Node};
+use crate::model::finding::did_you_mean;
+use crate::model::{Beside, BringUp, EventName, Finding, Ident, Origin, Statechart, TakeDown, codes};
+use std::time::Duration;
+
+/// A state as a deployment names it.
+#[derive(Debug, Clone)]
+pub struct Named {
+    coordinator: Option<Ident>,
+    state: String,
+    origin: Origin,
+}
+
+/// `deploy`, before it is known which coordinators there are.
+pub struct Rise {
+    event: EventName,
+    up: Vec<Named>,
+    failed: Vec<Named>,
+    within: Duration,
+}
+
+/// `shutdown`, likewise.
+pub struct Fall {
+    event: EventName,
+    down: Vec<Named>,
+    within: Duration,
+}
+
+const ONE: &str = "coordinator: coordinator.lua";
+const SEVERAL: &str = "coordinators: { arm: arm.lua, gripper: gripper.lua }";
+
+/// `coordinator` and `coordinators`.
+pub fn coordinators(cx: &mut Cx, fields: &mut Fields) -> Vec<(Option<Ident>, String, Origin)> {
+    let mut out: Vec<(Option<Ident>, String, Origin)> = Vec::new();
+    let several = fields.take("coordinators");
+    let one = if several.is_some() { fields.take("coordinator") } else { fields.required(cx, "coordinator", ONE) };
+    if let Some(node) = one
+        && let Some(path) = text(cx, &node, "`coordinator`", ONE)
+    {
+        out.push((None, path, node.origin));
+    }
+    let Some(several) = several else { return out };
+    let Kind::Map(entries) = several.kind else {
+        cx.wrong(&several, "`coordinators`", "a table of files by name", SEVERAL);
+        return out;
+    };
+    for entry in entries {
+        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+        let ident = name::<Ident>(cx, &key, "a coordinator", SEVERAL);
+        if let (Some(ident), Some(path)) = (ident, text(cx, &entry.value, "a coordinator", SEVERAL)) {
+            out.push((Some(ident), path, entry.origin));
+        }
+    }
+    if out.is_empty() && !crate::model::finding::has_errors(&cx.findings) {
+        let finding = Finding::error(codes::TEXT_BAD_VALUE, "`coordinators` names none").at(several.origin);
+        cx.report(finding.help(format!("write at least one: `{SEVERAL}`")));
+    }
+    out
+}
+
+/// The name or path of a coordinator's state, with the coordinator's name before it if there is one.
+fn state(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<Named> {
+    let path = text(cx, node, what, example)?;
+    let (coordinator, state) = match path.split_once(':') {
+        Some((coordinator, state)) => (Some(coordinator), state),
+        None => (None, path.as_str()),
+    };
+    let bad = coordinator.into_iter().chain(state.split('.')).find_map(|part| Ident::new(part).err());
+    if let Some(error) = bad {
+        let finding = Finding::error(codes::TEXT_BAD_NAME, format!("`{path}` is not the name of a state"));
+        cx.report(finding.at(node.origin).labelled(error.reason).help(format!("write it like `{example}`")));
+        return None;
+    }
+    let coordinator = coordinator.and_then(|name| Ident::new(name).ok());
+    Some(Named { coordinator, state: state.to_owned(), origin: node.origin })
+}
+
+fn states(cx: &mut Cx, node: Option<Node>, what: &str, example: &str) -> Vec<Named> {
+    let nodes = node.map(one_or_more).unwrap_or_default();
+    nodes.iter().filter_map(|node| state(cx, node, what, example)).collect()
+}
+
+/// `deploy`
+pub fn rise(cx: &mut Cx, node: Node) -> Option<Rise> {
+    let mut fields = Fields::of(cx, node, "`deploy`", DEPLOY)?;
+    let event = fields.required(cx, "event", "event: e_start");
+    let event = event.and_then(|node| name::<EventName>(cx, &node, "`deploy.event`", "event: e_start"));
+    let up = fields.required(cx, "up", "up: operational");
+    let up = states(cx, up, "`deploy.up`", "up: operational");
+    let failed = fields.take("failed");
+    let failed = states(cx, failed, "`deploy.failed`", "failed: [fault]");
+    let within = fields.required(cx, "within_s", "within_s: 20");
+    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    fields.finish(cx);
+    Some(Rise { event: event?, up, failed, within: within? })
+}
+
+/// `shutdown`
+pub fn fall(cx: &mut Cx, node: Node) -> Option<Fall> {
+    let mut fields = Fields::of(cx, node, "`shutdown`", SHUTDOWN)?;
+    let event = fields.required(cx, "event", "event: e_shutdown");
+    let event = event.and_then(|node| name::<EventName>(cx, &node, "`shutdown.event`", "event: e_shutdown"));
+    let down = fields.required(cx, "down", "down: idle");
+    let down = states(cx, down, "`shutdown.down`", "down: idle");
+    let within = fields.required(cx, "within_s", "within_s: 20");
+    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    fields.finish(cx);
+    Some(Fall { event: event?, down, within: within? })
+}
+
+/// The coordinators with their states: how the deployment comes up and goes down by its first one, and the others.
+pub struct Joined {
+    /// The first coordinator.
+    pub coordinator: Statechart,
+    /// Its name, if it was given one.
+    pub first: Option<Ident>,
+    /// The others.
+    pub beside: Vec<Beside>,
+    /// How it comes up.
+    pub deploy: BringUp,
+    /// How it goes down.
+    pub shutdown: TakeDown,
+}
+
+/// Gives each coordinator its states. `own` is the name of the deployment, and of a coordinator without one.
+pub fn join(
+    cx: &mut Cx,
+    own: Ident,
+    charts: Vec<(Option<Ident>, Statechart, Origin)>,
+    rise: &Rise,
+    fall: &Fall,
+) -> Option<Joined> {
+    let names: Vec<Ident> = charts.iter().map(|(name, ..)| name.unwrap_or(own)).collect();
+    if let Some(again) = (1..names.len()).find(|at| names[..*at].contains(&names[*at])) {
+        let message = format!("there are two coordinators `{}`", names[again]);
+        cx.report(
+            Finding::error(codes::TEXT_DUPLICATE_KEY, message)
+                .at(charts[again].2)
+                .help("the one under `coordinator` is called like the deployment: give the other another name"),
+        );
+    }
+    for named in rise.up.iter().chain(&rise.failed).chain(&fall.down) {
+        if let Some(coordinator) = named.coordinator.filter(|name| !names.contains(name)) {
+            cx.report(
+                Finding::error(codes::DEPLOY_UNKNOWN_STATE, format!("there is no coordinator `{coordinator}`"))
+                    .at(named.origin)
+                    .help(did_you_mean(coordinator.as_str(), "coordinators", names.iter().map(Ident::as_str))),
+            );
+        }
+    }
+    let up: Vec<String> = names.iter().map(|name| one(cx, *name, &rise.up, "up")).collect();
+    let down: Vec<String> = names.iter().map(|name| one(cx, *name, &fall.down, "down")).collect();
+    let failed = |name: Ident| -> Vec<String> {
+        let meant = rise.failed.iter().filter(|f| f.coordinator.is_none_or(|c| c == name));
+        meant.map(|f| f.state.clone()).collect()
+    };
+    let mut beside: Vec<Beside> = Vec::new();
+    let mut first = None;
+    for (at, (name, chart, origin)) in charts.into_iter().enumerate() {
+        if at == 0 {
+            first = Some((name, chart));
+        } else {
+            let (up, down) = (up[at].clone(), down[at].clone());
+            beside.push(Beside { name: names[at], chart, up, failed: failed(names[at]), down, origin });
+        }
+    }
+    let (first, coordinator) = first?;
+    Some(Joined {
+        coordinator,
+        first,
+        beside,
+        deploy: BringUp { event: rise.event, up: up[0].clone(), failed: failed(names[0]), within: rise.within },
+        shutdown: TakeDown { event: fall.event, down: down[0].clone(), within: fall.within },
+    })
+}
+
+/// The one state that means `what` of one coordinator.
+fn one(cx: &mut Cx, coordinator: Ident, named: &[Named], what: &str) -> String {
+    let of = |name: Option<Ident>| named.iter().filter(move |n| n.coordinator == name);
+    let own: Vec<&Named> = of(Some(coordinator)).collect();
+    let meant = if own.is_empty() { of(None).collect() } else { own };
+    match meant[..] {
+        [one] => one.state.clone(),
+        [] => {
+            // Where the names themselves are wrong, that is said already.
+            if !crate::model::finding::has_errors(&cx.findings) {
+                let at = named.first().map_or(Origin::NONE, |n| n.origin);
+                let message = format!("no state is named that means {what} of the coordinator `{coordinator}`");
+                let help = format!("every coordinator has one: write `{what}: [{coordinator}:STATE, …]`");
+                cx.report(Finding::error(codes::DEPLOY_UNKNOWN_STATE, message).at(at).help(help));
+            }
+            String::new()
+        }
+        [first, second, ..] => {
+            let message = format!("two states mean {what} of the coordinator `{coordinator}`");
+            cx.report(
+                Finding::error(codes::TEXT_BAD_VALUE, message)
+                    .at(second.origin)
+                    .also(first.origin, "first here")
+                    .help("name one state for each coordinator; a state around both means either"),
+            );
+            first.state.clone()
+        }
+    }
+}

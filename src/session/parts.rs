@@ -1,0 +1,93 @@
+//! The coordinators of a session, side by side: each on its own thread, with its own states that mean *up* and *down*.
+//!
+//! Events of operators and components go to all of them; an answer goes to the one that asked; what one emits is an event
+//! of the others that wait for it. A frame belongs to whoever asked for it, so none undoes another's.
+
+use super::hub::Hub;
+use super::routes::{Junction, ToConfigurator, lock, scoped};
+use crate::configurator::Requester;
+use crate::coordinator::Coordinator;
+use crate::model::{Deployment, EventName, Ident};
+use crate::statechart::{Chart, EventId, NodeId};
+use crate::time::Clock;
+use std::sync::Arc;
+
+/// One coordinator of a session.
+pub(super) struct Part {
+    pub name: Ident,
+    pub chart: Arc<Chart>,
+    pub coordinator: Coordinator,
+    pub up: Option<NodeId>,
+    pub down: Option<NodeId>,
+    failed: Vec<(NodeId, String)>,
+}
+
+impl Part {
+    /// Starts all coordinators of a deployment and makes them known to the junction.
+    pub fn start_all(
+        deployment: &Deployment,
+        charts: Vec<Arc<Chart>>,
+        clock: &Clock,
+        hub: &Arc<Hub>,
+        junction: &Arc<Junction>,
+    ) -> Vec<Self> {
+        let names = deployment.coordinators();
+        let several = names.len() > 1;
+        // None reacts before all are known: what the first one emits on its first entry must find the others.
+        let mut known = lock(&junction.coordinators);
+        let mut parts = Vec::new();
+        for (number, (name, chart)) in names.into_iter().zip(charts).enumerate() {
+            let requester = Requester::Coordinator(name.into());
+            let listener = ToConfigurator {
+                hub: hub.clone(),
+                junction: Arc::downgrade(junction),
+                name: requester,
+                prefix: if several { format!("{name}:") } else { String::new() },
+                scoped: scoped(&chart),
+            };
+            let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
+            let coordinator = Coordinator::start(&thread, chart.clone(), clock, listener);
+            known.push((requester, coordinator.clone()));
+            let (up, down, failed) = match number.checked_sub(1).map(|at| &deployment.beside[at]) {
+                None => (&deployment.deploy.up, &deployment.shutdown.down, &deployment.deploy.failed),
+                Some(own) => (&own.up, &own.down, &own.failed),
+            };
+            let state = |name: &str| chart.find(name).ok();
+            parts.push(Self {
+                name,
+                up: state(up),
+                down: state(down),
+                failed: failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
+                chart: chart.clone(),
+                coordinator,
+            });
+        }
+        parts
+    }
+
+    /// Its state of that name, which may have the coordinator's name before it.
+    pub fn find(&self, state: &str) -> Option<NodeId> {
+        let own = match state.split_once(':') {
+            Some((name, own)) if name == self.name.as_str() => own,
+            Some(_) => return None,
+            None => state,
+        };
+        self.chart.find(own).ok()
+    }
+
+    /// Its active state that means that the bring-up failed.
+    pub fn failed_state(&self) -> Option<&str> {
+        self.failed.iter().find(|(id, _)| self.coordinator.is_active(*id)).map(|(_, name)| name.as_str())
+    }
+}
+
+/// Names that one coordinator raises and another waits for.
+pub(super) fn between(charts: &[Arc<Chart>]) -> Vec<EventName> {
+    let mut names = Vec::new();
+    for (number, chart) in charts.iter().enumerate() {
+        let others = || charts.iter().enumerate().filter(move |(other, _)| *other != number);
+        let heard = |name| others().any(|(_, other)| other.event(name) != EventId::OTHER);
+        names.extend(chart.raises().iter().map(|site| site.name).filter(|name| heard(*name)));
+    }
+    names
+}
