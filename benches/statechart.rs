@@ -86,7 +86,8 @@ fn react(chart: &Chart, machine: &mut Machine, event: EventId, batch: &mut Batch
 mod by_hand {
     use super::Batch;
 
-    /// A name, who raised it, and in which visit.
+    /// A name, who raised it, and in which visit. Its reader only takes it.
+    #[allow(dead_code)]
     pub struct Raised<S> {
         pub name: &'static str,
         pub owner: S,
