@@ -169,3 +169,14 @@ pub const FORCED_SHOWN: usize = 8;
 /// Pieces of a signal that one operator over time of a monitor keeps; past it neighbours are merged. A window keeps the
 /// extremes still to come, a few dozen for a signal that goes up and down; this many pieces are 100 kB.
 pub const MONITOR_PIECES: usize = 4096;
+
+/// Conditions and signals of a monitor within each other. People write five levels; each is two levels of YAML, which must
+/// fit into [`TEXT_DEPTH`] with the file around it.
+pub const MONITOR_DEPTH: usize = 24;
+
+/// Bytes of one line of a file of samples: thousands of columns.
+pub const SAMPLES_LINE: usize = 1 << 20;
+
+/// Evaluations of monitors between two lines of a file of samples. A monitor that runs at 1 kHz has this many in a gap of a
+/// quarter of an hour; more are not made one by one.
+pub const SAMPLES_WAKES: u32 = 1_000_000;

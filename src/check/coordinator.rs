@@ -5,7 +5,7 @@ use crate::model::codes::{
     COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
 use crate::model::finding::{did_you_mean, nearest};
-use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Verdict};
 use crate::statechart::{Chart, EdgeId, NodeId, RaiseSite, When};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -100,7 +100,8 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
 }
 
 /// Completion and time events: raised in the chart itself.
-fn is_internal(event: &str) -> bool {
+/// Whether the statechart makes events of that name itself.
+pub fn is_internal(event: &str) -> bool {
     event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
 }
 
@@ -112,7 +113,8 @@ fn split_answer(event: &str) -> Option<(&str, &'static str)> {
     SUFFIXES.iter().find_map(|suffix| event.strip_suffix(suffix).map(|id| (id, *suffix)))
 }
 
-fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
+/// Whether an event is spelt like an answer of the configurator.
+pub fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
     match split_answer(event) {
         Some((id, _)) => ConfigId::new(id).is_ok(),
         None => event.rsplit_once('.').is_some_and(|(id, _)| {
@@ -192,6 +194,7 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let mut known: BTreeSet<&str> =
         deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
+    known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
         for trigger in chart.triggers(edge).unwrap_or(&[]) {

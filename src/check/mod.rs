@@ -8,6 +8,7 @@ mod configurations;
 mod coordinator;
 mod drive;
 mod explore;
+mod monitors;
 mod reactions;
 mod types;
 mod universe;
@@ -74,6 +75,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
     findings.extend(configurations::check(deployment, catalogue, &universe));
+    findings.extend(monitors::check(deployment, &universe));
     let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
     let mut charts = Vec::new();
     let mut all = 0;
@@ -96,6 +98,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         looked.entangled = !together.is_empty();
         looked.explored.complete = !looked.entangled;
         looked.findings.extend(together);
+        looked.findings.extend(monitors::events(deployment, &looked.charts));
         if all == 1 {
             looked.at(deployment, 0, "");
         } else {

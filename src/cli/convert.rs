@@ -9,12 +9,12 @@ use std::path::PathBuf;
 
 /// Write the same model in the other language.
 ///
-/// A file of configurations or a coordinator's file becomes one text. Of a deployment, all files are written: with `-o
+/// A file of configurations, of monitors, or a coordinator's file becomes one text. Of a deployment, all files are written: with `-o
 /// DIR` into that directory, else one after the other, each below a comment with its name. Comments, loops and parameters
 /// of the original are not part of the model.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Configurations, a coordinator, or a deployment.
+    /// Configurations, monitors, a coordinator, or a deployment.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// The language to write.

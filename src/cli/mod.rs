@@ -15,6 +15,7 @@ mod explain;
 mod graph;
 pub mod input;
 mod log;
+mod monitor;
 pub mod output;
 mod plan;
 mod plan_view;
@@ -76,6 +77,7 @@ commands! {
     Types = types::Args,
     Convert = convert::Args,
     Sim = sim::Args,
+    Monitor = monitor::Args,
     Deploy = deploy::Args,
     Run = run::Args,
     Shutdown = shutdown::Args,

@@ -60,7 +60,7 @@ pub fn render_with(findings: &[Finding], sources: &SourceMap, options: RenderOpt
 pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
     let place = |location: Option<&Location>| {
         let file = location.map(|l| sources.file(l.file).name.to_string());
-        (file, location.map(|l| l.line), location.map(|l| l.column))
+        (file, location.map(|l| l.line + sources.file(l.file).skipped), location.map(|l| l.column))
     };
     let one = |finding: &Finding| {
         let (file, line, column) = place(primary(finding, sources).as_ref());
@@ -251,6 +251,7 @@ struct Window {
     name: Arc<str>,
     text: Arc<str>,
     line_starts: Vec<usize>,
+    skipped: usize,
 }
 
 impl fmt::Debug for Window {
@@ -268,7 +269,12 @@ const LONG_LINE: usize = 2_000;
 impl Window {
     fn new(sources: &SourceMap, file: FileId) -> Self {
         let source = sources.file(file);
-        Self { name: source.name.clone(), text: source.text.clone(), line_starts: source.line_starts().collect() }
+        Self {
+            name: source.name.clone(),
+            text: source.text.clone(),
+            line_starts: source.line_starts().collect(),
+            skipped: source.skipped as usize,
+        }
     }
 
     fn cut(&self, offset: usize) -> usize {
@@ -300,7 +306,14 @@ impl SourceCode for Window {
         let window = SourceSpan::from((range.start, range.len()));
         let lines = last - line + 1;
         let bytes = &self.text.as_bytes()[range];
-        Ok(Box::new(MietteSpanContents::new_named(self.name.to_string(), bytes, window, line, column, lines)))
+        Ok(Box::new(MietteSpanContents::new_named(
+            self.name.to_string(),
+            bytes,
+            window,
+            line + self.skipped,
+            column,
+            lines,
+        )))
     }
 }
 

@@ -29,6 +29,8 @@ pub struct SourceFile {
     pub language: Language,
     /// Byte offsets at which lines begin.
     line_starts: Vec<u32>,
+    /// Lines of the whole text that stand before this one, when it is an excerpt.
+    pub skipped: u32,
 }
 
 impl SourceFile {
@@ -111,7 +113,14 @@ impl SourceMap {
         let after_breaks = breaks.map(|(i, _)| u32::try_from(i + 1).unwrap_or(u32::MAX));
         let line_starts = std::iter::once(0).chain(after_breaks).collect();
         let id = FileId(u32::try_from(self.files.len()).unwrap_or(u32::MAX));
-        self.files.push(SourceFile { name: name.into(), text, language, line_starts });
+        self.files.push(SourceFile { name: name.into(), text, language, line_starts, skipped: 0 });
+        id
+    }
+
+    /// Adds some lines of a text too large to be kept, of which the first is the `line`-th (from 1) of the whole.
+    pub fn add_excerpt(&mut self, name: impl Into<Arc<str>>, text: impl Into<Arc<str>>, line: u32) -> FileId {
+        let id = self.add_file(name, text, Language::Yaml);
+        self.files[id.0 as usize].skipped = line.saturating_sub(1);
         id
     }
 

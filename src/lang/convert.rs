@@ -20,13 +20,14 @@ pub struct Converted {
     pub unreadable: bool,
 }
 
-/// A file of configurations or a coordinator's file, in the language given. The model is the same; comments, loops,
+/// A file of configurations, of monitors, or a coordinator's file, in the language given. The model is the same; comments, loops,
 /// parameters and the layout of the text are not part of it.
 pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions) -> Converted {
     let (content, findings, sources, unreadable) = load::load_any(from, path, options);
     let text = match content {
         _ if crate::model::finding::has_errors(&findings) => None,
         Some(Content::Configurations(list)) => Some(print::configurations(&list, to)),
+        Some(Content::Monitors(list)) => Some(print::monitors(&list, to)),
         Some(Content::Coordinator(chart)) => Some(print::coordinator(&chart, to)),
         None => None,
     };

@@ -1,13 +1,13 @@
 //! The entrances: a deployment with all its files, or one file alone.
 
 use super::files::{self, Sources};
-use super::lower::{beside, chart, configuration, deployment};
+use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
 use super::params::Params;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
-use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Origin, Statechart, codes};
+use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, Statechart, codes};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
 
@@ -57,6 +57,19 @@ pub struct LoadedCoordinator {
     pub unreadable: bool,
 }
 
+/// What loading a file of monitors gave.
+#[derive(Debug)]
+pub struct LoadedMonitors {
+    /// Its monitors, in written order.
+    pub monitors: Vec<Monitor>,
+    /// What was found.
+    pub findings: Findings,
+    /// The text, and where everything stands.
+    pub sources: SourceMap,
+    /// As in [`Loaded`].
+    pub unreadable: bool,
+}
+
 /// Loads a deployment file and all that it names.
 pub fn load(path: &Path, options: &LoadOptions) -> Loaded {
     load_from(&Sources::Disk, path, options)
@@ -93,6 +106,19 @@ pub fn load_coordinator(from: &Sources, path: &Path, options: &LoadOptions) -> L
     LoadedCoordinator { coordinator, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
 }
 
+/// Loads one file of monitors, Lua or YAML.
+pub fn load_monitors(from: &Sources, path: &Path, options: &LoadOptions) -> LoadedMonitors {
+    let mut cx = Cx::default();
+    let mut params = Params::new(&mut cx, Vec::new(), &options.set);
+    let mut monitors = Vec::new();
+    if let Some(node) = monitor_tree(&mut cx, from, path, Origin::NONE, &mut params) {
+        monitors = monitor::monitors(&mut cx, node);
+        monitor::unique(&mut cx, &mut monitors);
+    }
+    params.finish(&mut cx);
+    LoadedMonitors { monitors, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+}
+
 /// What a file turned out to hold.
 #[derive(Debug)]
 pub enum Content {
@@ -100,6 +126,8 @@ pub enum Content {
     Configurations(Vec<Configuration>),
     /// A coordinator.
     Coordinator(Statechart),
+    /// Monitors.
+    Monitors(Vec<Monitor>),
 }
 
 /// Loads a file of configurations or a coordinator's file, whichever it is.
@@ -117,10 +145,10 @@ pub(super) fn load_any(
 
 fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<Content> {
     let (reading, language) = open(cx, from, path, Origin::NONE)?;
-    let (configurations, chart) = match language {
+    let (configurations, chart, monitors) = match language {
         Language::Lua => {
             let made = lua::read(cx, reading, params, &stem(path))?;
-            (made.configurations, made.chart)
+            (made.configurations, made.chart, made.monitors)
         }
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
@@ -133,25 +161,32 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
                 return None;
             }
             if is("coordinator") {
-                (None, only_key(cx, node, reading, "coordinator", "a coordinator's file"))
+                (None, only_key(cx, node, reading, "coordinator", "a coordinator's file"), None)
+            } else if is("monitors") {
+                (None, None, only_key(cx, node, reading, "monitors", "a file of monitors"))
             } else {
-                (only_key(cx, node, reading, "configurations", "a file of configurations"), None)
+                (only_key(cx, node, reading, "configurations", "a file of configurations"), None, None)
             }
         }
     };
-    match (configurations, chart) {
-        (_, Some(node)) => chart::statechart(cx, node).map(Content::Coordinator),
-        (Some(node), None) => {
+    match (configurations, chart, monitors) {
+        (_, Some(node), _) => chart::statechart(cx, node).map(Content::Coordinator),
+        (None, None, Some(node)) => {
+            let mut list = monitor::monitors(cx, node);
+            monitor::unique(cx, &mut list);
+            Some(Content::Monitors(list))
+        }
+        (Some(node), None, _) => {
             let mut list = configuration::configurations(cx, node);
             unique(cx, &mut list);
             Some(Content::Configurations(list))
         }
-        (None, None) => {
+        (None, None, None) => {
             nothing(
                 cx,
                 reading,
-                "configuration and no coordinator",
-                "`ConfiguratorConf { … }` or `return state { … }`",
+                "configuration, no coordinator and no monitor",
+                "`ConfiguratorConf { … }`, `return state { … }` or `Monitors { … }`",
             );
             None
         }
@@ -197,6 +232,24 @@ fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             only_key(cx, node, reading, "configurations", "a file of configurations")
+        }
+    }
+}
+
+/// The map of monitors of a file.
+fn monitor_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Node> {
+    let (reading, language) = open(cx, from, path, named_at)?;
+    match language {
+        Language::Lua => {
+            let made = lua::read(cx, reading, params, &stem(path))?;
+            if made.monitors.is_none() {
+                nothing(cx, reading, "monitor", "`Monitors { name = monitor { … } }`");
+            }
+            made.monitors
+        }
+        Language::Yaml => {
+            let node = yaml::read(cx, reading)?;
+            only_key(cx, node, reading, "monitors", "a file of monitors")
         }
     }
 }
@@ -296,6 +349,13 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
             charts.push((*name, chart, *named_at));
         }
     }
+    let mut monitors = Vec::new();
+    for (file, named_at) in &draft.monitors {
+        if let Some(node) = monitor_tree(cx, from, &folder.join(file), *named_at, &mut params) {
+            monitors.extend(monitor::monitors(cx, node));
+        }
+    }
+    monitor::unique(cx, &mut monitors);
     params.finish(cx);
     if charts.len() < draft.coordinators.len() {
         return None;

@@ -13,11 +13,12 @@ mod lua;
 mod params;
 pub mod print;
 mod tree;
+mod words;
 mod yaml;
 
 pub use convert::{Converted, convert};
 pub use files::Sources;
 pub use load::{
-    LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, load, load_configurations, load_coordinator,
-    load_from,
+    LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations,
+    load_coordinator, load_from, load_monitors,
 };

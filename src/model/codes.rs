@@ -152,9 +152,6 @@ codes! {
         "A Lua file called `print`. Files are read by every command and may not write into its output, so what was \
          printed is shown as a note. Remove the call when it is no longer needed.";
     // ---- deployment and types --------------------------------------------------------------------------------------
-    DEPLOY_MONITORS_LATER = "deploy::monitors_later", "monitors are not read yet",
-        "The deployment names files of monitors. This version does not evaluate them, so nothing will raise their \
-         events. Until then a component can watch its ports and raise events through an event port.";
     TYPE_BAD_TYPE = "type::bad_type", "this is not a type of values",
         "Types are `bool`, `int`, `float`, `string`, for ports also `event`, arrays `\"float[3]\"` and `\"float[]\"` (in \
          quotes, since YAML has brackets of its own), and records `{x: float, y: float}`. Anything else cannot be \
@@ -491,6 +488,9 @@ codes! {
     CLI_UNWRITABLE = "cli::unwritable", "the output cannot be written",
         "`-o FILE` names a file that cannot be created or written: the directory is missing, it is a directory itself, or \
          permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal.";
+    CLI_UNKNOWN_MONITOR = "cli::unknown_monitor", "there is no such monitor",
+        "The file has monitors, but none of the name that was given. Correct the name, or leave the option out to run all \
+         of them.";
     CLI_UNKNOWN_TYPE = "cli::unknown_type", "there is no such component type",
         "`davit types` was asked for a type that neither the libraries of this program nor the deployment has. `davit types` \
          without a name lists all of them; types of a deployment are listed with `davit types FILE`.";
@@ -534,6 +534,82 @@ codes! {
         "The running deployment understood the request and said no; the message is its own. An unknown event or \
          configuration is refused at once; a wait that ran out is told as such, and the request itself may still be \
          answered: `davit log` shows it.";
+    // ---- monitors --------------------------------------------------------------------------------------------------
+    MONITOR_UNNAMED = "monitor::unnamed", "a monitor has no name",
+        "Monitors are switched on and off, shown and recorded by their names. Write each as `name = monitor { … }` inside \
+         `Monitors { … }`.";
+    MONITOR_DUPLICATE = "monitor::duplicate", "two monitors have one name",
+        "Monitors are switched on and off by their names, so a deployment has one of each, in whichever of its files. \
+         Give one of them another name.";
+    MONITOR_UNKNOWN_WORD = "monitor::unknown_word", "a word that is no condition or no signal",
+        "Conditions and signals are made with a fixed list of words, the same in Lua and in YAML; the chapter on \
+         monitors has the table. A signal (a port, its age, a norm) has a number and becomes a condition when it is \
+         compared with another.";
+    MONITOR_ARGUMENTS = "monitor::arguments", "a word of the monitor language has other arguments",
+        "Each word takes a fixed number of arguments, or one list. The help shows one that is right; in YAML the same \
+         word is the key and the list its arguments.";
+    MONITOR_BAD_INTERVAL = "monitor::bad_interval", "an interval of time is none",
+        "The interval of `once`, `historically` and `since` has two ends in seconds, which say how long ago: the newer \
+         one first, neither in the future; the older one may be infinite (`math.huge`, in YAML `.inf`).";
+    MONITOR_BAD_HYSTERESIS = "monitor::bad_hysteresis", "a hysteresis that cannot be",
+        "A hysteresis says how far a signal must go back before an ordered comparison that was true ends; it is 0 or \
+         more. `equals` and `differs` have no side to which it could reach.";
+    MONITOR_AGE = "monitor::age", "an age is used in another way than compared with a time",
+        "The age of a sample grows all the time, between samples too. It is therefore compared with a number of seconds \
+         directly, which becomes true at an instant that is known beforehand; norms, differences and a hysteresis of \
+         ages have no such instant.";
+    MONITOR_TOO_DEEP = "monitor::too_deep", "conditions are nested too deeply",
+        "Conditions within conditions are read up to a fixed depth, beyond what can be understood, so that both \
+         languages can express each of them. `all` and `any` take as many conditions as are wanted, side by side.";
+    MONITOR_COMPARED = "monitor::compared", "a signal is compared with Lua's own operators",
+        "`age(\"A.x\") > 0.1` is calculated by Lua when the file is read, once, and cannot be recorded as a condition. The \
+         words `below`, `at_most`, `above`, `at_least`, `equals` and `differs` can.";
+    MONITOR_NOT_A_NUMBER = "monitor::not_a_number", "a signal is neither a number nor a bool",
+        "Conditions compare numbers; a bool counts as 0 or 1. What the port carries is something else: name the field or \
+         the element that is meant (`Arm.state.qd[0]`, counted from 0).";
+    MONITOR_NO_SUCH_PART = "monitor::no_such_part", "what a port carries has no such field or element",
+        "The value of the port is looked into by fields (`.name`) and elements (`[0]`, counted from 0), as its type says; \
+         `davit types` shows it. Correct the name or the index.";
+    MONITOR_EVENT_TAKEN = "monitor::event_taken", "a monitor raises what only Davit itself may raise",
+        "Answers of the configurator, such as `engage.ok`, and the events of the statechart itself, such as \
+         `e_done@root.a`, tell the coordinator what has happened. If a monitor raised one, the coordinator would be told \
+         what has not. Give the monitor's event another name.";
+    MONITOR_UNHEARD = "monitor::unheard", "nobody listens to an event of a monitor",
+        "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
+         watches in vain. The name may be misspelt in one of the two places.";
+    // ---- recorded samples ------------------------------------------------------------------------------------------
+    SAMPLES_UNREADABLE = "samples::unreadable", "a file of samples cannot be read",
+        "The file does not exist, may not be read, or is no text in UTF-8. Samples are comma-separated values: a first \
+         line with `time` and the names of ports, then one line for each time.";
+    SAMPLES_EMPTY = "samples::empty", "a file of samples holds no samples",
+        "There is no first line with the names of the columns, or no line after it. A recording that was cut off, or one \
+         whose logger never ran, looks like this.";
+    SAMPLES_COLUMNS = "samples::columns", "the columns of a file of samples are not understood",
+        "The first line names the columns: `time`, in seconds, then the signals as the monitors spell them \
+         (`Dynamics.force[0]`), each once; every other line has as many cells. A cell that is left empty says that there \
+         was no new sample at that time.";
+    SAMPLES_MISSING = "samples::missing", "a monitor looks at something that was not recorded",
+        "Every port, run state and counter that the monitors look at needs a column in the file of samples: without it, \
+         their conditions would be false throughout, which says nothing. Record it, rename the column with \
+         `--column SIGNAL=COLUMN`, or look at some of the monitors only.";
+    SAMPLES_UNUSED = "samples::unused", "columns of a file of samples that no monitor looks at",
+        "A recording may hold more than the monitors need. If a monitor was meant to look at the column, its name is \
+         spelt in another way there.";
+    SAMPLES_BAD_NUMBER = "samples::bad_number", "a cell of a file of samples is no number",
+        "Cells hold numbers (`0.5`, `-1e-3`), `true` or `false`, the name of a run state in the column of one, or nothing. \
+         Units and other texts belong into the name of the column or nowhere.";
+    SAMPLES_NAN = "samples::nan", "samples that are not a number",
+        "The recording holds NaN. A comparison with it is false, whichever it is, and its robustness is minus infinity: \
+         nothing can be said of a value that is none. Look at what produced it.";
+    SAMPLES_BAD_TIME = "samples::bad_time", "a time of a file of samples is no time",
+        "The column `time` holds seconds, 0 or more, in every line. A line without a time cannot be put anywhere.";
+    SAMPLES_GAP = "samples::gap", "a gap between samples is too long to go through step by step",
+        "Between two lines, monitors that run at a rate or repeat their events are evaluated at each of their times, up to \
+         a bound. After it the rest of the gap is passed in one step: events that would be repeated in it are raised \
+         once. Look whether the times of the recording are in seconds.";
+    SAMPLES_BACKWARDS = "samples::backwards", "the time of a file of samples goes backwards",
+        "Each line is at the time of the one before it or later. Recordings of several runs one after the other, and \
+         clocks that were set meanwhile, look like this: cut the file there.";
 }
 
 /// The page of `code`, written with or without the leading `davit::`.

@@ -356,7 +356,8 @@ impl Condition {
         Self { kind, origin: Origin::NONE }
     }
 
-    fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
+    /// Calls `f` with it and all that it is made of, outer ones first.
+    pub fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
         use ConditionKind as K;
         f(self);
         match &self.kind {
@@ -381,7 +382,8 @@ impl Signal {
         Self { kind, origin: Origin::NONE }
     }
 
-    fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
+    /// Calls `f` with it and all that it is made of, outer ones first.
+    pub fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
         use SignalKind as K;
         f(self);
         match &self.kind {

@@ -5,6 +5,7 @@ use super::program::Program;
 use crate::model::monitor::{Counter, Monitor, PortSignal, Sampling};
 use crate::model::{ComponentName, EventName, Ident, MemberRef, RunState};
 use crate::time::Time;
+use std::fmt;
 use std::time::Duration;
 
 /// Something that monitors look at.
@@ -30,6 +31,19 @@ impl Input {
     /// The value of a port itself.
     pub fn whole(member: MemberRef) -> Self {
         Self::Port(PortSignal::whole(member))
+    }
+}
+
+/// As the columns of a file of samples are called: `Arm.force[0]`, `state(Arm)`, `faulted(Arm)`,
+/// `activity(control.overruns)`.
+impl fmt::Display for Input {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Port(port) => write!(f, "{port}"),
+            Self::State(component) => write!(f, "state({component})"),
+            Self::Faulted(component) => write!(f, "faulted({component})"),
+            Self::Activity { activity, counter } => write!(f, "activity({activity}.{})", counter.word()),
+        }
     }
 }
 
@@ -89,6 +103,8 @@ pub struct Troubles {
 #[derive(Debug, Clone)]
 pub struct Bank {
     inputs: Vec<Input>,
+    /// Of which the value matters, not only when it comes.
+    valued: Vec<bool>,
     samples: Vec<Sample>,
     watches: Vec<Watch>,
     last: Time,
@@ -128,17 +144,21 @@ impl Bank {
     /// The same, with another number of pieces that each operator over time may keep (two at least).
     pub fn with_memory(monitors: &[Monitor], pieces: usize) -> Self {
         let mut inputs: Vec<Input> = Vec::new();
+        let mut valued: Vec<bool> = Vec::new();
         let mut known: rustc_hash::FxHashMap<Input, usize> = rustc_hash::FxHashMap::default();
         let watches = monitors.iter().map(|monitor| {
             let (program, own) = compile(&monitor.when, pieces);
-            let stamped = own.iter().map(|input| matches!(input, Input::Port(_))).collect();
+            let stamped = own.iter().map(|input| matches!(input, (Input::Port(_), _))).collect();
             let slots: Box<[usize]> = own
                 .into_iter()
-                .map(|input| {
-                    *known.entry(input).or_insert_with_key(|input| {
+                .map(|(input, matters)| {
+                    let slot = *known.entry(input).or_insert_with_key(|input| {
                         inputs.push(input.clone());
+                        valued.push(false);
                         inputs.len() - 1
-                    })
+                    });
+                    valued[slot] |= matters;
+                    slot
                 })
                 .collect();
             Watch {
@@ -159,12 +179,20 @@ impl Bank {
         });
         let watches = watches.collect();
         let samples = vec![Sample::default(); inputs.len()];
-        Self { inputs, samples, watches, last: Time::default(), troubles: Troubles::default() }
+        Self { inputs, valued, samples, watches, last: Time::default(), troubles: Troubles::default() }
     }
 
     /// What the monitors look at, each once; [`Bank::step`] reads them by their index here.
     pub fn inputs(&self) -> &[Input] {
         &self.inputs
+    }
+
+    /// Whether the value of an input matters; else only when it is written does, and the value may be anything.
+    ///
+    /// # Panics
+    /// When there is no input of that index.
+    pub fn is_valued(&self, input: usize) -> bool {
+        self.valued[input]
     }
 
     /// Looks at every input and evaluates the monitors whose turn it is. `raise` is called with the index of a monitor and
@@ -189,7 +217,7 @@ impl Bank {
                 self.troubles.backwards += u64::from(fresh.differs(known));
                 fresh.at = at;
             }
-            if fresh.present && fresh.value.is_nan() && fresh.differs(known) {
+            if fresh.present && self.valued[i] && fresh.value.is_nan() && fresh.differs(known) {
                 self.troubles.not_numbers += 1;
             }
             *known = fresh;

@@ -13,12 +13,13 @@ pub fn positions(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(u64::MAX).saturating_mul(2)
 }
 
-/// Compiles a condition; `slots` are the inputs that its samples come from, in that order.
+/// Compiles a condition. The inputs that its samples come from are answered in the order of its slots, each with whether
+/// its value matters, or only when it comes.
 ///
 /// What must be merged because the memory of an operator is used up makes the whole condition less true, never more: an
 /// event is raised only when it would be with all the memory in the world. Under an odd number of negations an operator
 /// therefore errs to the other side.
-pub fn compile(condition: &Condition, pieces: usize) -> (Program, Vec<Input>) {
+pub fn compile(condition: &Condition, pieces: usize) -> (Program, Vec<(Input, bool)>) {
     let mut compiler = Compiler { numbers: Vec::new(), truths: Vec::new(), slots: Vec::new(), pieces };
     compiler.condition(condition, false);
     (Program::new(compiler.numbers, compiler.truths), compiler.slots)
@@ -30,16 +31,23 @@ pub const PIECES: usize = MONITOR_PIECES;
 struct Compiler {
     numbers: Vec<Number>,
     truths: Vec<Truth>,
-    slots: Vec<Input>,
+    slots: Vec<(Input, bool)>,
     pieces: usize,
 }
 
 impl Compiler {
     fn slot(&mut self, input: Input) -> usize {
-        self.slots.iter().position(|known| *known == input).unwrap_or_else(|| {
-            self.slots.push(input);
+        self.slots.iter().position(|(known, _)| *known == input).unwrap_or_else(|| {
+            self.slots.push((input, false));
             self.slots.len() - 1
         })
+    }
+
+    /// The slot of an input whose value is looked at.
+    fn valued(&mut self, input: Input) -> usize {
+        let slot = self.slot(input);
+        self.slots[slot].1 = true;
+        slot
     }
 
     fn number(&mut self, number: Number) -> usize {
@@ -58,7 +66,7 @@ impl Compiler {
 
     fn signal(&mut self, signal: &Signal) -> usize {
         let number = match &signal.kind {
-            SignalKind::Port(port) => Number::Input(self.slot(Input::Port(port.clone()))),
+            SignalKind::Port(port) => Number::Input(self.valued(Input::Port(port.clone()))),
             // Compared directly only; `lang` sees to it. Elsewhere an age has no value.
             SignalKind::Age(_) => Number::Constant(f64::NAN),
             SignalKind::Rate { port, over } => {
@@ -66,7 +74,7 @@ impl Compiler {
                 Number::Rate(slot, Rate::new(positions(*over), self.pieces))
             }
             SignalKind::Activity { activity, counter } => {
-                Number::Input(self.slot(Input::Activity { activity: *activity, counter: *counter }))
+                Number::Input(self.valued(Input::Activity { activity: *activity, counter: *counter }))
             }
             SignalKind::Norm(list) => Number::Norm(self.signals(list)),
             SignalKind::Difference(a, b) => Number::Difference(self.signal(a), self.signal(b)),
@@ -100,9 +108,9 @@ impl Compiler {
                     Truth::Compare { left, op: *op, right, hysteresis, holds: false }
                 }
             },
-            K::IsTrue(port) => Truth::IsTrue(self.slot(Input::Port(port.clone()))),
-            K::InState { component, state } => Truth::Is(self.slot(Input::State(*component)), state_value(*state)),
-            K::Faulted(component) => Truth::IsTrue(self.slot(Input::Faulted(*component))),
+            K::IsTrue(port) => Truth::IsTrue(self.valued(Input::Port(port.clone()))),
+            K::InState { component, state } => Truth::Is(self.valued(Input::State(*component)), state_value(*state)),
+            K::Faulted(component) => Truth::IsTrue(self.valued(Input::Faulted(*component))),
             K::Silent { port, time } => {
                 let slot = self.slot(Input::whole(*port));
                 let bound = i64::try_from(positions(*time)).unwrap_or(i64::MAX);

@@ -13,6 +13,7 @@
 //!
 //! * [`Bank`]: all monitors of a deployment. * `program`: one condition, compiled. * `window`: `once` and `since`.
 //! * `pieces`: sliding extremes. * `grade`: truth and robustness, together.
+//! * [`table`]: recorded samples as text. [`replay`]: monitors over them.
 
 mod bank;
 mod compile;
@@ -20,6 +21,8 @@ mod grade;
 mod nodes;
 mod pieces;
 mod program;
+pub mod replay;
+pub mod table;
 mod window;
 
 pub use bank::{Bank, Input, Sample, Troubles, state_value};

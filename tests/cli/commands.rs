@@ -39,7 +39,7 @@ fn usage_and_unreadable_input_are_status_2() {
 #[test]
 fn the_help_of_every_command_says_what_it_does() {
     let help = at_home(&["--help"]).out;
-    for command in ["check", "plan", "graph", "types", "convert", "sim", "explain", "completions"] {
+    for command in ["check", "plan", "graph", "types", "convert", "sim", "monitor", "explain", "completions"] {
         assert!(help.contains(command), "{help}");
         let own = at_home(&[command, "--help"]).out;
         assert!(own.contains("Usage: davit"), "{own}");

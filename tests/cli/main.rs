@@ -3,3 +3,4 @@
 mod breakages;
 mod commands;
 mod demo;
+mod monitor;

@@ -3,5 +3,6 @@
 mod helpers;
 mod hostile;
 mod listings;
+mod monitors;
 mod round_trip;
 mod typos;

@@ -3,6 +3,7 @@
 use crate::helpers::shown;
 use davit::diagnostics::Language;
 use davit::lang::{self, LoadOptions, Sources, print};
+use davit::model::monitor::*;
 use davit::model::statechart::{Action, Connector, Node, Since, State, Statechart, Transition as Edge, Trigger};
 use davit::model::*;
 use proptest::collection::{btree_map, vec};
@@ -201,6 +202,104 @@ fn chart() -> impl Strategy<Value = Statechart> {
     })
 }
 
+fn time_or_zero() -> impl Strategy<Value = Duration> {
+    prop_oneof![1 => Just(Duration::ZERO), 3 => time()]
+}
+
+fn port_signal() -> impl Strategy<Value = PortSignal> {
+    let part = prop_oneof![ident().prop_map(Part::Field), (0_usize..1000).prop_map(Part::Index)];
+    (member(), vec(part, 0..3)).prop_map(|(member, path)| PortSignal { member, path })
+}
+
+fn signal() -> impl Strategy<Value = Signal> {
+    let counter = prop::sample::select(Counter::NAMES.to_vec()).prop_map(|(_, counter)| counter);
+    let leaf = prop_oneof![
+        3 => port_signal().prop_map(SignalKind::Port),
+        2 => finite().prop_map(SignalKind::Constant),
+        1 => (member(), time()).prop_map(|(port, over)| SignalKind::Rate { port, over }),
+        1 => (ident(), counter).prop_map(|(activity, counter)| SignalKind::Activity { activity, counter }),
+    ];
+    leaf.prop_map(Signal::new).prop_recursive(3, 8, 3, |inner| {
+        let list = || vec(inner.clone(), 1..4);
+        prop_oneof![
+            list().prop_map(SignalKind::Norm),
+            list().prop_map(SignalKind::Min),
+            list().prop_map(SignalKind::Max),
+            (inner.clone(), inner.clone()).prop_map(|(a, b)| SignalKind::Difference(a.into(), b.into())),
+            inner.clone().prop_map(|s| SignalKind::Abs(s.into())),
+        ]
+        .prop_map(Signal::new)
+    })
+}
+
+fn condition() -> impl Strategy<Value = Condition> {
+    use ConditionKind as K;
+    let op = || prop::sample::select(Comparison::ALL.to_vec());
+    let state =
+        prop::sample::select(vec![RunState::Unconfigured, RunState::Stopped, RunState::Running, RunState::Faulted]);
+    let leaf = prop_oneof![
+        4 => (signal(), op(), signal(), option::of(0.0..1e9_f64)).prop_map(|(left, op, right, h)| K::Compare {
+            left,
+            op,
+            right,
+            hysteresis: h.filter(|_| op.is_ordered()),
+        }),
+        1 => (member(), op(), finite()).prop_map(|(port, op, v)| K::Compare {
+            left: Signal::new(SignalKind::Age(port)),
+            op,
+            right: Signal::new(SignalKind::Constant(v)),
+            hysteresis: None,
+        }),
+        1 => port_signal().prop_map(K::IsTrue),
+        1 => (component(), state).prop_map(|(component, state)| K::InState { component, state }),
+        1 => component().prop_map(K::Faulted),
+        1 => (member(), time()).prop_map(|(port, time)| K::Silent { port, time }),
+    ];
+    leaf.prop_map(Condition::new).prop_recursive(4, 12, 3, |inner| {
+        let one = || inner.clone().prop_map(Box::new);
+        let interval = || {
+            (time_or_zero(), option::of(time_or_zero()))
+                .prop_map(|(a, b)| Interval { from: b.map_or(a, |b| a.min(b)), to: b.map(|b| a.max(b)) })
+        };
+        prop_oneof![
+            vec(inner.clone(), 1..4).prop_map(K::All),
+            vec(inner.clone(), 1..4).prop_map(K::Any),
+            one().prop_map(K::No),
+            (one(), one()).prop_map(|(a, b)| K::Implies(a, b)),
+            one().prop_map(K::Rise),
+            one().prop_map(K::Fall),
+            (one(), interval()).prop_map(|(condition, interval)| K::Once { condition, interval }),
+            (one(), interval()).prop_map(|(condition, interval)| K::Historically { condition, interval }),
+            (one(), one(), interval()).prop_map(|(hold, from, interval)| K::Since { hold, from, interval }),
+            (one(), time()).prop_map(|(condition, time)| K::ForAtLeast { condition, time }),
+            (one(), time()).prop_map(|(condition, time)| K::WithinLast { condition, time }),
+        ]
+        .prop_map(Condition::new)
+    })
+}
+
+fn monitors() -> impl Strategy<Value = Vec<Monitor>> {
+    let sampling = option::of(time()).prop_map(|t| t.map_or(Sampling::OnSample, Sampling::Every));
+    let events = (event(), option::of(event()));
+    let one = (ident(), condition(), events, option::of(time()), sampling, any::<bool>(), option::of(any_text()))
+        .prop_map(|(name, when, (raise, cleared), repeat, sampling, enabled, description)| Monitor {
+            name,
+            when,
+            raise,
+            cleared,
+            repeat,
+            sampling,
+            enabled,
+            description,
+            origin: Origin::NONE,
+        });
+    vec(one, 0..4).prop_map(|mut monitors| {
+        let mut seen = BTreeSet::new();
+        monitors.retain(|m: &Monitor| seen.insert(m.name));
+        monitors
+    })
+}
+
 fn value_type() -> impl Strategy<Value = ValueType> {
     let leaf = prop::sample::select(vec![ValueType::Bool, ValueType::Int, ValueType::Float, ValueType::Str]);
     leaf.prop_recursive(2, 6, 3, |inner| {
@@ -281,11 +380,13 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     let limits = (1_usize..100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
     let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, any::<bool>());
     let beside = vec((ident(), chart(), path(), vec(path(), 0..2), path()), 0..2);
-    (vec(ident(), 2..5), configurations(), (chart(), proptest::option::of(ident()), beside), parts).prop_map(
+    let charts = (chart(), proptest::option::of(ident()), beside);
+    (vec(ident(), 2..5), configurations(), charts, monitors(), parts).prop_map(
         |(
             names,
             configurations,
             (coordinator, first, beside),
+            monitors,
             (types, activities, emits, deploy, shutdown, limits, full),
         )| Deployment {
             name: names[0],
@@ -303,7 +404,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                     |(name, chart, up, failed, down)| Beside { name, chart, up, failed, down, origin: Origin::NONE };
                 named.map(made).collect()
             },
-            monitors: Vec::new(),
+            monitors,
             emits: emits.into_iter().map(|event| (event, Origin::NONE)).collect(),
             deploy,
             shutdown,
@@ -337,6 +438,16 @@ proptest! {
             let loaded = lang::load_coordinator(&Sources::memory([(file, text.as_str())]), Path::new(file), &LoadOptions::default());
             prop_assert!(loaded.findings.is_empty(), "{}\n{text}", shown(&loaded.findings, &loaded.sources));
             prop_assert_eq!(loaded.coordinator.as_ref(), Some(&chart), "{}", text);
+        }
+    }
+
+    #[test]
+    fn text_law_monitors(list in monitors()) {
+        for (language, file) in LANGUAGES {
+            let text = print::monitors(&list, language);
+            let loaded = lang::load_monitors(&Sources::memory([(file, text.as_str())]), Path::new(file), &LoadOptions::default());
+            prop_assert!(loaded.findings.is_empty(), "{}\n{text}", shown(&loaded.findings, &loaded.sources));
+            prop_assert_eq!(&loaded.monitors, &list, "{}", text);
         }
     }
 

@@ -76,7 +76,7 @@ fn deployment_keys_names_and_values() {
         ("step_timeout_s: 0.5", "step_timeout_s: 500000", "text::bad_time 20:38", "longer than a day"),
         ("step_timeout_s: 0.5", "step_timeout_ms: 0.5", "text::unknown_key 20:22", "`step_timeout_s`"),
         ("durability: relaxed", "durability: relaxd", "text::bad_value 21:13", "`relaxed`"),
-        ("durability: relaxed", "monitors: [m.lua]", "deploy::monitors_later 21:12", "m.lua"),
+        ("durability: relaxed", "monitors: [m.lua]", "text::no_file 21:12", "`c.lua`"),
         ("durability: relaxed", "durability: relaxed\nwith: { gain: 1 }", "text::unknown_parameter 22:9", "gain"),
     ];
     let mut answers = Answers::default();

@@ -22,6 +22,8 @@ pub struct Draft {
     pub configurations: Option<Vec<(String, Origin)>>,
     /// `coordinator` and `coordinators`, in written order: names (none: called like the deployment), paths, and where.
     pub coordinators: Vec<(Option<Ident>, String, Origin)>,
+    /// `monitors`: paths and where they are named.
+    pub monitors: Vec<(String, Origin)>,
     /// `with`: parameters of the Lua files.
     pub with: Vec<Entry>,
     /// `emits`
@@ -97,14 +99,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         .required(cx, "configurations", "configurations: [configurations.lua]")
         .map(|node| files(cx, node, "`configurations`", "configurations: [configurations.lua]"));
     let coordinators = beside::coordinators(cx, &mut fields);
-    if let Some(node) = fields.take("monitors") {
-        let named = files(cx, node, "`monitors`", "monitors: [monitors.lua]");
-        if let Some((path, origin)) = named.first() {
-            let message = format!("monitors are not read by this version: `{path}` is left out");
-            let help = "a component can watch instead and raise events through an event port";
-            cx.report(Finding::warning(codes::DEPLOY_MONITORS_LATER, message).at(*origin).help(help));
-        }
-    }
+    let monitors = fields.take("monitors").map(|node| files(cx, node, "`monitors`", "monitors: [monitors.lua]"));
     let with = match fields.take("with") {
         None => Vec::new(),
         Some(Node { kind: Kind::Map(entries), .. }) => entries,
@@ -129,6 +124,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         activities,
         configurations,
         coordinators,
+        monitors: monitors.unwrap_or_default(),
         with,
         emits,
         deploy,

@@ -2,8 +2,10 @@
 
 pub mod beside;
 pub mod chart;
+pub mod condition;
 pub mod configuration;
 pub mod deployment;
+pub mod monitor;
 pub mod types;
 
 use super::tree::{Cx, Kind, Node};

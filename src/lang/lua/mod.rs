@@ -4,6 +4,7 @@
 
 mod constructors;
 mod convert;
+mod monitors;
 mod recorder;
 mod sandbox;
 
@@ -23,6 +24,8 @@ pub struct Made {
     pub configurations: Option<Node>,
     /// The statechart it returned.
     pub chart: Option<Node>,
+    /// Its named monitors in written order, as a map.
+    pub monitors: Option<Node>,
 }
 
 /// Runs the text of `reading`'s file. `stem` names a configuration that stands alone without a name. None, with
@@ -53,6 +56,10 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str) -> O
         }
     };
     let made = ran.map(|returned| recorder.assemble(returned, stem));
+    // Putting conditions into their places is bounded as well.
+    if let Some(exhausted) = recorder.exhausted.take() {
+        recorder.report_exhausted(&exhausted);
+    }
     *cx = recorder.cx;
     *params = recorder.params;
     made
@@ -65,6 +72,7 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
     lua.set_memory_limit(limits::LUA_BYTES)?;
     let env = sandbox::environment(&lua, shared)?;
     constructors::install(&lua, &env, shared)?;
+    monitors::install(&lua, &env, shared)?;
     sandbox::start_budget(&lua, shared)?;
     // A first line `#!…` is blanked and not cut: lines keep their numbers.
     let text = if text.starts_with('#') {
@@ -97,7 +105,8 @@ impl Recorder {
                 let finding =
                     Finding::error(codes::LUA_BAD_RETURN, format!("the file returns {}", returned.describe()));
                 self.cx.report(finding.at(returned.origin).help(
-                    "a coordinator's file returns `state { … }`; a configuration's file calls `ConfiguratorConf { … }`",
+                    "a coordinator's file returns `state { … }`; a configuration's file calls `ConfiguratorConf { … }`, a \
+                     file of monitors `Monitors { … }`",
                 ));
                 None
             }
@@ -135,10 +144,11 @@ impl Recorder {
             entries.push(entry);
         }
         self.unnamed(stem, confs, &mut entries);
+        let monitors = self.monitors();
         self.unused();
         let some = confs > 0 || !entries.is_empty();
         let whole = self.reading.whole;
-        Made { configurations: some.then(|| Node::new(Kind::Map(entries), whole)), chart }
+        Made { configurations: some.then(|| Node::new(Kind::Map(entries), whole)), chart, monitors }
     }
 
     /// The paper's first listing is a `Configuration` alone in its file: it takes the file's name.
@@ -171,10 +181,13 @@ impl Recorder {
         }
         for index in 0..self.made.len() {
             let made = &self.made[index];
-            if made.uses == 0 && made.verb != "Configuration" && made.verb != "ConfiguratorConf" {
-                let message = format!("this `{}` stands in no configuration, so it is never made", made.verb);
-                let finding = Finding::error(codes::LUA_UNUSED, message).at(made.origin);
-                self.cx.report(finding.help("put it inside a `Configuration { … }`"));
+            if made.uses == 0 && !matches!(made.verb, "Configuration" | "ConfiguratorConf" | "Monitors") {
+                let (origin, verb) = (made.origin, made.verb);
+                let (message, help) = self.unused_monitor(verb).unwrap_or_else(|| {
+                    let message = format!("this `{verb}` stands in no configuration, so it is never made");
+                    (message, "put it inside a `Configuration { … }`")
+                });
+                self.cx.report(Finding::error(codes::LUA_UNUSED, message).at(origin).help(help));
             }
         }
     }

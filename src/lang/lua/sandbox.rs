@@ -278,7 +278,11 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
     ] {
         meta.raw_set(event, &quiet)?;
     }
-    let no = lua.create_function(|_, (_, _): (Value, MultiValue)| Ok(false))?;
+    let recorder = shared.clone();
+    let no = lua.create_function(move |lua, (a, b): (Value, Value)| {
+        super::monitors::compared(&recorder, lua, [&a, &b]);
+        Ok(false)
+    })?;
     meta.raw_set("__lt", &no)?;
     meta.raw_set("__le", &no)?;
     meta.raw_set("__len", lua.create_function(|_, _: MultiValue| Ok(0))?)?;
@@ -301,6 +305,7 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
         })?,
     )?;
     let undo = super::constructors::undo(lua, shared)?;
+    let methods = super::monitors::methods(lua, shared)?;
     let recorder = shared.clone();
     meta.raw_set(
         "__index",
@@ -312,12 +317,20 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
             if name == "undo" {
                 return Ok(Value::Function(undo.clone()));
             }
+            if let Some(method) = super::monitors::method(&methods, handle, &name)? {
+                return Ok(Value::Function(method));
+            }
             let line = line(lua);
             let mut recorder = recorder.borrow_mut();
             let origin = recorder.word_at(line, &name);
             let finding =
                 Finding::error(codes::LUA_UNDEFINED, format!("`{name}` is not defined for what a constructor made"));
-            recorder.cx.report(finding.at(origin).help("the only one is `operation_call(…):undo(…)`"));
+            let mut known: Vec<String> =
+                methods.pairs::<String, Value>().filter_map(|pair| Some(pair.ok()?.0)).collect();
+            known.push("undo".to_owned());
+            known.sort();
+            let help = did_you_mean(&name, "methods", known.iter().map(String::as_str));
+            recorder.cx.report(finding.at(origin).help(help));
             recorder.undefined.insert(name);
             Ok(convert::poison())
         })?,

@@ -12,7 +12,7 @@ const KEYWORDS: &[&str] = &[
 ];
 
 /// A text in quotes.
-fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 2);
     out.push('"');
     for c in text.chars() {
@@ -35,7 +35,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// A key of a table.
-fn key(text: &str) -> String {
+pub fn key(text: &str) -> String {
     let mut bytes = text.bytes();
     let plain = bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')
         && bytes.all(|b| b.is_ascii_alphanumeric() || b == b'_')

@@ -2,9 +2,11 @@
 //! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
 
 mod lua;
+mod monitor;
 mod yaml;
 
 pub use lua::{configurations_lua, coordinator_lua};
+pub use monitor::monitors;
 pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
 
 use crate::diagnostics::Language;
@@ -27,8 +29,8 @@ pub fn coordinator(chart: &Statechart, language: Language) -> String {
     }
 }
 
-/// A deployment as files, by name: itself first (always YAML), then its configurations and its coordinators in the
-/// language given.
+/// A deployment as files, by name: itself first (always YAML), then its configurations, its coordinators and its
+/// monitors, where it has any, in the language given.
 pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, String)> {
     let ending = match language {
         Language::Lua => "lua",
@@ -43,11 +45,14 @@ pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, S
         .chain(deployment.beside.iter().map(|b| &b.chart))
         .map(|chart| coordinator(chart, language))
         .collect();
+    let m = (!deployment.monitors.is_empty()).then(|| format!("monitors.{ending}"));
+    let main = deployment_yaml(deployment, &[&c], &coordinators, m.as_deref());
     let mut files = vec![
-        (format!("{}.deployment.yaml", deployment.name), deployment_yaml(deployment, &[&c], &coordinators)),
+        (format!("{}.deployment.yaml", deployment.name), main),
         (c, configurations(&deployment.configurations, language)),
     ];
     files.extend(coordinators.into_iter().zip(texts));
+    files.extend(m.map(|m| (m, monitors(&deployment.monitors, language))));
     files
 }
 

@@ -9,7 +9,7 @@ use crate::model::{
 use std::fmt::{Display, Write as _};
 
 /// A text: plain where every reader takes it for a text, else in quotes.
-fn text(t: &str) -> String {
+pub fn text(t: &str) -> String {
     let mut bytes = t.bytes();
     let plain = bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')
         && bytes.all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'/'));
@@ -18,7 +18,7 @@ fn text(t: &str) -> String {
     if plain && !WORDS.contains(&t.to_ascii_lowercase().as_str()) { t.to_owned() } else { quoted(t) }
 }
 
-fn quoted(t: &str) -> String {
+pub fn quoted(t: &str) -> String {
     let mut out = String::with_capacity(t.len() + 2);
     out.push('"');
     for c in t.chars() {
@@ -312,8 +312,13 @@ fn component_type(out: &mut String, ty: &ComponentType) {
     out.push_str(&body);
 }
 
-/// The deployment file, with the names of the files of its configurations and its coordinators.
-pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinators: &[String]) -> String {
+/// The deployment file, with the names of the files of its configurations, its coordinators and its monitors.
+pub fn deployment_yaml(
+    d: &Deployment,
+    configurations: &[&str],
+    coordinators: &[String],
+    monitors: Option<&str>,
+) -> String {
     let mut out = format!("davit: 1\nname: {}\nplatform: {}\n", t(&d.name), t(&d.platform));
     _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
     if !d.types.is_empty() {
@@ -348,6 +353,9 @@ pub fn deployment_yaml(d: &Deployment, configurations: &[&str], coordinators: &[
         .collect();
     if !named.is_empty() {
         _ = writeln!(out, "coordinators: {{ {} }}", named.join(", "));
+    }
+    if let Some(monitors) = monitors {
+        _ = writeln!(out, "monitors: {}", list([text(monitors)]));
     }
     if !d.emits.is_empty() {
         _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));

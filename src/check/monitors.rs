@@ -1,0 +1,200 @@
+//! Monitors against the deployment: do the things exist that they look at, are they numbers, does somebody listen.
+
+use super::coordinator::{is_internal, looks_like_answer};
+use super::universe::Universe;
+use crate::model::codes::{
+    MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
+    UNKNOWN_COMPONENT, UNKNOWN_PORT,
+};
+use crate::model::finding::did_you_mean;
+use crate::model::monitor::{ConditionKind, Part, PortSignal, SignalKind};
+use crate::model::{
+    ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Monitor, Origin, PortType, ValueType,
+};
+use crate::statechart::Chart;
+use std::collections::BTreeSet;
+
+/// What is wrong with the conditions.
+pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
+    let mut check = Check { deployment, universe, path: String::new(), findings: Vec::new() };
+    for monitor in &deployment.monitors {
+        check.path = format!("monitors.{}", monitor.name);
+        check.monitor(monitor);
+    }
+    check.findings
+}
+
+/// What is wrong with the events.
+pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
+    let mut findings = Vec::new();
+    let heard: BTreeSet<&str> = charts.iter().flat_map(|chart| chart.events()).map(|e| e.as_str()).collect();
+    let confirmed = |event| deployment.configurations.iter().any(|c| c.confirm.is_some_and(|c| c.event == event));
+    for monitor in &deployment.monitors {
+        for event in monitor.events() {
+            let path = format!("monitors.{}", monitor.name);
+            let text = event.as_str();
+            if is_internal(text) || looks_like_answer(deployment, text) {
+                let message = format!("the monitor `{}` raises `{event}`, which tells of something else", monitor.name);
+                findings.push(Finding::error(MONITOR_EVENT_TAKEN, message).at(monitor.origin).path(path).help(
+                    "answers of the configurator and the events of the statechart itself cannot be made by a monitor: \
+                     give its event another name, such as `e_aligned`",
+                ));
+            } else if !heard.contains(text) && !confirmed(event) {
+                let message = format!("nobody listens to `{event}` of the monitor `{}`", monitor.name);
+                findings.push(
+                    Finding::warning(MONITOR_UNHEARD, message).at(monitor.origin).path(path).help(did_you_mean(
+                        text,
+                        "events",
+                        heard.iter().copied().filter(|e| !is_internal(e)),
+                    )),
+                );
+            }
+        }
+    }
+    findings
+}
+
+struct Check<'a> {
+    deployment: &'a Deployment,
+    universe: &'a Universe,
+    path: String,
+    findings: Findings,
+}
+
+impl Check<'_> {
+    fn add(&mut self, finding: Finding) {
+        self.findings.push(finding.path(self.path.clone()));
+    }
+
+    fn monitor(&mut self, monitor: &Monitor) {
+        monitor.for_each_condition(&mut |condition| match &condition.kind {
+            ConditionKind::IsTrue(port) => self.number(port, condition.origin),
+            ConditionKind::InState { component, .. } | ConditionKind::Faulted(component) => {
+                self.component(*component, condition.origin);
+            }
+            ConditionKind::Silent { port, .. } => _ = self.port(*port, condition.origin),
+            _ => {}
+        });
+        monitor.for_each_signal(&mut |signal| match &signal.kind {
+            SignalKind::Port(port) => self.number(port, signal.origin),
+            SignalKind::Age(port) | SignalKind::Rate { port, .. } => _ = self.port(*port, signal.origin),
+            SignalKind::Activity { activity, .. } => self.activity(*activity, signal.origin),
+            _ => {}
+        });
+    }
+
+    fn component(&mut self, component: ComponentName, at: Origin) -> bool {
+        let known = !self.universe.of(component).is_empty();
+        if !known {
+            let help = did_you_mean(component.as_str(), "components", self.universe.names());
+            self.add(
+                Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
+                    .at(at)
+                    .labelled("no such component")
+                    .help(help),
+            );
+        }
+        known
+    }
+
+    fn activity(&mut self, activity: Ident, at: Origin) {
+        if !self.deployment.activities.contains_key(&activity) {
+            let known = self.deployment.activities.keys().map(Ident::as_str);
+            self.add(
+                Finding::error(UNKNOWN_ACTIVITY, format!("the deployment has no activity `{activity}`"))
+                    .at(at)
+                    .help(did_you_mean(activity.as_str(), "activities", known)),
+            );
+        }
+    }
+
+    /// The types of the port, in each of the ways in which its component is created; a finding when there is none.
+    fn port(&mut self, port: MemberRef, at: Origin) -> Vec<PortType> {
+        if !self.component(port.component, at) {
+            return Vec::new();
+        }
+        let creations = self.universe.of(port.component);
+        let types: Vec<_> = creations.iter().filter_map(|c| c.description.as_ref()).collect();
+        // That a type is unknown is said where it is created.
+        if types.len() < creations.len() {
+            return Vec::new();
+        }
+        let found: Vec<PortType> = types.iter().filter_map(|ty| ty.port(port.member).cloned()).collect();
+        if found.is_empty() {
+            let names: BTreeSet<&str> = types.iter().flat_map(|ty| ty.ports.keys()).map(Ident::as_str).collect();
+            self.add(
+                Finding::error(UNKNOWN_PORT, format!("{} has no port `{}`", port.component, port.member))
+                    .at(at)
+                    .labelled("no such port")
+                    .help(did_you_mean(port.member.as_str(), "ports", names)),
+            );
+        }
+        found
+    }
+
+    fn number(&mut self, signal: &PortSignal, at: Origin) {
+        let ports = self.port(signal.member, at);
+        let wrong: Vec<Finding> = ports.iter().filter_map(|port| part(signal, &port.ty)).collect();
+        // One of the types it may be created as is enough: which one it is, is known when it runs.
+        if wrong.len() == ports.len()
+            && let Some(finding) = wrong.into_iter().next()
+        {
+            let declared = ports.first().map_or(Origin::NONE, |port| port.origin);
+            let finding = finding.at(at);
+            self.add(if declared.is_some() { finding.also(declared, "the port") } else { finding });
+        }
+    }
+}
+
+/// What is wrong with the way to a number in a value of that type.
+fn part(signal: &PortSignal, whole: &ValueType) -> Option<Finding> {
+    let mut ty = whole;
+    for step in &signal.path {
+        ty = match (step, ty) {
+            (Part::Field(field), ValueType::Record(fields)) => match fields.iter().find(|(name, _)| name == field) {
+                Some((_, ty)) => ty,
+                None => {
+                    let message = format!("`{}` carries {ty}, which has no field `{field}`", signal.member);
+                    let known = fields.iter().map(|(name, _)| name.as_str());
+                    let help = did_you_mean(field.as_str(), "fields", known);
+                    return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help));
+                }
+            },
+            (Part::Index(index), ValueType::Array(element, length)) => {
+                if length.is_some_and(|length| *index >= length) {
+                    let message = format!("`{}` carries {ty}, which has no element {index}", signal.member);
+                    let help = "elements are counted from 0";
+                    return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help));
+                }
+                element
+            }
+            (Part::Field(field), _) => {
+                let message = format!("`.{field}` of {ty}, which has no fields");
+                return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
+            }
+            (Part::Index(index), _) => {
+                let message = format!("`[{index}]` of {ty}, which has no elements");
+                return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
+            }
+        };
+    }
+    if matches!(ty, ValueType::Bool | ValueType::Int | ValueType::Float) {
+        return None;
+    }
+    let message = format!("`{signal}` is {ty}, which is neither a number nor a bool");
+    Some(Finding::error(MONITOR_NOT_A_NUMBER, message).help(help_for(signal, ty)))
+}
+
+fn help_for(signal: &PortSignal, ty: &ValueType) -> String {
+    match ty {
+        ValueType::Array(..) => format!("name an element, counted from 0: `{signal}[0]`"),
+        ValueType::Record(fields) => {
+            let name = fields.first().map_or("x", |(name, _)| name.as_str());
+            format!("name a field, such as `{signal}.{name}`")
+        }
+        ValueType::Str | ValueType::Event => {
+            "only when it comes can be watched: `age`, `sample_rate` and `silent` take any port".to_owned()
+        }
+        _ => format!("it carries {ty}: write `{}` alone", signal.member),
+    }
+}

@@ -1,0 +1,384 @@
+//! Conditions and signals of monitors: what both spellings mean.
+
+use super::{Unit, choice, name, number, time};
+use crate::lang::tree::{Cx, Fields, Kind, Node};
+use crate::lang::words::{CONDITIONS, SIGNALS, Word};
+use crate::limits::MONITOR_DEPTH;
+use crate::model::finding::did_you_mean;
+use crate::model::monitor::{Comparison, Condition, ConditionKind, Counter, Interval, PortSignal, Signal, SignalKind};
+use crate::model::{ComponentName, Finding, Ident, MemberRef, Origin, RunState, codes};
+use std::time::Duration;
+
+/// Over which time a rate is taken where nothing else is said.
+pub const RATE_TIME: Duration = Duration::from_secs(1);
+
+/// A word with its arguments.
+struct Term {
+    word: &'static Word,
+    args: Vec<Node>,
+    origin: Origin,
+}
+
+impl Term {
+    /// Its only, first or second argument; their number has been looked at.
+    fn arg(&mut self) -> Node {
+        if self.args.is_empty() { Node::new(Kind::Poison, self.origin) } else { self.args.remove(0) }
+    }
+}
+
+/// What is wanted where a word stands.
+#[derive(Clone, Copy)]
+struct Wanted {
+    what: &'static str,
+    words: &'static [Word],
+    others: &'static [Word],
+    example: &'static str,
+}
+
+const A_CONDITION: Wanted =
+    Wanted { what: "a condition", words: CONDITIONS, others: SIGNALS, example: "above(\"A.x\", 2.0)" };
+const A_SIGNAL: Wanted =
+    Wanted { what: "a signal", words: SIGNALS, others: CONDITIONS, example: "above(\"A.x\", 2.0)" };
+
+/// Reads a word and its arguments: `word(a, b)` of Lua, `{ word: [a, b] }` of YAML.
+fn term(cx: &mut Cx, node: Node, wanted: Wanted) -> Option<Term> {
+    let origin = node.origin;
+    let (key, key_origin, args) =
+        match node.kind {
+            Kind::Made(verb, _, args) => (verb.to_owned(), origin, args),
+            Kind::Map(mut entries) if entries.len() == 1 => {
+                let entry = entries.pop()?;
+                let args = match entry.value.kind {
+                    Kind::List(list) => list,
+                    _ => vec![entry.value],
+                };
+                (entry.key.into_owned(), entry.origin, args)
+            }
+            Kind::Map(entries) if entries.len() > 1 => {
+                let finding =
+                    Finding::error(codes::MONITOR_ARGUMENTS, format!("{} is one word, here are several", wanted.what));
+                cx.report(finding.at(entries[1].origin).labelled("a second one").help(
+                    "several conditions stand in a list: `all: [ … ]` or `any: [ … ]`, each with its own braces",
+                ));
+                return None;
+            }
+            _ => {
+                cx.wrong(&node, wanted.what, &format!("{}, such as `{}`", wanted.what, wanted.example), wanted.example);
+                return None;
+            }
+        };
+    let Some(word) = wanted.words.iter().find(|word| word.name == key) else {
+        let shown: String = key.chars().take(60).collect();
+        let (message, help) = match wanted.others.iter().find(|word| word.name == key) {
+            Some(_) if wanted.what == A_CONDITION.what => (
+                format!("`{key}` is a signal, not a condition"),
+                format!("compare it with something: `above({key}(…), 2.0)`"),
+            ),
+            Some(_) => (
+                format!("`{key}` is a condition, not a signal"),
+                "compared are ports, numbers, and signals made of them".to_owned(),
+            ),
+            None => (
+                format!("there is no {} `{shown}`", wanted.what.trim_start_matches("a ")),
+                did_you_mean(&key, "words", wanted.words.iter().map(|word| word.name)),
+            ),
+        };
+        cx.report(Finding::error(codes::MONITOR_UNKNOWN_WORD, message).at(key_origin).help(help));
+        return None;
+    };
+    if args.len() < word.least || args.len() > word.most {
+        let most = if word.most > 20 { "or more".to_owned() } else { format!("to {}", word.most) };
+        let count = if word.least == word.most { word.least.to_string() } else { format!("{} {most}", word.least) };
+        let message = format!("`{}` takes {count} arguments, this are {}", word.name, args.len());
+        cx.report(
+            Finding::error(codes::MONITOR_ARGUMENTS, message)
+                .at(key_origin)
+                .help(format!("write it like `{}`; in YAML `{{ {}: [ … ] }}`", word.usage, word.name)),
+        );
+        return None;
+    }
+    Some(Term { word, args, origin: key_origin })
+}
+
+fn too_deep(cx: &mut Cx, origin: Origin) {
+    let message = format!("conditions and signals within each other, more than {MONITOR_DEPTH} deep");
+    cx.report(
+        Finding::error(codes::MONITOR_TOO_DEEP, message)
+            .at(origin)
+            .help("`all` and `any` take as many conditions as are wanted, side by side"),
+    );
+}
+
+/// A condition.
+pub fn condition(cx: &mut Cx, node: Node, depth: usize) -> Option<Condition> {
+    use ConditionKind as K;
+    if depth >= MONITOR_DEPTH {
+        too_deep(cx, node.origin);
+        return None;
+    }
+    let mut t = term(cx, node, A_CONDITION)?;
+    let origin = t.origin;
+    let inner = |cx: &mut Cx, t: &mut Term| {
+        let node = t.arg();
+        condition(cx, node, depth + 1).map(Box::new)
+    };
+    let kind = match t.word.name {
+        "is_true" => K::IsTrue(port_signal(cx, &t.arg())?),
+        "in_state" => {
+            let component = name::<ComponentName>(cx, &t.arg(), "a component", "in_state(\"Arm\", \"running\")");
+            let state = run_state(cx, &t.arg());
+            K::InState { component: component?, state: state? }
+        }
+        "faulted" => K::Faulted(name(cx, &t.arg(), "a component", "faulted(\"Arm\")")?),
+        "silent" => {
+            let port = member(cx, &t.arg());
+            let time = within(cx, &t.arg(), "the time of `silent`", t.word.usage);
+            K::Silent { port: port?, time: time? }
+        }
+        "all" => K::All(conditions(cx, t.args, depth)?),
+        "any" => K::Any(conditions(cx, t.args, depth)?),
+        "no" => K::No(inner(cx, &mut t)?),
+        "rise" => K::Rise(inner(cx, &mut t)?),
+        "fall" => K::Fall(inner(cx, &mut t)?),
+        "implies" => {
+            let (first, second) = (inner(cx, &mut t), inner(cx, &mut t));
+            K::Implies(first?, second?)
+        }
+        "once" | "historically" => {
+            let condition = inner(cx, &mut t);
+            let interval = interval(cx, t.arg(), t.word)?;
+            let condition = condition?;
+            if t.word.name == "once" {
+                K::Once { condition, interval }
+            } else {
+                K::Historically { condition, interval }
+            }
+        }
+        "since" => {
+            let (hold, from) = (inner(cx, &mut t), inner(cx, &mut t));
+            let interval = interval(cx, t.arg(), t.word);
+            K::Since { hold: hold?, from: from?, interval: interval? }
+        }
+        "for_at_least" | "within_last" => {
+            let condition = inner(cx, &mut t);
+            let what = format!("the time of `{}`", t.word.name);
+            let time = within(cx, &t.arg(), &what, t.word.usage)?;
+            let condition = condition?;
+            if t.word.name == "for_at_least" {
+                K::ForAtLeast { condition, time }
+            } else {
+                K::WithinLast { condition, time }
+            }
+        }
+        compared => {
+            let op = Comparison::ALL.into_iter().find(|op| op.word() == compared)?;
+            comparison(cx, t, op, depth)?
+        }
+    };
+    Some(Condition { kind, origin })
+}
+
+fn conditions(cx: &mut Cx, args: Vec<Node>, depth: usize) -> Option<Vec<Condition>> {
+    let count = args.len();
+    let list: Vec<_> = args.into_iter().filter_map(|node| condition(cx, node, depth + 1)).collect();
+    (list.len() == count).then_some(list)
+}
+
+fn comparison(cx: &mut Cx, mut t: Term, op: Comparison, depth: usize) -> Option<ConditionKind> {
+    let (left, right) = (t.arg(), t.arg());
+    let hysteresis = match t.args.pop() {
+        None => Some(None),
+        Some(node) => hysteresis(cx, node, op).map(Some),
+    };
+    let (left, right) = (signal(cx, left, depth + 1), signal(cx, right, depth + 1));
+    let (left, right, hysteresis) = (left?, right?, hysteresis?);
+    let mut age = None;
+    left.for_each(&mut |s| age = age.or(matches!(s.kind, SignalKind::Age(_)).then_some(s.origin)));
+    right.for_each(&mut |s| age = age.or(matches!(s.kind, SignalKind::Age(_)).then_some(s.origin)));
+    let direct = matches!((&left.kind, &right.kind), (SignalKind::Age(_), SignalKind::Constant(_)));
+    if let Some(origin) = age
+        && (!direct || hysteresis.is_some())
+    {
+        let message = "an age is compared with a number of seconds, by itself";
+        cx.report(Finding::error(codes::MONITOR_AGE, message).at(origin).help(
+            "write it like `above(age(\"A.x\"), 0.1)`; several ages are compared each, in `all { … }` or `any { … }`",
+        ));
+        return None;
+    }
+    Some(ConditionKind::Compare { left, op, right, hysteresis })
+}
+
+fn hysteresis(cx: &mut Cx, node: Node, op: Comparison) -> Option<f64> {
+    const EXAMPLE: &str = "above(\"A.x\", 8.0, { hysteresis = 0.5 })";
+    let mut fields = Fields::of(cx, node, "the options of a comparison", EXAMPLE)?;
+    let node = fields.required(cx, "hysteresis", EXAMPLE);
+    fields.finish(cx);
+    let node = node?;
+    let v = number(cx, &node, "`hysteresis`", EXAMPLE)?;
+    let wrong = if v < 0.0 {
+        Some((
+            format!("a hysteresis is 0 or more, this is {v}"),
+            "how far back the signal must go before the condition ends",
+        ))
+    } else if op.is_ordered() {
+        None
+    } else {
+        Some((
+            format!("`{}` has no hysteresis", op.word()),
+            "only `below`, `at_most`, `above` and `at_least` have a side to which it could reach",
+        ))
+    };
+    if let Some((message, help)) = wrong {
+        let origin = cx.place(&node);
+        cx.report(Finding::error(codes::MONITOR_BAD_HYSTERESIS, message).at(origin).help(help));
+        return None;
+    }
+    // Not minus zero: it would print as something else than it is equal to.
+    Some(v + 0.0)
+}
+
+/// A signal.
+fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<Signal> {
+    use SignalKind as K;
+    if depth >= MONITOR_DEPTH {
+        too_deep(cx, node.origin);
+        return None;
+    }
+    let origin = cx.place(&node);
+    match node.kind {
+        Kind::Str(_) => return Some(Signal { kind: K::Port(port_signal(cx, &node)?), origin }),
+        Kind::Int(_) | Kind::Float(_) => {
+            let v = number(cx, &node, "a constant", "2.0")?;
+            return Some(Signal { kind: K::Constant(v), origin });
+        }
+        _ => {}
+    }
+    let mut t = term(cx, node, A_SIGNAL)?;
+    let origin = t.origin;
+    let list = |cx: &mut Cx, args: Vec<Node>| {
+        let count = args.len();
+        let list: Vec<_> = args.into_iter().filter_map(|node| signal(cx, node, depth + 1)).collect();
+        (list.len() == count).then_some(list)
+    };
+    let kind = match t.word.name {
+        "age" => K::Age(member(cx, &t.arg())?),
+        "sample_rate" => {
+            let port = member(cx, &t.arg());
+            let over = match t.args.pop() {
+                None => Some(RATE_TIME),
+                Some(node) => within(cx, &node, "the time of `sample_rate`", t.word.usage),
+            };
+            K::Rate { port: port?, over: over? }
+        }
+        "activity" => {
+            let activity = name::<Ident>(cx, &t.arg(), "an activity", t.word.usage);
+            let counter = choice(cx, &t.arg(), "the counter of an activity", &Counter::NAMES);
+            K::Activity { activity: activity?, counter: counter? }
+        }
+        "norm" => K::Norm(list(cx, t.args)?),
+        "min" => K::Min(list(cx, t.args)?),
+        "max" => K::Max(list(cx, t.args)?),
+        "difference" => {
+            let (a, b) = (t.arg(), t.arg());
+            let (a, b) = (signal(cx, a, depth + 1), signal(cx, b, depth + 1));
+            K::Difference(Box::new(a?), Box::new(b?))
+        }
+        _ => {
+            let of = t.arg();
+            K::Abs(Box::new(signal(cx, of, depth + 1)?))
+        }
+    };
+    Some(Signal { kind, origin })
+}
+
+fn port_signal(cx: &mut Cx, node: &Node) -> Option<PortSignal> {
+    name(cx, node, "a port", "Dynamics.force[0]")
+}
+
+fn member(cx: &mut Cx, node: &Node) -> Option<MemberRef> {
+    name(cx, node, "a port", "Dynamics.force")
+}
+
+fn run_state(cx: &mut Cx, node: &Node) -> Option<RunState> {
+    let Kind::Str(text) = &node.kind else {
+        cx.wrong(node, "a run state", "a text", "in_state(\"Arm\", \"running\")");
+        return None;
+    };
+    let state = RunState::from_name(text);
+    if state.is_none() {
+        let origin = cx.place(node);
+        // Our own names before the field's, which differ from them in a capital letter.
+        let ours = ["unconfigured", "stopped", "running", "faulted"];
+        let help = did_you_mean(text, "states", ours);
+        cx.report(Finding::error(codes::CONF_BAD_STATE, format!("`{text}` is not a run state")).at(origin).help(help));
+    }
+    state
+}
+
+/// A time that something must last.
+fn within(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<Duration> {
+    time(cx, node, what, Unit::Seconds, example)
+}
+
+/// A closed interval of time before now: `{ a, b }` in seconds, `b` may be infinite.
+fn interval(cx: &mut Cx, node: Node, word: &'static Word) -> Option<Interval> {
+    let origin = node.origin;
+    let what = format!("the interval of `{}`", word.name);
+    let Node { kind: Kind::List(list), .. } = node else {
+        cx.wrong(&node, &what, "two numbers of seconds", word.usage);
+        return None;
+    };
+    let Ok([from, to]) = <[Node; 2]>::try_from(list) else {
+        cx.report(
+            Finding::error(codes::MONITOR_BAD_INTERVAL, format!("{what} has two ends"))
+                .at(origin)
+                .help(format!("write it like `{}`: from so many seconds ago to so many", word.usage)),
+        );
+        return None;
+    };
+    let from = end(cx, &from, &what, word)?;
+    let to = end(cx, &to, &what, word)?;
+    let Some(from) = from else {
+        cx.report(
+            Finding::error(codes::MONITOR_BAD_INTERVAL, format!("{what} begins at a time that never was"))
+                .at(origin)
+                .help("the newer end comes first, and only the older one may be infinite"),
+        );
+        return None;
+    };
+    if to.is_some_and(|to| to < from) {
+        cx.report(
+            Finding::error(codes::MONITOR_BAD_INTERVAL, format!("{what} ends before it begins"))
+                .at(origin)
+                .help("the newer end comes first: `{ 0, 1.5 }` is from now to a second and a half ago"),
+        );
+        return None;
+    }
+    Some(Interval { from, to })
+}
+
+/// An end of an interval; none: infinitely long ago.
+fn end(cx: &mut Cx, node: &Node, what: &str, word: &'static Word) -> Option<Option<Duration>> {
+    let v = match node.kind {
+        #[allow(clippy::cast_precision_loss)]
+        Kind::Int(v) => v as f64,
+        Kind::Float(v) => v,
+        _ => f64::NAN,
+    };
+    if v == f64::INFINITY {
+        return Some(None);
+    }
+    if v == 0.0 {
+        return Some(Some(Duration::ZERO));
+    }
+    if v < 0.0 {
+        let origin = cx.place(node);
+        cx.report(
+            Finding::error(codes::MONITOR_BAD_INTERVAL, format!("{what} lies in the past, {v} s is in the future"))
+                .at(origin)
+                .help(format!("both ends say how long ago: write it like `{}`", word.usage)),
+        );
+        return None;
+    }
+    time(cx, node, &format!("an end of {what}"), Unit::Seconds, word.usage).map(Some)
+}
