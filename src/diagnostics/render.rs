@@ -210,7 +210,8 @@ fn to_miette(span: &Range<usize>) -> SourceSpan {
 /// The part of a place that stands on its first line: a call of twenty lines is shown by its beginning.
 fn first_line(sources: &SourceMap, location: &Location) -> Range<usize> {
     let file = sources.file(location.file);
-    let most = file.text.floor_char_boundary(location.span.start + LINE_MARGIN);
+    let most = (location.span.start + LINE_MARGIN).min(file.text.len());
+    let most = (0..=most).rev().find(|i| file.text.is_char_boundary(*i)).unwrap_or(0);
     location.span.start..location.span.end.min(file.line(location.line).end).min(most).max(location.span.start)
 }
 

@@ -371,7 +371,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         coordinator: joined.coordinator,
         first: joined.first,
         beside: joined.beside,
-        monitors: Vec::new(),
+        monitors,
         emits: draft.emits,
         deploy: joined.deploy,
         shutdown: joined.shutdown,
