@@ -4,6 +4,7 @@ use super::PLATFORMS;
 use crate::check::{self, Report};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions};
+use crate::libraries::monitors;
 use crate::model::codes::{DEPLOY_UNKNOWN_LIBRARY, DEPLOY_UNKNOWN_PLATFORM};
 use crate::model::finding::did_you_mean;
 use crate::model::{Catalogue, Deployment, Finding, Findings};
@@ -73,6 +74,11 @@ pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result
             );
             return Err(Refused { findings, sources: loaded.sources, unreadable: false });
         }
+    };
+    // The monitors are a component type of this deployment.
+    let libraries = match &deployment.monitors[..] {
+        [] => libraries,
+        monitors => libraries.with(monitors::library(monitors)),
     };
     let platform = deployment.platform.as_str();
     if !PLATFORMS.contains(&platform) {

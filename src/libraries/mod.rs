@@ -1,5 +1,6 @@
 //! Component libraries, written against the runtime as any user's library would be.
 
+pub mod monitors;
 pub mod standard;
 pub mod youbot;
 

@@ -7,6 +7,7 @@ use super::cell::{Cell, Closed};
 use super::component::{Call, Reply};
 use super::latest::Reader;
 use crate::limits;
+use crate::model::monitor::Counter;
 use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState, Value};
 use crate::time::{Clock, Receiver, Signal, Time};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
@@ -152,6 +153,18 @@ impl Activity {
             stuck: self.stuck(members),
             complaint: crate::time::lock(&self.complaint).clone(),
         }
+    }
+
+    /// A counter as a number: rounds, or seconds.
+    #[allow(clippy::cast_precision_loss)]
+    pub(crate) fn counter(&self, counter: Counter) -> f64 {
+        let (word, unit) = match counter {
+            Counter::Cycles => (&self.counters.cycles, 1.0),
+            Counter::Overruns => (&self.counters.overruns, 1.0),
+            Counter::Latency => (&self.counters.latency_last, 1e-9),
+            Counter::Duration => (&self.counters.duration_last, 1e-9),
+        };
+        word.load(Ordering::Relaxed) as f64 * unit
     }
 
     /// The thread.

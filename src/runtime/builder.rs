@@ -6,6 +6,7 @@
 use super::beat::Beat;
 use super::component::{Answer, Arguments, Component, Context, HookResult, Reply, Returned};
 use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
+use super::probe::{Probes, ProbesEnd, Wanted};
 use super::property::{Prop, PropEnd};
 use super::value::PortValue;
 use crate::model::{
@@ -91,6 +92,7 @@ pub(crate) struct Ends {
     pub(crate) ports: Vec<Option<PortEnd>>,
     pub(crate) properties: Vec<Option<Box<dyn PropEnd>>>,
     pub(crate) callers: Vec<(Ident, CallerFn)>,
+    pub(crate) probes: Option<ProbesEnd>,
 }
 
 fn ident(name: &str) -> Ident {
@@ -98,8 +100,8 @@ fn ident(name: &str) -> Ident {
 }
 
 impl<C: Component> Builder<C> {
-    /// The type as [`Component::new`] declares it.
-    pub(crate) fn describe_type(name: &str) -> (ComponentType, Table<C>) {
+    /// The type as its constructor declares it.
+    pub(crate) fn describe_type(name: &str, new: impl FnOnce(&mut Self) -> C) -> (ComponentType, Table<C>) {
         let description = Description {
             ty: ComponentType::new(name, ""),
             words: Words::default(),
@@ -109,7 +111,7 @@ impl<C: Component> Builder<C> {
             hooks: [None; 4],
         };
         let mut builder = Self { mode: Mode::Describe(Box::new(description)) };
-        drop(C::new(&mut builder));
+        drop(new(&mut builder));
         let Mode::Describe(mut d) = builder.mode else { unreachable!("the mode never changes") };
         let ports: Vec<Ident> = d.ty.ports.keys().copied().collect();
         let properties: Vec<Ident> = d.ty.properties.keys().copied().collect();
@@ -139,12 +141,13 @@ impl<C: Component> Builder<C> {
         table: &Arc<Table<C>>,
         beat: &Arc<Beat>,
         values: Vec<Value>,
+        new: impl FnOnce(&mut Self) -> C,
     ) -> Result<(C, Ends, Vec<Value>), String> {
         let mut ports = Vec::with_capacity(table.ports.len());
         ports.resize_with(table.ports.len(), || None);
         let mut properties = Vec::with_capacity(table.properties.len());
         properties.resize_with(table.properties.len(), || None);
-        let made = Ends { ports, properties, callers: Vec::new() };
+        let made = Ends { ports, properties, callers: Vec::new(), probes: None };
         if values.len() != table.properties.len() {
             return Err(format!("{} values for {} properties", values.len(), table.properties.len()));
         }
@@ -158,7 +161,7 @@ impl<C: Component> Builder<C> {
             error: None,
         };
         let mut builder = Self { mode: Mode::Make(making) };
-        let component = C::new(&mut builder);
+        let component = new(&mut builder);
         let Mode::Make(making) = builder.mode else { unreachable!("the mode never changes") };
         match making.error {
             Some(error) => Err(error),
@@ -406,6 +409,18 @@ impl<C: Component> Builder<C> {
             }
         }
         self
+    }
+
+    /// Probes of what is `wanted`, beside connections. They come and go with what they look at; a component has one set.
+    pub fn probes(&mut self, wanted: Arc<[Wanted]>) -> Probes {
+        match &mut self.mode {
+            Mode::Describe(_) => Probes::loose(),
+            Mode::Make(m) => {
+                let (probes, end) = Probes::new(wanted, &m.beat);
+                m.made.probes = Some(end);
+                probes
+            }
+        }
     }
 
     /// An event's name, to be raised later.

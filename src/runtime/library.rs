@@ -75,13 +75,22 @@ impl Kind {
     /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits. A library
     /// is written by a programmer and described at every start of the program.
     pub fn of<C: Component>(name: &str) -> Self {
-        let (ty, table) = Builder::<C>::describe_type(name);
+        Self::made_by(name, C::new)
+    }
+
+    /// The type that `new` declares and makes, under a name: for types that depend on more than their Rust type. It must
+    /// declare the same members each time.
+    ///
+    /// # Panics
+    /// As [`Kind::of`].
+    pub fn made_by<C: Component>(name: &str, new: impl Fn(&mut Builder<C>) -> C + Send + Sync + 'static) -> Self {
+        let (ty, table) = Builder::<C>::describe_type(name, &new);
         let table = Arc::new(table);
         let hooks = table.hooks.map(|hook| hook.is_some());
         let (ports, properties) = (ty.ports.keys().copied().collect(), ty.properties.keys().copied().collect());
         let operations = ty.operations.keys().copied().collect();
         let make: Maker = Box::new(move |beat, values| {
-            let (component, ends, values) = Builder::make(&table, beat, values)?;
+            let (component, ends, values) = Builder::make(&table, beat, values, &new)?;
             Ok(Made { body: Box::new(Typed { component, table: table.clone() }), ends, values })
         });
         Self { ty: Arc::new(ty), hooks, ports, properties, operations, make }
@@ -125,6 +134,13 @@ impl Library {
     #[must_use]
     pub fn with<C: Component>(mut self, type_name: &str) -> Self {
         self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
+        self
+    }
+
+    /// With a component type that was made before.
+    #[must_use]
+    pub fn with_kind(mut self, kind: Kind) -> Self {
+        self.kinds.push(Arc::new(kind));
         self
     }
 

@@ -7,7 +7,9 @@
 use super::beat::Beat;
 use super::latest::{Reader, Writer, latest};
 use super::links::{Links, Sender, links};
+use super::probe::Tap;
 use super::value::PortValue;
+use crate::model::monitor::Part;
 use crate::model::{EventName, Policy, Value};
 use crate::time::Time;
 use std::any::Any;
@@ -185,6 +187,8 @@ pub struct Inlet<T> {
 
 enum InletKind<T> {
     Data(Writer<Slot<T>>),
+    /// A probe: the latest value, and how often there was one.
+    Tap(Writer<(Slot<T>, u64)>, u64),
     Fifo(rtrb::Producer<(T, Time)>, Arc<AtomicU64>),
 }
 
@@ -193,6 +197,13 @@ impl<T: PortValue> Inlet<T> {
     fn put(&mut self, value: &T, at: Time) {
         match &mut self.kind {
             InletKind::Data(writer) => writer.write(|slot| slot.set(value, at)),
+            InletKind::Tap(writer, writes) => {
+                *writes += 1;
+                writer.write(|(slot, count)| {
+                    slot.set(value, at);
+                    *count = *writes;
+                });
+            }
             InletKind::Fifo(queue, lost) => {
                 // The newest value is the one that is dropped: only the reader may take from the other end.
                 if queue.push((value.clone(), at)).is_err() {
@@ -371,11 +382,30 @@ impl<T: PortValue> InEnd for End<T> {
 }
 
 /// An out-port as the configurator sees it.
-pub trait OutEnd: Send {
+pub(crate) trait OutEnd: Send {
     /// Adds connection `id`.
     fn attach(&mut self, id: u64, feed: Box<dyn Feed>);
-    /// Removes connection `id`.
+    /// Removes connection or probe `id`.
     fn detach(&mut self, id: u64);
+    /// Adds the probe `id`; every write wakes `wake`.
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap>;
+}
+
+/// The reading end of a probe.
+struct Tapped<T> {
+    reader: Reader<(Slot<T>, u64)>,
+}
+
+impl<T: PortValue> Tap for Tapped<T> {
+    fn fetch(&mut self) -> Option<(Time, u64)> {
+        self.reader.update();
+        let (slot, writes) = self.reader.value();
+        slot.value.is_some().then_some((slot.at, *writes))
+    }
+
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        self.reader.value().0.value.as_ref().and_then(|value| value.number(path))
+    }
 }
 
 impl<T: PortValue> OutEnd for Sender<Target<T>> {
@@ -393,6 +423,12 @@ impl<T: PortValue> OutEnd for Sender<Target<T>> {
 
     fn detach(&mut self, id: u64) {
         self.remove(id);
+    }
+
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap> {
+        let (writer, reader) = latest((Slot::EMPTY, 0));
+        self.add(id, Target::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
+        Box::new(Tapped { reader })
     }
 }
 

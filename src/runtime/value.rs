@@ -1,5 +1,6 @@
 //! Rust types as values of the model: what travels through ports, is a property, an argument or a result.
 
+use crate::model::monitor::Part;
 use crate::model::{EventName, Ident, Value, ValueType};
 use std::sync::Arc;
 
@@ -17,6 +18,14 @@ pub trait PortValue: Clone + Send + 'static {
 
     /// The value as this type; none when it is not of [`PortValue::value_type`], or does not fit (300 is no `u8`).
     fn from_value(value: &Value) -> Option<Self>;
+
+    /// The number on this way into the value, bools as 0 and 1: what a monitor looks at. None when there is no number.
+    ///
+    /// Allocates nothing for the types named above; a type of your own that does not say otherwise goes through
+    /// [`PortValue::to_value`].
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        self.to_value().number(path)
+    }
 
     /// The smallest and largest number a Rust type can hold where the model's type holds more; they limit properties.
     fn limits() -> Option<(f64, f64)> {
@@ -37,6 +46,9 @@ impl PortValue for bool {
             _ => None,
         }
     }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        path.is_empty().then(|| f64::from(u8::from(*self)))
+    }
 }
 
 macro_rules! integers {
@@ -54,6 +66,10 @@ macro_rules! integers {
                     Value::Int(v) => Self::try_from(*v).ok(),
                     _ => None,
                 }
+            }
+            #[allow(clippy::cast_precision_loss, clippy::cast_lossless)]
+            fn number(&self, path: &[Part]) -> Option<f64> {
+                path.is_empty().then_some(*self as f64)
             }
             #[allow(clippy::cast_precision_loss, clippy::cast_lossless)]
             fn limits() -> Option<(f64, f64)> {
@@ -77,6 +93,9 @@ impl PortValue for f64 {
     fn from_value(value: &Value) -> Option<Self> {
         value.as_f64()
     }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        path.is_empty().then_some(*self)
+    }
 }
 
 impl PortValue for f32 {
@@ -89,6 +108,9 @@ impl PortValue for f32 {
     #[allow(clippy::cast_possible_truncation)]
     fn from_value(value: &Value) -> Option<Self> {
         value.as_f64().map(|v| v as Self)
+    }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        path.is_empty().then(|| f64::from(*self))
     }
 }
 
@@ -105,6 +127,9 @@ impl PortValue for String {
             _ => None,
         }
     }
+    fn number(&self, _: &[Part]) -> Option<f64> {
+        None
+    }
 }
 
 impl PortValue for Arc<str> {
@@ -120,6 +145,9 @@ impl PortValue for Arc<str> {
             _ => None,
         }
     }
+    fn number(&self, _: &[Part]) -> Option<f64> {
+        None
+    }
 }
 
 impl PortValue for EventName {
@@ -134,6 +162,9 @@ impl PortValue for EventName {
             Value::Str(v) => Self::new(v).ok(),
             _ => None,
         }
+    }
+    fn number(&self, _: &[Part]) -> Option<f64> {
+        None
     }
 }
 
@@ -157,6 +188,9 @@ impl<T: PortValue, const N: usize> PortValue for [T; N] {
         });
         fits.then(|| converted.map(|element| element.expect("all elements fit")))
     }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        element(self, path)
+    }
     fn limits() -> Option<(f64, f64)> {
         T::limits()
     }
@@ -175,6 +209,9 @@ impl<T: PortValue> PortValue for Vec<T> {
             _ => None,
         }
     }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        element(self, path)
+    }
     fn limits() -> Option<(f64, f64)> {
         T::limits()
     }
@@ -189,6 +226,16 @@ impl<const N: usize> PortValue for nalgebra::SVector<f64, N> {
     }
     fn from_value(value: &Value) -> Option<Self> {
         <[f64; N]>::from_value(value).map(Self::from)
+    }
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        element(self.as_slice(), path)
+    }
+}
+
+fn element<T: PortValue>(values: &[T], path: &[Part]) -> Option<f64> {
+    match path.split_first()? {
+        (Part::Index(index), rest) => values.get(*index)?.number(rest),
+        (Part::Field(_), _) => None,
     }
 }
 
@@ -252,6 +299,13 @@ macro_rules! record {
             fn from_value(value: &$crate::model::Value) -> Option<Self> {
                 Some(Self { $($field: $crate::runtime::value::field(value, stringify!($field))?),+ })
             }
+            fn number(&self, path: &[$crate::model::monitor::Part]) -> Option<f64> {
+                let ($crate::model::monitor::Part::Field(field), rest) = path.split_first()? else { return None };
+                $(if field.as_str() == stringify!($field) {
+                    return $crate::runtime::PortValue::number(&self.$field, rest);
+                })+
+                None
+            }
         }
     )+};
 }
@@ -274,6 +328,11 @@ mod tests {
         let value = v.to_value();
         assert!(value.is_of(&T::value_type()), "{value} is no {}", T::value_type());
         assert_eq!(T::from_value(&value).as_ref(), Some(v));
+        // Every way that may lead to a number leads to the same one in the model's value.
+        for text in ["A.x", "A.x[1]", "A.x[0][1]", "A.x.at[2]", "A.x.id", "A.x[0].at[1]", "A.x[9]", "A.x.none"] {
+            let path = text.parse::<crate::model::monitor::PortSignal>().unwrap().path;
+            assert_eq!(v.number(&path), value.number(&path), "{value} {text}");
+        }
     }
 
     #[test]

@@ -4,5 +4,6 @@
 mod activities;
 mod calls;
 mod flow;
+mod monitors;
 mod standard;
 mod support;

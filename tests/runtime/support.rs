@@ -32,8 +32,13 @@ pub fn bench(library: Library) -> Bench {
 }
 
 pub fn bench_on(clock: Clock, library: Library) -> Bench {
+    bench_with(clock, [library])
+}
+
+pub fn bench_with(clock: Clock, libraries: impl IntoIterator<Item = Library>) -> Bench {
     let guard = clock.enter();
-    let libraries = Libraries::new().with(davit::libraries::standard::library()).with(library);
+    let standard = Libraries::new().with(davit::libraries::standard::library());
+    let libraries = libraries.into_iter().fold(standard, Libraries::with);
     let platform = EmbeddedPlatform::new(&clock, &libraries, &activities());
     let events = Arc::new(Mutex::new(Vec::new()));
     let sink = events.clone();

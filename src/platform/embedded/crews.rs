@@ -135,6 +135,7 @@ impl Registry {
         if self.crews.get(&name).is_some_and(|crew| crew.expected == 0 && crew.holes == crew.members.len())
             && let Some(crew) = self.crews.remove(&name)
         {
+            self.hide_activity(name);
             crew.activity.end();
             // The thread ends by itself, as soon as nothing in it hangs.
             self.ending.retain(|thread| !thread.is_finished());

@@ -3,7 +3,7 @@
 //! * [`registry`]: what is there, behind one lock that no activity ever takes; [`crews`] its activities, [`wiring`] its
 //!   ports and properties.
 //! * [`steps`]: the steps that are immediate. [`calls`]: those that run a component's own code, on workers under a deadline.
-//! * [`prepared`]: fixed lists of immediate steps. [`order`]: the data-flow order. [`workers`]: the threads of `calls`.
+//! * [`watchers`]: the probes by which monitors look at components. [`prepared`]: fixed lists of immediate steps. [`order`]: the data-flow order. [`workers`]: the threads of `calls`.
 //!
 //! What is immediate: everything but operations, and the state changes (and `destroy`) of types that declare a hook for
 //! them. A `stop` waits until an update under way has ended, at most until its deadline.
@@ -18,6 +18,7 @@ mod order;
 mod prepared;
 mod registry;
 mod steps;
+mod watchers;
 mod wiring;
 mod workers;
 

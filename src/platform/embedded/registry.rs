@@ -1,6 +1,7 @@
 //! What is there: components, connections, activities, as the configurator's side sees them. No activity ever touches it.
 
 use super::crews::Crew;
+use super::watchers::Watcher;
 use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, Policy, Snapshot, Value};
 use crate::platform::Cause;
 use crate::runtime::builder::{CallerFn, Ends};
@@ -22,6 +23,8 @@ pub(super) struct Registry {
     pub(super) crews: FxHashMap<Ident, Crew>,
     /// Threads of activities that are gone.
     pub(super) ending: Vec<Join>,
+    /// Components that look at others by probes.
+    pub(super) watchers: Vec<Watcher>,
     /// Components whose call never returned; also those that are not there any more but for that call.
     pub(super) quarantined: FxHashSet<ComponentName>,
 }
@@ -135,11 +138,12 @@ impl Registry {
     pub(super) fn insert(
         &mut self,
         cell: Arc<Cell>,
-        ends: Ends,
+        mut ends: Ends,
         values: Vec<Value>,
         asked: Option<Ident>,
         crew: Ident,
     ) {
+        let probes = ends.probes.take();
         let number = self.next_number();
         let slot = self.free.pop().unwrap_or_else(|| {
             self.slots.push(None);
@@ -156,6 +160,12 @@ impl Registry {
         self.names.insert(ByAddress(cell.name), slot);
         self.slots[slot as usize] =
             Some(Entry { cell, ends, values, ports, connections: 0, asked, crew, place, number });
+        if !self.watchers.is_empty() {
+            self.show(slot);
+        }
+        if let Some(probes) = probes {
+            self.watch(slot, probes);
+        }
     }
 
     /// Whether the component may be destroyed as far as its connections go.
@@ -178,6 +188,9 @@ impl Registry {
 
     /// Takes a component without connections out.
     pub(super) fn remove(&mut self, slot: u32) -> Entry {
+        if !self.watchers.is_empty() {
+            self.hide(slot);
+        }
         let entry = self.slots[slot as usize].take().expect("a slot found under this lock is taken");
         self.free.push(slot);
         self.names.remove(&ByAddress(entry.cell.name));

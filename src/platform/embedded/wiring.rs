@@ -10,7 +10,7 @@ use crate::time::Time;
 
 impl Registry {
     /// The index of a port in the order of names, and its type.
-    fn port(&self, slot: u32, port: Ident) -> Result<(usize, &PortType), Cause> {
+    pub(super) fn port(&self, slot: u32, port: Ident) -> Result<(usize, &PortType), Cause> {
         let kind = &self.entry(slot).cell.kind;
         match (kind.ports.binary_search(&port), kind.ty.port(port)) {
             (Ok(index), Some(ty)) => Ok((index, ty)),
@@ -66,6 +66,9 @@ impl Registry {
         entry.ports[out_port].connections += 1;
         entry.connections += 1;
         self.connections.insert(ByAddress((from, to)), Connection { number, policy, lost });
+        if !self.watchers.is_empty() && carried == Policy::Data {
+            self.show_connection(from, to);
+        }
         let (writer, reader) = (self.entry(writer), self.entry(reader));
         if writer.crew == reader.crew && writer.place > reader.place {
             let name = writer.crew;
@@ -84,6 +87,9 @@ impl Registry {
         let Some(connection) = self.connections.remove(&ByAddress((from, to))) else {
             return refused(format!("{from} -> {to} is not connected"));
         };
+        if !self.watchers.is_empty() {
+            self.hide_connection(to);
+        }
         let entry = self.entry_mut(writer);
         if let Some(PortEnd::Out(end)) = &mut entry.ends.ports[out_port] {
             end.detach(connection.number);

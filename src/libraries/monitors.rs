@@ -1,0 +1,174 @@
+//! `davit.Monitors`: the monitors of a deployment, as a component of the system.
+//!
+//! It evaluates them in the rounds of its activity. Each monitor is a property of it, true while it is enabled: a
+//! configuration enables one by setting it, and its undo restores what was. What a monitor looks at need not exist, nor
+//! be connected: the component has probes of it.
+
+use crate::model::RunState;
+use crate::model::monitor::{Counter, Part};
+use crate::model::{Monitor, TypeName};
+use crate::monitor::{Bank, Input, Sample, state_value};
+use crate::runtime::{Builder, Component, Context, EventOut, Kind, Library, Out, Probes, Prop, Wanted};
+use std::sync::Arc;
+
+/// The type's name.
+pub const TYPE: &str = "davit.Monitors";
+
+/// The name of the type.
+///
+/// # Panics
+/// Never.
+pub fn type_name() -> TypeName {
+    TypeName::new(TYPE).expect("a type's name")
+}
+
+/// The library with the component type that evaluates `monitors`.
+pub fn library(monitors: &[Monitor]) -> Library {
+    let plan = Arc::new(Plan::new(monitors));
+    Library::new("davit").with_kind(Kind::made_by(TYPE, move |b| Monitors::new_of(&plan, b)))
+}
+
+/// What all instances share.
+struct Plan {
+    monitors: Vec<Monitor>,
+    bank: Bank,
+    wanted: Arc<[Wanted]>,
+    /// The inputs of the bank that each probe serves.
+    served: Vec<Vec<(usize, What)>>,
+}
+
+/// What an input takes from its probe.
+#[derive(Clone)]
+enum What {
+    Number(Vec<Part>),
+    State,
+    Faulted,
+    Counter(Counter),
+}
+
+impl Plan {
+    fn new(monitors: &[Monitor]) -> Self {
+        let bank = Bank::new(monitors);
+        let mut wanted: Vec<Wanted> = Vec::new();
+        let mut served: Vec<Vec<(usize, What)>> = Vec::new();
+        for (i, input) in bank.inputs().iter().enumerate() {
+            let (of, what) = match input {
+                Input::Port(signal) => (Wanted::Port(signal.member), What::Number(signal.path.clone())),
+                Input::State(component) => (Wanted::Component(*component), What::State),
+                Input::Faulted(component) => (Wanted::Component(*component), What::Faulted),
+                Input::Activity { activity, counter } => (Wanted::Activity(*activity), What::Counter(*counter)),
+            };
+            let place = wanted.iter().position(|w| *w == of).unwrap_or_else(|| {
+                wanted.push(of);
+                served.push(Vec::new());
+                wanted.len() - 1
+            });
+            served[place].push((i, what));
+        }
+        Self { monitors: monitors.to_vec(), bank, wanted: wanted.into(), served }
+    }
+}
+
+/// The monitors at work.
+struct Monitors {
+    plan: Arc<Plan>,
+    bank: Bank,
+    enabled: Vec<Prop<bool>>,
+    is_enabled: Vec<bool>,
+    probes: Probes,
+    samples: Vec<Sample>,
+    events: EventOut,
+    verdicts: Vec<Out<bool>>,
+    robustness: Vec<Out<f64>>,
+    /// Begins anew with the next update.
+    fresh: bool,
+}
+
+impl Component for Monitors {
+    fn new(_: &mut Builder<Self>) -> Self {
+        unreachable!("it is made by `new_of`, which knows the monitors")
+    }
+
+    fn update(&mut self, cx: &mut Context) {
+        let now = cx.now();
+        for (i, enabled) in self.enabled.iter_mut().enumerate() {
+            let on = enabled.get();
+            if self.fresh || on != self.is_enabled[i] {
+                // A monitor that is enabled has no history, and neither has one whose component was stopped.
+                self.bank.enable(i, false, now);
+                self.bank.enable(i, on, now);
+                self.is_enabled[i] = on;
+            }
+        }
+        self.fresh = false;
+        for sample in &mut self.samples {
+            sample.present = false;
+        }
+        let (samples, served) = (&mut self.samples, &self.plan.served);
+        for (place, mut seen) in self.probes.each() {
+            let written = seen.written();
+            for (input, what) in &served[place] {
+                let sample = match what {
+                    What::Number(path) => {
+                        written.map(|(at, writes)| (seen.number(path).unwrap_or(f64::NAN), at, writes))
+                    }
+                    What::State => seen.state().map(|state| (state_value(state), now, 0)),
+                    What::Faulted => {
+                        seen.state().map(|state| (f64::from(u8::from(state == RunState::Faulted)), now, 0))
+                    }
+                    What::Counter(counter) => seen.counter(*counter).map(|value| (value, now, 0)),
+                };
+                if let Some((value, at, writes)) = sample {
+                    samples[*input] = Sample { value, at, writes, present: true };
+                }
+            }
+        }
+        let (samples, events) = (&self.samples, &mut self.events);
+        self.bank.step(now, &mut |input| samples[input], &mut |_, event| events.raise(event));
+        for (i, (verdict, robustness)) in self.verdicts.iter_mut().zip(&mut self.robustness).enumerate() {
+            if let Some(is) = self.bank.is_true(i) {
+                verdict.write(is);
+            }
+            if let Some(margin) = self.bank.robustness(i) {
+                robustness.write(margin);
+            }
+        }
+    }
+}
+
+impl Monitors {
+    fn new_of(plan: &Arc<Plan>, b: &mut Builder<Self>) -> Self {
+        b.describe(
+            "The deployment's monitors. Each is a property, true while it is enabled, with its verdict and how far it is \
+             from the other one as ports. Enabled again, a monitor begins with an empty history.",
+        )
+        .on_start(|c, _| {
+            c.fresh = true;
+            Ok(())
+        });
+        let events = b.doc("What the monitors raise.").event_output("events");
+        let (mut enabled, mut verdicts, mut robustness) = (Vec::new(), Vec::new(), Vec::new());
+        for monitor in &plan.monitors {
+            let name = monitor.name.as_str();
+            let doc = monitor.description.clone().unwrap_or_else(|| format!("Raises `{}`.", monitor.raise));
+            enabled.push(b.doc(&doc).property(name, monitor.enabled));
+            verdicts.push(b.doc("Whether its condition is true.").output(&format!("is_{name}")));
+            let margin = format!("{name}_robustness");
+            robustness
+                .push(b.doc("How far the condition is from changing: positive while it is true.").output(&margin));
+        }
+        let probes = b.probes(plan.wanted.clone());
+        Self {
+            plan: plan.clone(),
+            bank: plan.bank.clone(),
+            is_enabled: vec![false; enabled.len()],
+            enabled,
+            probes,
+            samples: vec![Sample::default(); plan.bank.inputs().len()],
+            events,
+            verdicts,
+            robustness,
+            fresh: true,
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Probes given to components that want to see others: put in place when what they look at appears, taken away with it.
+
+use super::registry::Registry;
+use crate::model::{ComponentName, Direction, Ident, MemberRef};
+use crate::runtime::beat::Beat;
+use crate::runtime::builder::PortEnd;
+use crate::runtime::links::Sender;
+use crate::runtime::probe::{Probe, ProbesEnd, Tap, Wanted};
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// A component that looks at others.
+pub(super) struct Watcher {
+    name: ComponentName,
+    wanted: Arc<[Wanted]>,
+    places: FxHashMap<Wanted, usize>,
+    sender: Sender<(usize, Probe)>,
+    wake: Option<Arc<Beat>>,
+    given: Vec<Given>,
+}
+
+/// A probe that is in place.
+struct Given {
+    number: u64,
+    place: usize,
+    /// The out-port it is a link of.
+    at: Option<MemberRef>,
+}
+
+impl Watcher {
+    /// Whether it looks at this.
+    fn place(&self, wanted: &Wanted) -> Option<usize> {
+        self.places.get(wanted).copied()
+    }
+
+    /// Takes away the probes for which `gone` is true; answers the links they were.
+    fn take(&mut self, gone: impl Fn(&Given, &Wanted) -> bool) -> Vec<(u64, MemberRef)> {
+        let mut links = Vec::new();
+        let (sender, wanted) = (&mut self.sender, &self.wanted);
+        self.given.retain(|given| {
+            let gone = gone(given, &wanted[given.place]);
+            if gone {
+                sender.remove(given.number);
+                links.extend(given.at.map(|at| (given.number, at)));
+            }
+            !gone
+        });
+        links
+    }
+}
+
+impl Registry {
+    /// A component has come that looks at others: shows it what is there.
+    pub(super) fn watch(&mut self, slot: u32, probes: ProbesEnd) {
+        let name = self.entry(slot).cell.name;
+        let ProbesEnd { wanted, sender, wake } = probes;
+        let places = wanted.iter().cloned().zip(0..).collect();
+        self.watchers.push(Watcher { name, wanted, places, sender, wake, given: Vec::new() });
+        let present: Vec<u32> =
+            (0..self.slots.len()).filter(|i| self.slots[*i].is_some()).filter_map(|i| u32::try_from(i).ok()).collect();
+        let watcher = self.watchers.len() - 1;
+        for slot in present {
+            self.show_to(watcher, slot);
+        }
+        let connections: Vec<_> = self.connections.keys().map(|ends| ends.0).collect();
+        for (from, to) in connections {
+            self.show_connection_to(watcher, from, to);
+        }
+    }
+
+    /// A component has come: shows it to those who look at it.
+    pub(super) fn show(&mut self, slot: u32) {
+        for watcher in 0..self.watchers.len() {
+            self.show_to(watcher, slot);
+        }
+    }
+
+    fn show_to(&mut self, watcher: usize, slot: u32) {
+        let entry = self.entry(slot);
+        let (cell, crew) = (entry.cell.clone(), entry.crew);
+        if let Some(place) = self.watchers[watcher].place(&Wanted::Component(cell.name)) {
+            self.give(watcher, place, None, Probe::Component(cell.clone()));
+        }
+        if let Some(place) = self.watchers[watcher].place(&Wanted::Activity(crew))
+            && self.watchers[watcher].given.iter().all(|given| given.place != place)
+            && let Some(crew) = self.crews.get(&crew)
+        {
+            let activity = crew.activity.clone();
+            self.give(watcher, place, None, Probe::Activity(activity));
+        }
+        for (index, port) in cell.kind.ports.iter().enumerate() {
+            let member = cell.name.member(*port);
+            let out = cell.kind.ty.ports.get(port).is_some_and(|ty| ty.direction == Direction::Out);
+            if out && let Some(place) = self.watchers[watcher].place(&Wanted::Port(member)) {
+                self.tap(watcher, place, slot, index, member);
+            }
+        }
+    }
+
+    /// A connection has been made: who looks at its in-port sees what comes through it.
+    pub(super) fn show_connection(&mut self, from: MemberRef, to: MemberRef) {
+        for watcher in 0..self.watchers.len() {
+            self.show_connection_to(watcher, from, to);
+        }
+    }
+
+    fn show_connection_to(&mut self, watcher: usize, from: MemberRef, to: MemberRef) {
+        if let Some(place) = self.watchers[watcher].place(&Wanted::Port(to))
+            && let Ok(slot) = self.find(from.component)
+            && let Ok((index, _)) = self.port(slot, from.member)
+        {
+            self.tap(watcher, place, slot, index, from);
+        }
+    }
+
+    /// A connection is being removed.
+    pub(super) fn hide_connection(&mut self, to: MemberRef) {
+        self.take_probes(|_, wanted| *wanted == Wanted::Port(to));
+    }
+
+    /// A component is being removed: it looks no more, and is looked at no more.
+    pub(super) fn hide(&mut self, slot: u32) {
+        let name = self.entry(slot).cell.name;
+        if let Some(at) = self.watchers.iter().position(|watcher| watcher.name == name) {
+            let mut watcher = self.watchers.swap_remove(at);
+            self.detach(watcher.take(|_, _| true));
+        }
+        self.take_probes(|given, wanted| {
+            *wanted == Wanted::Component(name) || given.at.is_some_and(|at| at.component == name)
+        });
+    }
+
+    /// An activity has ended.
+    pub(super) fn hide_activity(&mut self, name: Ident) {
+        self.take_probes(|_, wanted| *wanted == Wanted::Activity(name));
+    }
+
+    fn take_probes(&mut self, gone: impl Fn(&Given, &Wanted) -> bool) {
+        for watcher in 0..self.watchers.len() {
+            let links = self.watchers[watcher].take(&gone);
+            self.detach(links);
+        }
+    }
+
+    fn detach(&mut self, links: Vec<(u64, MemberRef)>) {
+        for (number, at) in links {
+            if let Ok(slot) = self.find(at.component)
+                && let Ok((index, _)) = self.port(slot, at.member)
+                && let Some(PortEnd::Out(end)) = &mut self.entry_mut(slot).ends.ports[index]
+            {
+                end.detach(number);
+            }
+        }
+    }
+
+    fn tap(&mut self, watcher: usize, place: usize, slot: u32, index: usize, at: MemberRef) {
+        let (number, wake) = (self.next_number(), self.watchers[watcher].wake.clone());
+        let tap: Option<Box<dyn Tap>> = match &mut self.entry_mut(slot).ends.ports[index] {
+            Some(PortEnd::Out(end)) => Some(end.tap(number, wake)),
+            _ => None,
+        };
+        if let Some(tap) = tap {
+            self.give_as(watcher, place, number, Some(at), Probe::Port(tap));
+        }
+    }
+
+    fn give(&mut self, watcher: usize, place: usize, at: Option<MemberRef>, probe: Probe) {
+        let number = self.next_number();
+        self.give_as(watcher, place, number, at, probe);
+    }
+
+    fn give_as(&mut self, watcher: usize, place: usize, number: u64, at: Option<MemberRef>, probe: Probe) {
+        let watcher = &mut self.watchers[watcher];
+        watcher.given.push(Given { number, place, at });
+        watcher.sender.add(number, (place, probe));
+    }
+}
