@@ -46,8 +46,7 @@ pub(crate) fn hook_index(transition: Transition) -> usize {
     }
 }
 
-/// Declares the members of a component. Words about a member come before it:
-/// `b.doc("Force on the tool.").unit("N").input("f")`.
+/// Declares a component's members. Words about one come before it: `b.doc("Force on the tool.").unit("N").input("f")`.
 pub struct Builder<C> {
     mode: Mode<C>,
 }

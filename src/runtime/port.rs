@@ -7,9 +7,8 @@
 use super::beat::Beat;
 use super::latest::{Reader, Writer, latest};
 use super::links::{Links, Sender, links};
-use super::probe::Tap;
+use super::probe::{Tap, Tapped};
 use super::value::PortValue;
-use crate::model::monitor::Part;
 use crate::model::{EventName, Policy, Value};
 use crate::time::Time;
 use std::any::Any;
@@ -19,9 +18,9 @@ use std::time::Duration;
 
 /// A value with the moment it was written; none: never written.
 #[derive(Debug, Clone)]
-struct Slot<T> {
-    value: Option<T>,
-    at: Time,
+pub(super) struct Slot<T> {
+    pub(super) value: Option<T>,
+    pub(super) at: Time,
 }
 
 impl<T: Clone> Slot<T> {
@@ -389,23 +388,6 @@ pub(crate) trait OutEnd: Send {
     fn detach(&mut self, id: u64);
     /// Adds the probe `id`; every write wakes `wake`.
     fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap>;
-}
-
-/// The reading end of a probe.
-struct Tapped<T> {
-    reader: Reader<(Slot<T>, u64)>,
-}
-
-impl<T: PortValue> Tap for Tapped<T> {
-    fn fetch(&mut self) -> Option<(Time, u64)> {
-        self.reader.update();
-        let (slot, writes) = self.reader.value();
-        slot.value.is_some().then_some((slot.at, *writes))
-    }
-
-    fn number(&self, path: &[Part]) -> Option<f64> {
-        self.reader.value().0.value.as_ref().and_then(|value| value.number(path))
-    }
 }
 
 impl<T: PortValue> OutEnd for Sender<Target<T>> {

@@ -6,7 +6,10 @@
 use super::activity::Activity;
 use super::beat::Beat;
 use super::cell::Cell;
+use super::latest::Reader;
 use super::links::{Links, Sender, links};
+use super::port::Slot;
+use super::value::PortValue;
 use crate::model::monitor::{Counter, Part};
 use crate::model::{ComponentName, Ident, MemberRef, RunState};
 use crate::time::Time;
@@ -30,6 +33,23 @@ pub(crate) trait Tap: Send {
 
     /// The number on this way into the value fetched last; none when there is none.
     fn number(&self, path: &[Part]) -> Option<f64>;
+}
+
+/// The reading end of a probe.
+pub(super) struct Tapped<T> {
+    pub(super) reader: Reader<(Slot<T>, u64)>,
+}
+
+impl<T: PortValue> Tap for Tapped<T> {
+    fn fetch(&mut self) -> Option<(Time, u64)> {
+        self.reader.update();
+        let (slot, writes) = self.reader.value();
+        slot.value.is_some().then_some((slot.at, *writes))
+    }
+
+    fn number(&self, path: &[Part]) -> Option<f64> {
+        self.reader.value().0.value.as_ref().and_then(|value| value.number(path))
+    }
 }
 
 /// One probe.
