@@ -7,6 +7,7 @@ pub mod configurator;
 pub mod coordinator;
 pub mod diagnostics;
 pub mod draw;
+pub mod functions;
 pub mod lang;
 pub mod libraries;
 pub mod limits;

@@ -152,6 +152,30 @@ pub const SCRIPT_MEMORY: usize = 256 << 20;
 
 /// Instructions of one script: hours of stories, and a few seconds of an endless loop.
 pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;
+
+/// Instructions of the Lua machine that one call of a coordinator's function may take (one resumption of a `doo`, one
+/// guard): some ten milliseconds, a thousand times more than a reaction should take.
+pub const CALL_INSTRUCTIONS: u64 = 1_000_000;
+
+/// Bytes that the Lua state of one coordinator with functions may hold.
+pub const FUNCTIONS_BYTES: usize = 64 * 1024 * 1024;
+
+/// Lines that functions may print between two looks of the coordinator; more are counted.
+pub const SAID_LINES: usize = 256;
+
+/// Characters of one printed line; the rest is cut off.
+pub const SAID_LENGTH: usize = 4096;
+
+/// Machines that the functions of one coordinator may make with `rfsm.init`.
+pub const INNER_MACHINES: usize = 256;
+
+/// How long a coordinator pauses before it resumes a `doo` that is not content to wait: rFSM would call it again at once
+/// and keep a processor busy for nothing but that.
+pub const DOO_BUSY: Duration = Duration::from_millis(1);
+
+/// How long a coordinator pauses before it resumes a `doo` that is content to wait, or asks `getevents` again: as a host
+/// that steps its machine a hundred times a second.
+pub const DOO_IDLE: Duration = Duration::from_millis(10);
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
 /// twenty milliseconds of work.
 pub const CHECK_TRANSITIONS: usize = 20_000;

@@ -1,7 +1,9 @@
 //! From a checked deployment to one that is alive.
 
 use super::Checked;
+use crate::functions::Opener;
 use crate::model::finding::did_you_mean;
+use crate::model::{Ident, Statechart};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Simulated};
@@ -21,6 +23,12 @@ pub enum StartError {
         /// What was likely meant.
         help: String,
     },
+    /// The functions of the coordinator could not be opened.
+    #[error("the coordinator's functions cannot be run: {why}")]
+    Functions {
+        /// Why.
+        why: String,
+    },
 }
 
 /// The platforms of this program.
@@ -32,6 +40,10 @@ pub const PLATFORMS: &[&str] = &["embedded", "simulated"];
 /// When the deployment names a platform that this program does not have.
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
     let deployment = &checked.deployment;
+    // Once here, to say what is wrong; then on each coordinator's own thread, from the same text.
+    for opener in openers(checked).into_iter().flatten() {
+        opener.open(None).map_err(|failure| StartError::Functions { why: failure.to_string() })?;
+    }
     let platform: Arc<dyn Platform> = match deployment.platform.as_str() {
         "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
         "simulated" => {
@@ -56,9 +68,22 @@ pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -
     });
     Session::start(Setup {
         deployment: checked.deployment.share(),
+        functions: openers(checked),
         charts: charts.collect(),
         catalogue: checked.catalogue.clone(),
         platform,
         clock: clock.clone(),
     })
+}
+
+/// What opens the functions of a deployment's coordinators, by coordinator; none for those that have none.
+fn openers(checked: &Checked) -> Vec<Option<Opener>> {
+    let deployment = &checked.deployment;
+    let beside = deployment.beside.iter().map(|b| &b.chart);
+    let charts = std::iter::once(&deployment.coordinator).chain(beside);
+    let opener = |(name, chart): (Ident, &Statechart)| {
+        let program = deployment.programs.get(&name)?;
+        Some(Opener::new(program.clone(), Arc::new(chart.clone())))
+    };
+    deployment.coordinators().into_iter().zip(charts).map(opener).collect()
 }

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::signals::Watch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
-use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM};
+use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session};
@@ -91,6 +91,11 @@ fn foreground(
         StartError::UnknownPlatform { name, help } => {
             Failure::no(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
         }
+        StartError::Functions { why } => Failure::no(
+            FUNCTIONS_NOT_OPENED,
+            format!("the coordinator's functions cannot be run: {why}"),
+            "the text ran when it was read: does it depend on time or chance?",
+        ),
     })?;
     let socket = open(&session)?;
     let watch = watch(&session, &socket, progress, in_background)?;

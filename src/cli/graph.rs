@@ -61,7 +61,7 @@ impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
         let picture = if what == What::Coordinator {
-            let read = coordinator(&self.file, &self.parameters, self.of.as_deref())?;
+            let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &[])?;
             draw::coordinator(&format!("{}: coordinator", read.name), &read.chart, &[])
         } else {
             let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read(context)?;

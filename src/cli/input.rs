@@ -8,8 +8,9 @@ use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::model::codes::{CLI_BAD_SET, CLI_WHICH_COORDINATOR};
 use crate::model::finding::did_you_mean;
-use crate::model::{Deployment, Findings, Ident, Statechart};
+use crate::model::{Deployment, Findings, Ident, Program, Statechart};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The file a command works on, and its parameters.
 #[derive(Debug, Clone, clap::Args)]
@@ -47,7 +48,7 @@ impl Parameters {
             };
             set.push((name.trim().to_owned(), value.to_owned()));
         }
-        Ok(LoadOptions { set })
+        Ok(LoadOptions { set, ..LoadOptions::default() })
     }
 }
 
@@ -83,40 +84,50 @@ pub struct Coordinator {
     pub name: String,
     /// The coordinator.
     pub chart: Statechart,
+    /// Its texts, when it has functions.
+    pub program: Option<Arc<Program>>,
     /// Its texts.
     pub sources: SourceMap,
     /// What reading found; no errors among them.
     pub findings: Findings,
 }
 
-/// Reads a coordinator.
+/// Reads a coordinator. A file given by hand is trusted to have functions (nothing is open to them); in a deployment
+/// `trusted:` says so. `host` are files that stand in for its host.
 ///
 /// # Errors
 /// What is wrong with the texts.
 ///
 /// `of`: which one of a deployment with several.
-pub fn coordinator(path: &Path, parameters: &Parameters, of: Option<&str>) -> Result<Coordinator, Failure> {
-    let options = parameters.options()?;
+pub fn coordinator(
+    path: &Path,
+    parameters: &Parameters,
+    of: Option<&str>,
+    host: &[PathBuf],
+) -> Result<Coordinator, Failure> {
+    let options = LoadOptions { trusted: true, host: host.to_vec(), ..parameters.options()? };
     let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     if is_deployment(path) {
         let loaded = lang::load(path, &options);
         return match loaded.deployment {
             Some(d) => {
-                let chart = chosen(d, of)?;
-                Ok(Coordinator { name, chart, sources: loaded.sources, findings: loaded.findings })
+                let (chart, program) = chosen(d, of)?;
+                Ok(Coordinator { name, chart, program, sources: loaded.sources, findings: loaded.findings })
             }
             None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
         };
     }
     let loaded = lang::load_coordinator(&Sources::Disk, path, &options);
     match loaded.coordinator {
-        Some(chart) => Ok(Coordinator { name, chart, sources: loaded.sources, findings: loaded.findings }),
+        Some(chart) => {
+            Ok(Coordinator { name, chart, program: loaded.program, sources: loaded.sources, findings: loaded.findings })
+        }
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }
 }
 
 /// The coordinator of that name; without one, the only one.
-fn chosen(deployment: Deployment, of: Option<&str>) -> Result<Statechart, Failure> {
+fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(Statechart, Option<Arc<Program>>), Failure> {
     let names = deployment.coordinators();
     let number = match of {
         None if names.len() == 1 => Some(0),
@@ -134,10 +145,12 @@ fn chosen(deployment: Deployment, of: Option<&str>) -> Result<Statechart, Failur
         };
         return Err(Failure::usage(CLI_WHICH_COORDINATOR, message, help));
     };
-    Ok(match number.checked_sub(1) {
+    let program = deployment.programs.get(&names[number]).cloned();
+    let chart = match number.checked_sub(1) {
         None => deployment.coordinator,
         Some(at) => deployment.beside.into_iter().nth(at).map_or(deployment.coordinator, |own| own.chart),
-    })
+    };
+    Ok((chart, program))
 }
 
 fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {

@@ -100,7 +100,11 @@ impl Progress {
             Happening::Phase { phase: Phase::Broken } => {
                 self.line(format!("{time}  {}", out.paint(Style::Bad, "broken")));
             }
-            Happening::Phase { .. } | Happening::Event { .. } | Happening::Stale { .. } => {}
+            Happening::Said { by, text } if *by != "dbg" => {
+                let style = if *by == "info" { Style::Dim } else { Style::Care };
+                self.line(format!("{time}  {}  {text}", out.paint(style, by)));
+            }
+            Happening::Said { .. } | Happening::Phase { .. } | Happening::Event { .. } | Happening::Stale { .. } => {}
         }
     }
 }

@@ -4,12 +4,17 @@ use super::exit::Exit;
 use super::input::{Parameters, coordinator};
 use super::output::Style;
 use super::{Answer, Context, Failure, Run};
-use crate::model::codes::CLI_EVENTS_UNREADABLE;
-use crate::statechart::{Chart, Sim, compile};
+use crate::functions::Opener;
+use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
+use crate::statechart::{Hook, Sim, compile};
 use std::io::{BufRead, BufReader, IsTerminal, Read};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Step a coordinator alone, interactively or from a file of events.
+///
+/// A Lua file given here may have functions: it is trusted, with files and processes closed to it. What they print and
+/// what goes wrong in them is shown as notes.
 ///
 /// One line is one set of events, separated by blanks, queued in the order written and followed by one step; an empty
 /// line queues nothing; the first line also enters the machine. A line `run` runs to idle; `advance 0.5` moves the clock
@@ -28,13 +33,17 @@ pub struct Args {
     /// Print one JSON object for each input line.
     #[arg(long)]
     json: bool,
+    /// Stand in for the host of a coordinator with functions: run this Lua file before it. May be given again.
+    #[arg(long, value_name = "FILE")]
+    host: Vec<PathBuf>,
     #[command(flatten)]
     parameters: Parameters,
 }
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let read = coordinator(&self.file, &self.parameters, self.of.as_deref()).map_err(|f| f.as_json(self.json))?;
+        let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &self.host)
+            .map_err(|f| f.as_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
         let Some(chart) = chart else {
@@ -53,14 +62,27 @@ impl Run for Args {
             _ => Box::new(std::io::stdin()),
         };
         let prompt = self.events.is_none() && std::io::stdin().is_terminal() && !self.json;
-        self.lines(context, &chart, input, prompt)
+        match read.program {
+            None => self.lines(context, Sim::new(&chart), input, prompt),
+            Some(program) => {
+                let opener = Opener::new(program, Arc::new(read.chart));
+                let functions = opener.open(None).map_err(|failure| {
+                    Failure::usage(
+                        FUNCTIONS_NOT_OPENED,
+                        format!("the functions cannot be run: {failure}"),
+                        "the text ran when it was read: does it depend on time or chance?",
+                    )
+                    .as_json(self.json)
+                })?;
+                self.lines(context, Sim::with(&chart, functions), input, prompt)
+            }
+        }
     }
 }
 
 impl Args {
-    fn lines(&self, context: &Context, chart: &Chart, input: Box<dyn Read>, prompt: bool) -> Answer {
+    fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>, prompt: bool) -> Answer {
         let out = &context.out;
-        let mut sim = Sim::new(chart);
         if prompt {
             out.line("a line is a set of events; `run`; `advance SECONDS`; end with Ctrl-D");
         }
@@ -68,7 +90,7 @@ impl Args {
         let mut lines = BufReader::new(input).lines();
         loop {
             if prompt {
-                self.offer(context, chart, &sim);
+                self.offer(context, &sim);
                 out.text("> ");
             }
             let line = match lines.next() {
@@ -108,7 +130,8 @@ impl Args {
     }
 
     /// The events that lead on from where the machine is.
-    fn offer(&self, context: &Context, chart: &Chart, sim: &Sim) {
+    fn offer<F: Hook>(&self, context: &Context, sim: &Sim<'_, F>) {
+        let chart = sim.chart();
         let mut events: Vec<String> = Vec::new();
         for state in sim.machine().active() {
             for edge in chart.outgoing(*state) {

@@ -4,7 +4,7 @@ use crate::limits;
 use crate::model::finding::Finding;
 use crate::model::names::EventName;
 use crate::model::{codes, finding};
-use crate::statechart::{AtOnce, Chart, Hook, Machine, NodeId, Raised, Step};
+use crate::statechart::{AtOnce, Chart, Hook, Machine, Mode, Nobody, NodeId, Raised, Said, Step, Watched};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -48,6 +48,11 @@ pub trait Listener {
     /// It has reacted to everything delivered so far and is about to wait. Whoever was told of an event before, and looked
     /// while it was being reacted to, must look again now.
     fn rested(&mut self) {}
+
+    /// A function of the model printed something, or failed.
+    fn said(&mut self, said: &Said) {
+        let _ = said;
+    }
 
     /// The chart behaved badly.
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
@@ -95,12 +100,16 @@ pub enum Delivered {
     Stale,
 }
 
-/// A coordinator that is driven by calls.
+/// A coordinator that is driven by calls, with the functions of its model where it has some.
 #[derive(Debug, Clone)]
-pub struct Core {
+pub struct Core<F = Nobody> {
     chart: Arc<Chart>,
     machine: Machine,
     batch: Vec<Raised>,
+    functions: F,
+    said: Vec<Said>,
+    /// When the model is to be given a turn although nothing happened.
+    again: Option<Time>,
 }
 
 /// Collects what one step raises.
@@ -118,10 +127,17 @@ impl Hook for Collect<'_> {
 impl Core {
     /// A coordinator that has not begun.
     pub fn new(chart: Arc<Chart>) -> Self {
+        Self::with(chart, Nobody)
+    }
+}
+
+impl<F: Hook> Core<F> {
+    /// The same, with functions.
+    pub fn with(chart: Arc<Chart>, functions: F) -> Self {
         let machine = Machine::new(&chart);
         // No step raises more than there are places that raise.
         let batch = Vec::with_capacity(chart.raises().len());
-        Self { chart, machine, batch }
+        Self { chart, machine, batch, functions, said: Vec::new(), again: None }
     }
 
     /// The chart.
@@ -152,8 +168,12 @@ impl Core {
             listener.stale(&self.chart, event, tag);
             return Delivered::Stale;
         }
-        let id = self.chart.event(event);
-        let at_once = self.machine.at_once(&self.chart, id, now, &mut Collect(&mut self.batch));
+        let id = self.functions.event(&self.chart, event);
+        let at_once = if F::TURNS {
+            AtOnce::No
+        } else {
+            self.machine.at_once(&self.chart, id, now, &mut Collect(&mut self.batch))
+        };
         if at_once != AtOnce::No {
             listener.moved(&self.chart, self.machine.active());
             self.tell(listener);
@@ -178,7 +198,18 @@ impl Core {
 
     /// When [`tick`](Self::tick) is next needed if no event comes; none: not at all.
     pub fn next_deadline(&self) -> Option<Time> {
-        self.machine.next_deadline(&self.chart)
+        let due = self.machine.next_deadline(&self.chart);
+        if F::TURNS { [due, self.again].into_iter().flatten().min() } else { due }
+    }
+
+    /// When an activity is to be resumed, or the model asked for events: what it wants at once waits a little, so that
+    /// events come in between and no processor is kept busy with nothing.
+    fn turn_after(&self, idle: bool, now: Time) -> Option<Time> {
+        if !idle {
+            return Some(now + limits::DOO_BUSY);
+        }
+        let wants = self.machine.mode() == Some(Mode::Active) || self.functions.polls();
+        wants.then(|| now + limits::DOO_IDLE)
     }
 
     /// Hands on what the step raised.
@@ -192,9 +223,16 @@ impl Core {
     /// Turns until nothing is left to do; answers what the first one did.
     fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> Step {
         let mut first = None;
+        self.again = None;
         for _ in 0..limits::CHART_RUN {
-            let step = self.machine.turn(&self.chart, now, &mut Collect(&mut self.batch));
+            let mut collect = Collect(&mut self.batch);
+            let mut hook = Watched { watcher: &mut collect, functions: &mut self.functions };
+            let step = self.machine.turn(&self.chart, now, &mut hook);
             first = first.or(Some(step));
+            if F::TURNS {
+                self.functions.said(&mut self.said);
+                self.said.drain(..).for_each(|said| listener.said(&said));
+            }
             match step {
                 Step::Taken | Step::Entered => listener.moved(&self.chart, self.machine.active()),
                 Step::NotEntered => {
@@ -205,9 +243,15 @@ impl Core {
             }
             self.tell(listener);
             let rests = match step {
-                Step::Taken | Step::Entered => self.machine.rest::<Collect<'_>>(&self.chart),
+                Step::Taken | Step::Entered => self.machine.rest::<Watched<'_, Collect<'_>, F>>(&self.chart),
                 // A time event that came due in an idle turn waits inside for the next one.
-                Step::Quiet { idle } => idle && self.machine.queue().events().is_empty(),
+                Step::Quiet { .. } if !self.machine.queue().events().is_empty() => false,
+                Step::Quiet { idle } => {
+                    if F::TURNS {
+                        self.again = self.turn_after(idle, now);
+                    }
+                    idle || F::TURNS
+                }
                 _ => false,
             };
             if rests {

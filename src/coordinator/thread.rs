@@ -4,7 +4,7 @@ use super::core::{Core, Listener, Trouble};
 use super::inbox::{Dropped, Inbox, Incoming, Refused};
 use super::{Delivered, Tag};
 use crate::model::names::EventName;
-use crate::statechart::{Chart, NodeId, Raised};
+use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
 use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
@@ -64,6 +64,18 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Coordinator {
     /// Starts a thread that enters the chart, and then reacts to what is [delivered](Self::deliver).
     pub fn start(name: &str, chart: Arc<Chart>, clock: &Clock, listener: impl Listener + Send + 'static) -> Self {
+        Self::start_with(name, chart, clock, listener, || Ok(Nobody))
+    }
+
+    /// The same, with functions. `open` is called on the new thread, which they never leave. When it fails, the listener is
+    /// told why, and the coordinator has ended.
+    pub fn start_with<F: Hook>(
+        name: &str,
+        chart: Arc<Chart>,
+        clock: &Clock,
+        listener: impl Listener + Send + 'static,
+        open: impl FnOnce() -> Result<F, String> + Send + 'static,
+    ) -> Self {
         let shared = Arc::new(Shared {
             clock: clock.clone(),
             chart,
@@ -80,7 +92,7 @@ impl Coordinator {
         let coordinator = Self { shared };
         let mut thread = lock(&coordinator.shared.thread);
         let shared = coordinator.shared.clone();
-        thread.join = Some(clock.spawn(name, move || shared.run(listener)));
+        thread.join = Some(clock.spawn(name, move || shared.run(listener, open)));
         thread.id = thread.join.as_ref().map(|join| join.thread().id());
         drop(thread);
         coordinator
@@ -213,9 +225,12 @@ impl Shared {
         self.chart.node(number)
     }
 
-    fn run(&self, listener: impl Listener) {
+    fn run<F: Hook>(&self, mut listener: impl Listener, open: impl FnOnce() -> Result<F, String>) {
         let _ended = Ended(self);
-        let mut core = Core::new(self.chart.clone());
+        let mut core = match open() {
+            Ok(functions) => Core::with(self.chart.clone(), functions),
+            Err(text) => return listener.said(&Said { by: Printer::Err, text }),
+        };
         let mut listener = Told { shared: self, listener };
         self.react(|| {
             core.start(self.clock.now(), &mut listener);
@@ -317,6 +332,12 @@ impl<L: Listener> Listener for Told<'_, L> {
     fn rested(&mut self) {
         if !self.silent() {
             self.listener.rested();
+        }
+    }
+
+    fn said(&mut self, said: &Said) {
+        if !self.silent() {
+            self.listener.said(said);
         }
     }
 

@@ -5,17 +5,26 @@ use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
 use super::params::Params;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::trusted::{self, Trust, Trusted};
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
-use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, Statechart, codes};
+use crate::model::{
+    ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, Program, Statechart, codes,
+};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// How to load.
 #[derive(Debug, Clone, Default)]
 pub struct LoadOptions {
     /// Parameters (`--set a.b=1` is `("a.b", "1")`): they override `with:`.
     pub set: Vec<(String, String)>,
+    /// For a coordinator's file alone: it may have functions. In a deployment `trusted:` says so.
+    pub trusted: bool,
+    /// Files that stand in for the host of a trusted coordinator, beside those that a deployment names.
+    pub host: Vec<PathBuf>,
 }
 
 /// What loading a deployment gave.
@@ -49,6 +58,8 @@ pub struct LoadedConfigurations {
 pub struct LoadedCoordinator {
     /// The statechart.
     pub coordinator: Option<Statechart>,
+    /// Its texts, when it has functions.
+    pub program: Option<Arc<Program>>,
     /// What was found.
     pub findings: Findings,
     /// The text, and where everything stands.
@@ -100,10 +111,16 @@ pub fn load_configurations(from: &Sources, path: &Path, options: &LoadOptions) -
 pub fn load_coordinator(from: &Sources, path: &Path, options: &LoadOptions) -> LoadedCoordinator {
     let mut cx = Cx::default();
     let mut params = Params::new(&mut cx, Vec::new(), &options.set);
-    let coordinator = coordinator(&mut cx, from, path, Origin::NONE, &mut params);
+    let trust = options.trusted.then(|| Trust { host: host_files(&options.host), ..Trust::default() });
+    let coordinator = coordinator(&mut cx, from, path, Origin::NONE, &mut params, trust.as_ref());
     params.finish(&mut cx);
     let coordinator = coordinator.filter(|_| !crate::model::finding::has_errors(&cx.findings));
-    LoadedCoordinator { coordinator, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+    let (coordinator, program) = coordinator.map_or((None, None), |(chart, program)| (Some(chart), program));
+    LoadedCoordinator { coordinator, program, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+}
+
+fn host_files(paths: &[PathBuf]) -> Vec<(PathBuf, Origin)> {
+    paths.iter().map(|path| (path.clone(), Origin::NONE)).collect()
 }
 
 /// Loads one file of monitors, Lua or YAML.
@@ -147,7 +164,7 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
     let (reading, language) = open(cx, from, path, Origin::NONE)?;
     let (configurations, chart, monitors) = match language {
         Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path))?;
+            let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)))?;
             (made.configurations, made.chart, made.monitors)
         }
         Language::Yaml => {
@@ -223,7 +240,7 @@ fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin
     let (reading, language) = open(cx, from, path, named_at)?;
     match language {
         Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path))?;
+            let made = lua::read(cx, reading, params, &stem(path), None)?;
             if made.configurations.is_none() {
                 nothing(cx, reading, "configuration", "`ConfiguratorConf { name = Configuration { … } }`");
             }
@@ -241,7 +258,7 @@ fn monitor_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, para
     let (reading, language) = open(cx, from, path, named_at)?;
     match language {
         Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path))?;
+            let made = lua::read(cx, reading, params, &stem(path), None)?;
             if made.monitors.is_none() {
                 nothing(cx, reading, "monitor", "`Monitors { name = monitor { … } }`");
             }
@@ -294,22 +311,36 @@ fn unique(cx: &mut Cx, configurations: &mut Vec<Configuration>) {
     });
 }
 
-fn coordinator(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Statechart> {
+fn loads(from: &Sources, path: &Path) -> lua::Loads {
+    lua::Loads { from: from.clone(), folder: path.parent().map_or_else(PathBuf::new, Path::to_path_buf) }
+}
+
+fn coordinator(
+    cx: &mut Cx,
+    from: &Sources,
+    path: &Path,
+    named_at: Origin,
+    params: &mut Params,
+    trust: Option<&Trust>,
+) -> Option<Trusted> {
     let (reading, language) = open(cx, from, path, named_at)?;
-    let node = match language {
-        Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path))?;
+    let node = match (language, trust) {
+        (Language::Lua, Some(trust)) => {
+            return trusted::read(cx, from, path, reading, params, trust, &stem(path));
+        }
+        (Language::Lua, None) => {
+            let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)))?;
             if made.chart.is_none() {
                 nothing(cx, reading, "coordinator", "`return state { … }`");
             }
             made.chart?
         }
-        Language::Yaml => {
+        (Language::Yaml, _) => {
             let node = yaml::read(cx, reading)?;
             only_key(cx, node, reading, "coordinator", "a coordinator's file")?
         }
     };
-    chart::statechart(cx, node)
+    chart::statechart(cx, node).map(|chart| (chart, None))
 }
 
 fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptions) -> Option<Deployment> {
@@ -343,9 +374,17 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         }
     }
     unique(cx, &mut configurations);
-    let mut charts = Vec::new();
+    let (mut charts, mut programs) = (Vec::new(), BTreeMap::new());
+    let trust = draft.trusted.map(|open| {
+        let named = draft.host.iter().map(|(file, origin)| (folder.join(file), *origin));
+        Trust { open, host: named.chain(host_files(&options.host)).collect() }
+    });
     for (name, file, named_at) in &draft.coordinators {
-        if let Some(chart) = coordinator(cx, from, &folder.join(file), *named_at, &mut params) {
+        if let Some((chart, program)) =
+            coordinator(cx, from, &folder.join(file), *named_at, &mut params, trust.as_ref())
+        {
+            let own = name.or(draft.name);
+            programs.extend(own.zip(program));
             charts.push((*name, chart, *named_at));
         }
     }
@@ -369,6 +408,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         activities: draft.activities,
         configurations,
         coordinator: joined.coordinator,
+        programs,
         first: joined.first,
         beside: joined.beside,
         monitors,

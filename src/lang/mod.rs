@@ -13,6 +13,7 @@ mod lua;
 mod params;
 pub mod print;
 mod tree;
+mod trusted;
 mod words;
 mod yaml;
 

@@ -130,6 +130,10 @@ codes! {
         "Lua files describe a system and are read by every command, so they may not touch files, processes, the network \
          or the clock, load other code, or call functions that no budget can stop (patterns). Write the data down, or \
          give it as a parameter.";
+    LUA_HOST_MISSING = "lua::host_missing", "a model expects something from its host",
+        "A coordinator with functions uses a global name that neither it nor Davit defines. rFSM models often expect such \
+         names (`rtt`, `yarp`, a table of the application) from the program they were written for. Define them in a Lua \
+         file and name it under `host:` in the deployment, or with `--host`.";
     LUA_INSTRUCTIONS = "lua::instructions", "a Lua file runs too long",
         "A Lua file may take a fixed number of instructions and a fixed time, far more than any list of changes needs. \
          This one took more: most likely a loop that does not end. Protected calls and coroutines do not lift the \
@@ -379,9 +383,14 @@ codes! {
         "The coordinator does not come to rest",
         "After an event a coordinator takes transitions until nothing is left to do. This one went on past the bound, and what it was doing was stopped there; it goes on with the next event. Completion events or time events lead round in a circle: look at the states named and let one transition wait for another event.";
     CHART_FUNCTION = "chart::function", "a coordinator contains a function",
-        "Guards, actions and activities written as Lua functions need `trusted: true` and come in a later version; what \
-         they do could not be verified. A pure coordinator raises names of events where rFSM has functions: the work is \
-         done by components, conditions are watched by monitors, switches are made by configurations.";
+        "Guards, actions and activities written as Lua functions run only in a coordinator that the deployment trusts \
+         (`trusted: true`), because what they do cannot be verified. A pure coordinator raises names of events where rFSM \
+         has functions: the work is done by components, conditions are watched by monitors, switches are made by \
+         configurations.";
+    FUNCTIONS_NOT_OPENED = "functions::not_opened", "a coordinator's functions cannot be run",
+        "A coordinator with functions is run twice: when it is read, and where its functions are to be called. The second \
+         time it failed, or it made another chart than the one that was checked. What a coordinator's file makes must not \
+         depend on the time, on chance or on files that change.";
     CHART_UNNAMED = "chart::unnamed", "a state has no name",
         "A state inside a state is written `name = state { … }`: transitions refer to it by that name. Without one it \
          could never be entered.";

@@ -5,9 +5,11 @@ use super::configuration::Configuration;
 use super::finding::Origin;
 use super::monitor::Monitor;
 use super::names::{ConfigId, EventName, Ident};
+use super::program::Program;
 use super::statechart::Statechart;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A deployment file and all it names, lowered.
@@ -31,6 +33,8 @@ pub struct Deployment {
     pub first: Option<Ident>,
     /// Coordinators that run beside the first one.
     pub beside: Vec<Beside>,
+    /// The texts of coordinators that have functions, by the coordinators' names.
+    pub programs: BTreeMap<Ident, Arc<Program>>,
     /// Monitors in written order; names are unique.
     pub monitors: Vec<Monitor>,
     /// Events that leave the deployment.

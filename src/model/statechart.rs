@@ -91,6 +91,27 @@ impl State {
             })
     }
 
+    /// Visits the place of everything in it.
+    pub fn places(&mut self, visit: &mut impl FnMut(&mut Origin)) {
+        visit(&mut self.origin);
+        self.entry.iter_mut().chain(&mut self.exit).for_each(|(_, origin)| visit(origin));
+        self.config.iter_mut().for_each(|(_, origin)| visit(origin));
+        self.doo.iter_mut().for_each(|(_, origin)| visit(origin));
+        for transition in &mut self.transitions {
+            visit(&mut transition.origin);
+            transition.src.iter_mut().chain(&mut transition.tgt).for_each(|(_, origin)| visit(origin));
+            transition.events.iter_mut().for_each(|(_, origin)| visit(origin));
+            transition.guard.iter_mut().for_each(|(_, origin)| visit(origin));
+            transition.effect.iter_mut().for_each(|(_, origin)| visit(origin));
+        }
+        for child in &mut self.children {
+            match child {
+                Node::State(state) => state.places(visit),
+                Node::Connector(connector) => visit(&mut connector.origin),
+            }
+        }
+    }
+
     /// The child of that name.
     pub fn child(&self, name: &str) -> Option<&Node> {
         self.children.iter().find(|child| child.name().as_str() == name)
@@ -179,7 +200,11 @@ impl Transition {
     pub fn is_pure(&self) -> bool {
         self.guard.is_none()
             && self.effect.iter().all(|(action, _)| action.is_pure())
-            && self.events.iter().all(|(trigger, _)| !matches!(trigger, Trigger::Predicate(_)))
+            && self.events.iter().all(|(trigger, _)| match trigger {
+                Trigger::Predicate(_) => false,
+                Trigger::Timed(timed) => timed.by.is_none(),
+                Trigger::Event(_) => true,
+            })
     }
 }
 
@@ -227,6 +252,8 @@ pub struct Timed {
     /// What stands for the time in the event's name; the time as written where nothing else was given. No blanks, no
     /// comma, no parentheses.
     pub id: String,
+    /// A function that says the seconds instead, asked on every entry of the source.
+    pub by: Option<FunctionId>,
 }
 
 /// From when a time event counts.
@@ -277,7 +304,7 @@ impl Trigger {
 
     /// The time event of so many seconds, named by the shortest text of the number (`e_after(1)`, `e_after(0.5)`).
     pub fn timed(since: Since, seconds: f64) -> Self {
-        Self::Timed(Timed { since, seconds, id: seconds.to_string() })
+        Self::Timed(Timed { since, seconds, id: seconds.to_string(), by: None })
     }
 }
 
@@ -289,7 +316,7 @@ impl Timed {
         };
         let seconds: f64 = number.parse().ok().filter(|s: &f64| s.is_finite())?;
         let plain = |c: char| !c.is_whitespace() && !c.is_control() && !matches!(c, ',' | '(' | ')');
-        (!id.is_empty() && id.chars().all(plain)).then(|| Self { since, seconds, id: id.to_owned() })
+        (!id.is_empty() && id.chars().all(plain)).then(|| Self { since, seconds, id: id.to_owned(), by: None })
     }
 }
 

@@ -78,6 +78,13 @@ pub enum Happening {
         /// What.
         note: String,
     },
+    /// A function of the coordinator printed something, or failed.
+    Said {
+        /// By which printer: `err`, `warn`, `info` or `dbg`.
+        by: &'static str,
+        /// What.
+        text: String,
+    },
 }
 
 /// An answer with what led to it.

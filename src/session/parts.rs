@@ -7,6 +7,7 @@ use super::hub::Hub;
 use super::routes::{Junction, ToConfigurator, lock, scoped};
 use crate::configurator::Requester;
 use crate::coordinator::Coordinator;
+use crate::functions::Opener;
 use crate::model::{Deployment, EventName, Ident};
 use crate::statechart::{Chart, EventId, NodeId};
 use crate::time::Clock;
@@ -26,7 +27,7 @@ impl Part {
     /// Starts all coordinators of a deployment and makes them known to the junction.
     pub fn start_all(
         deployment: &Deployment,
-        charts: Vec<Arc<Chart>>,
+        charts: impl Iterator<Item = (Arc<Chart>, Option<Opener>)>,
         clock: &Clock,
         hub: &Arc<Hub>,
         junction: &Arc<Junction>,
@@ -36,7 +37,7 @@ impl Part {
         // None reacts before all are known: what the first one emits on its first entry must find the others.
         let mut known = lock(&junction.coordinators);
         let mut parts = Vec::new();
-        for (number, (name, chart)) in names.into_iter().zip(charts).enumerate() {
+        for (number, (name, (chart, functions))) in names.into_iter().zip(charts).enumerate() {
             let requester = Requester::Coordinator(name.into());
             let listener = ToConfigurator {
                 hub: hub.clone(),
@@ -46,7 +47,14 @@ impl Part {
                 scoped: scoped(&chart),
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
-            let coordinator = Coordinator::start(&thread, chart.clone(), clock, listener);
+            let coordinator = match functions {
+                None => Coordinator::start(&thread, chart.clone(), clock, listener),
+                Some(opener) => {
+                    let time = clock.clone();
+                    let open = move || opener.open(Some(time)).map_err(|failure| failure.to_string());
+                    Coordinator::start_with(&thread, chart.clone(), clock, listener, open)
+                }
+            };
             known.push((requester, coordinator.clone()));
             let (up, down, failed) = match number.checked_sub(1).map(|at| &deployment.beside[at]) {
                 None => (&deployment.deploy.up, &deployment.shutdown.down, &deployment.deploy.failed),

@@ -8,7 +8,7 @@ use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
 use crate::model::{EventName, Verdict};
 use crate::platform::PlatformEvent;
-use crate::statechart::{Chart, EventId, NodeId, RaiseSite, Raised, When};
+use crate::statechart::{Chart, EventId, NodeId, Printer, RaiseSite, Raised, Said, When};
 use rustc_hash::FxHashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
@@ -102,6 +102,16 @@ impl Listener for ToConfigurator {
     fn rested(&mut self) {
         // An event that moves nothing is written down nowhere: without this, who waits for "up" would not look again.
         self.hub.wake();
+    }
+
+    fn said(&mut self, said: &Said) {
+        let by = match said.by {
+            Printer::Err => "err",
+            Printer::Warn => "warn",
+            Printer::Info => "info",
+            Printer::Dbg => "dbg",
+        };
+        self.hub.note(Happening::Said { by, text: said.text.clone() });
     }
 
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {

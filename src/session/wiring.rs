@@ -10,6 +10,7 @@ use crate::configurator::{
     Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
 };
 use crate::coordinator::Incoming;
+use crate::functions::Opener;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
 use crate::platform::Platform;
@@ -24,6 +25,8 @@ pub struct Setup {
     pub deployment: Arc<Deployment>,
     /// Its coordinators, compiled, in the order of [`Deployment::coordinators`].
     pub charts: Vec<Arc<Chart>>,
+    /// The functions of each, where it has some; opened on its thread.
+    pub functions: Vec<Option<Opener>>,
     /// The component types it may use.
     pub catalogue: Catalogue,
     /// Where its components live.
@@ -51,7 +54,7 @@ pub struct Session {
 impl Session {
     /// Starts the threads of a deployment; nothing happens until it is brought up.
     pub fn start(setup: Setup) -> Arc<Self> {
-        let Setup { deployment, charts, catalogue, platform, clock } = setup;
+        let Setup { deployment, charts, functions, catalogue, platform, clock } = setup;
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
@@ -74,7 +77,7 @@ impl Session {
             },
         });
         *lock(&junction.configurator) = Some(configurator.clone());
-        let parts = Part::start_all(&deployment, charts, &clock, &hub, &junction);
+        let parts = Part::start_all(&deployment, charts.into_iter().zip(functions), &clock, &hub, &junction);
         {
             let (hub, junction) = (hub.clone(), junction.clone());
             platform.subscribe(Arc::new(move |event| on_platform(&hub, &junction, &event)));

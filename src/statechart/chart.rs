@@ -43,6 +43,27 @@ impl EventId {
     /// The event of the first entry, when no transition lists it.
     pub(super) const INIT: Self = Self(u32::MAX - 1);
     const DONE: u32 = 1 << 31;
+    const STRANGE: u32 = 1 << 30;
+
+    /// An event that no transition lists and that a [`Hook`](super::Hook) remembers under `number` (less than 2^30).
+    pub fn strange(number: u32) -> Self {
+        Self(Self::STRANGE | number)
+    }
+
+    /// The number under which a hook remembers it.
+    pub fn as_strange(self) -> Option<u32> {
+        (self.0 < Self::DONE && self.0 & Self::STRANGE != 0).then_some(self.0 & !Self::STRANGE)
+    }
+
+    /// Its place in [`Chart::events`], when some transition lists it.
+    pub fn listed(self) -> Option<usize> {
+        (self.0 < Self::STRANGE).then_some(self.0 as usize)
+    }
+
+    /// The leaf whose completion it is, when no transition lists that.
+    pub fn as_completion(self) -> Option<NodeId> {
+        (self.0 & Self::DONE != 0 && self < Self::INIT).then_some(NodeId(self.0 & !Self::DONE))
+    }
 
     /// The completion of `leaf`, when no transition lists it.
     pub(super) fn done(leaf: u32) -> Self {
@@ -131,6 +152,8 @@ pub(super) struct Timer {
     pub relative: bool,
     /// Fires when more nanoseconds than this have passed.
     pub nanos: i64,
+    /// Says the time, on every entry, in place of `nanos`.
+    pub by: Option<FunctionId>,
     pub event: EventId,
 }
 
@@ -313,6 +336,16 @@ impl Chart {
         (!row.null).then(|| row.events.of(&self.triggers))
     }
 
+    /// The activity of a leaf, when it has one.
+    pub fn doo(&self, leaf: NodeId) -> Option<FunctionId> {
+        self.nodes[leaf.index()].doo
+    }
+
+    /// The event of the first entry.
+    pub fn init_event(&self) -> EventId {
+        self.init
+    }
+
     /// Whether a function of the model decides over a transition (a guard or a predicate).
     pub fn is_guarded(&self, edge: EdgeId) -> bool {
         let row = &self.edges[edge.index()];
@@ -349,6 +382,7 @@ impl Chart {
         match event {
             EventId::OTHER => "other".to_owned(),
             EventId::INIT => "e_init_fsm".to_owned(),
+            event if event.as_strange().is_some() => "other".to_owned(),
             EventId(id) if id & EventId::DONE != 0 => format!("e_done@{}", self.fqn(NodeId(id & !EventId::DONE))),
             EventId(id) => self.events[id as usize].to_string(),
         }

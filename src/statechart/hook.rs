@@ -70,6 +70,31 @@ pub trait Hook {
     /// [`exited`](Self::exited), [`taking`](Self::taking) or [`conflict`](Self::conflict). If not (and if it has no hand in
     /// single turns), whole reactions that are known beforehand are taken at once.
     const WATCHES: bool = true;
+    /// The event that `name` means; a hook may remember names that the chart does not know.
+    fn event(&mut self, chart: &Chart, name: EventName) -> EventId {
+        chart.event(name)
+    }
+
+    /// The text of an event that this hook may have remembered.
+    fn event_text(&self, chart: &Chart, event: EventId) -> String {
+        chart.event_text(event)
+    }
+
+    /// The seconds of a time event whose time a function says; asked on every entry of `state`. None: it never comes.
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+        let _ = (function, state, view);
+        None
+    }
+
+    /// Moves what functions said since the last time to the end of `said`.
+    fn said(&mut self, said: &mut Vec<Said>) {
+        let _ = said;
+    }
+
+    /// Whether turns are to be taken now and then even when no event waits: the model asks outside for events.
+    fn polls(&self) -> bool {
+        false
+    }
 
     /// A state is active now; its entry actions follow.
     fn entered(&mut self, chart: &Chart, state: NodeId) {
@@ -152,6 +177,134 @@ pub trait Hook {
     /// A chain of connectors went round in a circle, held by no guard; no path was found there.
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
         let _ = (chart, connector);
+    }
+}
+
+/// What a function of a model prints, or what it did wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Said {
+    /// By which of the four printers.
+    pub by: Printer,
+    /// One line or more.
+    pub text: String,
+}
+
+/// rFSM's four printers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Printer {
+    /// Errors, among them those that functions raise.
+    Err,
+    /// Warnings.
+    Warn,
+    /// All else.
+    Info,
+    /// For those who look for a fault.
+    Dbg,
+}
+
+/// Functions with somebody who watches: `watcher` sees what happens, `functions` decide and act.
+#[derive(Debug)]
+pub struct Watched<'a, W, F> {
+    /// Sees what happens.
+    pub watcher: &'a mut W,
+    /// The functions of the model.
+    pub functions: &'a mut F,
+}
+
+impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
+    const TURNS: bool = W::TURNS || F::TURNS;
+    const WATCHES: bool = W::WATCHES || F::WATCHES;
+
+    fn event(&mut self, chart: &Chart, name: EventName) -> EventId {
+        self.functions.event(chart, name)
+    }
+
+    fn event_text(&self, chart: &Chart, event: EventId) -> String {
+        self.functions.event_text(chart, event)
+    }
+
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+        self.functions.seconds(function, state, view)
+    }
+
+    fn said(&mut self, said: &mut Vec<Said>) {
+        self.functions.said(said);
+    }
+
+    fn polls(&self) -> bool {
+        self.functions.polls()
+    }
+
+    fn entered(&mut self, chart: &Chart, state: NodeId) {
+        self.watcher.entered(chart, state);
+        self.functions.entered(chart, state);
+    }
+
+    fn exited(&mut self, chart: &Chart, state: NodeId) {
+        self.watcher.exited(chart, state);
+        self.functions.exited(chart, state);
+    }
+
+    fn taking(&mut self, chart: &Chart, edge: EdgeId) {
+        self.watcher.taking(chart, edge);
+        self.functions.taking(chart, edge);
+    }
+
+    fn raised(&mut self, chart: &Chart, raised: Raised) {
+        self.watcher.raised(chart, raised);
+        self.functions.raised(chart, raised);
+    }
+
+    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
+        let ways: Vec<EdgeId> = ways.collect();
+        self.watcher.conflict(chart, connector, &mut ways.iter().copied());
+        self.functions.conflict(chart, connector, &mut ways.iter().copied());
+    }
+
+    fn not_entered(&mut self, chart: &Chart) {
+        self.watcher.not_entered(chart);
+        self.functions.not_entered(chart);
+    }
+
+    fn poll(&mut self, queue: &mut Queue) {
+        self.functions.poll(queue);
+    }
+
+    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
+        self.functions.before_step(view, added);
+    }
+
+    fn after_step(&mut self, view: &mut View<'_>) {
+        self.functions.after_step(view);
+    }
+
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+        self.functions.guard(function, edge, view)
+    }
+
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+        self.functions.predicate(function, event, view)
+    }
+
+    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+        self.functions.action(function, place, view);
+    }
+
+    fn doo_reset(&mut self, state: NodeId) {
+        self.functions.doo_reset(state);
+    }
+
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+        self.functions.doo(function, state, view)
+    }
+
+    fn go_on(&mut self) -> bool {
+        self.functions.go_on()
+    }
+
+    fn runaway(&mut self, chart: &Chart, connector: NodeId) {
+        self.watcher.runaway(chart, connector);
+        self.functions.runaway(chart, connector);
     }
 }
 

@@ -22,10 +22,21 @@ pub struct Machine {
     added: Vec<EventId>,
     /// By node: how often it was entered.
     pub(super) visits: Vec<u32>,
-    /// By time event: when its state was entered, and whether it was raised since.
-    timers: Vec<(Time, bool)>,
+    /// By time event.
+    timers: Vec<Armed>,
     pub(super) search: Search,
     chain: Vec<NodeId>,
+}
+
+/// A time event of one visit.
+#[derive(Debug, Clone, Copy)]
+struct Armed {
+    /// When its state was entered.
+    entered: Time,
+    /// Fires when more nanoseconds than this have passed.
+    nanos: i64,
+    /// It was, in this visit; or it never is.
+    raised: bool,
 }
 
 impl Machine {
@@ -40,7 +51,11 @@ impl Machine {
             events: Vec::with_capacity(limits::CHART_QUEUE),
             added: Vec::new(),
             visits: vec![0; chart.nodes.len()],
-            timers: vec![(Time::default(), false); chart.timers.len()],
+            timers: chart
+                .timers
+                .iter()
+                .map(|timer| Armed { entered: Time::default(), nanos: timer.nanos, raised: false })
+                .collect(),
             search: Search::new(chart),
             chain: Vec::with_capacity(depth),
         };
@@ -54,6 +69,15 @@ impl Machine {
         self.leaf = None;
         self.queue.events.clear();
         self.queue.push(chart.init);
+    }
+
+    /// Leaves all active states, innermost first, with their exit actions; the chart is to be entered anew after
+    /// [`reset`](Self::reset).
+    pub fn leave(&mut self, chart: &Chart, hook: &mut impl Hook) {
+        while !self.path.is_empty() {
+            self.exit(chart, NodeId::ROOT, hook);
+        }
+        self.leaf = None;
     }
 
     /// Queues an event; `false`: the queue is full, and the event is dropped and counted.
@@ -119,7 +143,7 @@ impl Machine {
         while let Some(node) = at {
             self.path.push(node);
             self.visits[node.index()] += 1;
-            self.restart_timer(chart, node, now);
+            self.restart_timer(chart, node, now, &mut Nobody);
             at = chart.parent(node);
         }
         self.path.reverse();
@@ -143,8 +167,9 @@ impl Machine {
         let due = |node: &NodeId| {
             let index = chart.nodes[node.index()].timer;
             let timer = chart.timers.get(index as usize)?;
-            let (entered, raised) = self.timers[index as usize];
-            (!raised).then(|| first_after(if timer.relative { entered } else { Time::default() }, timer.nanos))
+            let armed = self.timers[index as usize];
+            (!armed.raised)
+                .then(|| first_after(if timer.relative { armed.entered } else { Time::default() }, armed.nanos))
         };
         self.path.iter().filter_map(due).min()
     }
@@ -399,7 +424,7 @@ impl Machine {
     fn enter(&mut self, chart: &Chart, state: NodeId, now: Time, hook: &mut impl Hook) {
         self.path.push(state);
         self.visits[state.index()] = self.visits[state.index()].wrapping_add(1);
-        self.restart_timer(chart, state, now);
+        self.restart_timer(chart, state, now, hook);
         hook.entered(chart, state);
         let row = &chart.nodes[state.index()];
         self.act(chart, row.entry, Place::Entry(state), state, hook);
@@ -426,10 +451,18 @@ impl Machine {
         }
     }
 
-    pub(super) fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time) {
-        if let Some(timer) = self.timers.get_mut(chart.nodes[state.index()].timer as usize) {
-            *timer = (now, false);
+    pub(super) fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time, hook: &mut impl Hook) {
+        let index = chart.nodes[state.index()].timer as usize;
+        let Some(timer) = chart.timers.get(index) else { return };
+        let mut armed = Armed { entered: now, nanos: timer.nanos, raised: false };
+        if let Some(function) = timer.by {
+            let seconds = hook.seconds(function, state, &mut self.view(chart)).filter(|s| !s.is_nan());
+            armed.raised = seconds.is_none();
+            #[allow(clippy::cast_possible_truncation)] // saturates: 292 years
+            let nanos = (seconds.unwrap_or_default() * 1e9).round() as i64;
+            armed.nanos = nanos;
         }
+        self.timers[index] = armed;
     }
 
     /// After a turn: time events of the active states that are due, from the leaf outwards, each once a visit. What is
@@ -441,10 +474,10 @@ impl Machine {
         for node in self.path.iter().rev() {
             let index = chart.nodes[node.index()].timer;
             let Some(timer) = chart.timers.get(index as usize) else { continue };
-            let (entered, raised) = &mut self.timers[index as usize];
-            let since = if timer.relative { *entered } else { Time::default() };
-            if !*raised && now >= first_after(since, timer.nanos) {
-                *raised = true;
+            let armed = &mut self.timers[index as usize];
+            let since = if timer.relative { armed.entered } else { Time::default() };
+            if !armed.raised && now >= first_after(since, armed.nanos) {
+                armed.raised = true;
                 self.queue.push(timer.event);
             }
         }

@@ -24,7 +24,7 @@ mod sim;
 
 pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
 pub use compile::compile;
-pub use hook::{Doo, Hook, Nobody, Place, Raised, View};
+pub use hook::{Doo, Hook, Nobody, Place, Printer, Raised, Said, View, Watched};
 pub use machine::Machine;
 pub use outcome::{Ended, Mode, Step, Stepped};
 pub use queue::Queue;

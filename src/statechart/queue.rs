@@ -26,6 +26,11 @@ impl Queue {
         room
     }
 
+    /// How many more it takes.
+    pub fn room(&self) -> usize {
+        limits::CHART_QUEUE.saturating_sub(self.events.len())
+    }
+
     /// The events, oldest first.
     pub fn events(&self) -> &[EventId] {
         &self.events

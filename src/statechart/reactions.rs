@@ -8,7 +8,7 @@
 
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NodeId, Span};
-use super::hook::{Hook, Raised};
+use super::hook::{Hook, Nobody, Raised};
 use super::machine::Machine;
 use super::outcome::{Ended, Mode, Step, Stepped};
 use crate::limits;
@@ -89,7 +89,7 @@ impl Machine {
     #[cold]
     fn time_after(&mut self, chart: &Chart, row: Reaction, now: Time) -> AtOnce {
         for state in row.entered.of(&chart.reactions.entered) {
-            self.restart_timer(chart, *state, now);
+            self.restart_timer(chart, *state, now, &mut Nobody);
         }
         self.queue.push(chart.nodes[row.leaf.index()].done);
         self.check_timers(chart, now);

@@ -2,7 +2,7 @@
 
 use super::Machine;
 use super::chart::{Chart, NodeId};
-use super::hook::{Hook, Raised};
+use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
 use super::outcome::{Ended, Mode, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
@@ -45,16 +45,29 @@ pub enum SimError {
 
 /// A machine that is stepped by lines of text, on a clock of its own.
 #[derive(Debug, Clone)]
-pub struct Sim<'c> {
+pub struct Sim<'c, F = Nobody> {
     chart: &'c Chart,
     machine: Machine,
     now: Time,
+    functions: F,
 }
 
 impl<'c> Sim<'c> {
     /// A machine not yet entered, at time 0.
     pub fn new(chart: &'c Chart) -> Self {
-        Self { chart, machine: Machine::new(chart), now: Time::default() }
+        Self::with(chart, Nobody)
+    }
+}
+
+impl<'c, F: Hook> Sim<'c, F> {
+    /// The same, with the functions of the model.
+    pub fn with(chart: &'c Chart, functions: F) -> Self {
+        Self { chart, machine: Machine::new(chart), now: Time::default(), functions }
+    }
+
+    /// The chart.
+    pub fn chart(&self) -> &'c Chart {
+        self.chart
     }
 
     /// The machine.
@@ -76,8 +89,12 @@ impl<'c> Sim<'c> {
     pub fn line(&mut self, line: &str) -> Result<Observation, SimError> {
         let words: Vec<&str> = line.split_whitespace().collect();
         let mut trace = Trace::default();
+        let mut lost = 0;
         let stepped = match words[..] {
-            ["run"] => self.machine.run(self.chart, self.now, &mut trace),
+            ["run"] => {
+                let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
+                self.machine.run(self.chart, self.now, &mut hook)
+            }
             ["advance", ..] => {
                 let seconds = match words[1..] {
                     [number] => number.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0),
@@ -87,33 +104,46 @@ impl<'c> Sim<'c> {
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // finite, not negative; saturates
                 let nanos = (seconds * 1e9).round() as u64;
                 self.now += Duration::from_nanos(nanos);
-                self.machine.step(self.chart, self.now, 1, &mut trace)
+                let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
+                self.machine.step(self.chart, self.now, 1, &mut hook)
             }
             _ => {
-                let events: Vec<EventId> = words
-                    .iter()
-                    .map(|word| EventName::new(word).map(|name| self.chart.event(name)))
-                    .collect::<Result<_, _>>()?;
-                let lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
-                if lost > 0 {
-                    trace
-                        .notes
-                        .push(format!("{lost} events found no room: a set holds at most {}", limits::CHART_QUEUE));
-                }
-                self.machine.step(self.chart, self.now, 1, &mut trace)
+                let names: Vec<EventName> = words.iter().map(|word| EventName::new(word)).collect::<Result<_, _>>()?;
+                let events: Vec<EventId> =
+                    names.into_iter().map(|name| self.functions.event(self.chart, name)).collect();
+                lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
+                let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
+                self.machine.step(self.chart, self.now, 1, &mut hook)
             }
         };
+        if lost > 0 {
+            let most = limits::CHART_QUEUE;
+            trace.notes.push(format!("{lost} events found no room: a set holds at most {most}"));
+        }
         Ok(self.observe(stepped, trace))
     }
 
-    fn observe(&self, stepped: Stepped, mut trace: Trace) -> Observation {
+    fn observe(&mut self, stepped: Stepped, mut trace: Trace) -> Observation {
+        let mut said = Vec::new();
+        self.functions.said(&mut said);
+        trace.notes.extend(said.into_iter().map(|Said { by, text }| match by {
+            Printer::Err => format!("error: {text}"),
+            Printer::Warn => format!("warning: {text}"),
+            Printer::Info | Printer::Dbg => text,
+        }));
         if stepped.ended == Ended::Endless {
             trace.notes.push(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
         }
         Observation {
             active: self.machine.active().iter().map(|node| self.chart.fqn(*node).to_string()).collect(),
             mode: self.machine.mode(),
-            queue: self.machine.queue().events().iter().map(|event| self.chart.event_text(*event)).collect(),
+            queue: self
+                .machine
+                .queue()
+                .events()
+                .iter()
+                .map(|event| self.functions.event_text(self.chart, *event))
+                .collect(),
             actions: trace.actions,
             transition: stepped.transition,
             idle: stepped.idle,

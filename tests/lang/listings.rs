@@ -9,7 +9,7 @@ const LISTING_1: &str = include_str!("../paper/listing_1_sample_configuration.lu
 const LISTING_2: &str = include_str!("../paper/listing_2_youbot_sample.lua");
 
 fn options() -> LoadOptions {
-    LoadOptions { set: vec![("arg1".into(), "1".into()), ("arg2".into(), "two".into())] }
+    LoadOptions { set: vec![("arg1".into(), "1".into()), ("arg2".into(), "two".into())], ..LoadOptions::default() }
 }
 
 #[test]
@@ -84,8 +84,11 @@ fn parameters_come_from_with_and_set() {
         }
     };
     assert_eq!(value(&LoadOptions::default()), Value::Float(0.5));
-    assert_eq!(value(&LoadOptions { set: vec![("gains.slow".into(), "0.75".into())] }), Value::Float(0.75));
-    let typo = load(&files, &LoadOptions { set: vec![("gain.slow".into(), "0.75".into())] });
+    assert_eq!(
+        value(&LoadOptions { set: vec![("gains.slow".into(), "0.75".into())], ..LoadOptions::default() }),
+        Value::Float(0.75)
+    );
+    let typo = load(&files, &LoadOptions { set: vec![("gain.slow".into(), "0.75".into())], ..LoadOptions::default() });
     assert_eq!(codes(&typo), ["text::unknown_parameter 1:1"]);
     assert!(typo.findings[0].help.as_ref().unwrap().contains("`gains`"));
 }

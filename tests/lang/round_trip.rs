@@ -404,6 +404,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                     |(name, chart, up, failed, down)| Beside { name, chart, up, failed, down, origin: Origin::NONE };
                 named.map(made).collect()
             },
+            programs: BTreeMap::new(),
             monitors,
             emits: emits.into_iter().map(|event| (event, Origin::NONE)).collect(),
             deploy,

@@ -244,8 +244,9 @@ fn function(cx: &mut Cx, node: &Node, what: &str) {
         cx.wrong(node, what, "a function", "the name of an event under `entry`, `exit` or `effect`");
         return;
     }
-    let message = format!("{what} is a function, and this version runs pure coordinators only");
+    let message = format!("{what} is a function, and a coordinator that is not trusted must be pure");
     cx.report(Finding::error(codes::CHART_FUNCTION, message).at(node.origin).labelled("in this one").help(
-        "raise the name of an event instead (`entry = \"e_ready\"`), and let a component or a monitor do the work",
+        "write `trusted: true` in the deployment to let it run, or raise the name of an event instead \
+         (`entry = \"e_ready\"`) and let a component or a monitor do the work",
     ));
 }

@@ -3,7 +3,10 @@
 use super::beside::{self, Fall, Rise};
 use super::{Unit, choice, name, one_or_more, text, time, types, whole};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::{Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Origin, codes};
+use crate::model::finding::did_you_mean;
+use crate::model::{
+    Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Openings, Origin, codes,
+};
 use std::collections::BTreeMap;
 
 /// A deployment file, before the files that it names are read.
@@ -24,6 +27,10 @@ pub struct Draft {
     pub coordinators: Vec<(Option<Ident>, String, Origin)>,
     /// `monitors`: paths and where they are named.
     pub monitors: Vec<(String, Origin)>,
+    /// `trusted`: the coordinators may have functions, and this is open to them.
+    pub trusted: Option<Openings>,
+    /// `host`: Lua files that stand in for the coordinators' host, and where they are named.
+    pub host: Vec<(String, Origin)>,
     /// `with`: parameters of the Lua files.
     pub with: Vec<Entry>,
     /// `emits`
@@ -100,6 +107,13 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         .map(|node| files(cx, node, "`configurations`", "configurations: [configurations.lua]"));
     let coordinators = beside::coordinators(cx, &mut fields);
     let monitors = fields.take("monitors").map(|node| files(cx, node, "`monitors`", "monitors: [monitors.lua]"));
+    let trusted = fields.take("trusted").and_then(|node| trusted(cx, node));
+    let host_key = fields.take_entry("host");
+    if let (None, Some(entry)) = (trusted, &host_key) {
+        let finding = Finding::error(codes::TEXT_BAD_VALUE, "`host` is given to coordinators that are not trusted");
+        cx.report(finding.at(entry.origin).help("write `trusted: true` beside it, or leave it out"));
+    }
+    let host = host_key.map(|entry| files(cx, entry.value, "`host`", "host: [robot.lua]")).unwrap_or_default();
     let with = match fields.take("with") {
         None => Vec::new(),
         Some(Node { kind: Kind::Map(entries), .. }) => entries,
@@ -125,6 +139,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         configurations,
         coordinators,
         monitors: monitors.unwrap_or_default(),
+        trusted,
+        host,
         with,
         emits,
         deploy,
@@ -154,6 +170,29 @@ fn files(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(String, Ori
         out.push((path, node.origin));
     }
     out
+}
+
+/// `trusted: true`, or `trusted: { open: [io] }`.
+fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
+    const EXAMPLE: &str = "trusted: { open: [io, os] }";
+    if let Kind::Bool(yes) = node.kind {
+        return yes.then(Openings::default);
+    }
+    let mut fields = Fields::of(cx, node, "`trusted`", "trusted: true")?;
+    let mut out = Openings::default();
+    for node in fields.take("open").map(one_or_more).unwrap_or_default() {
+        let Some(text) = text(cx, &node, "`open`", EXAMPLE) else { continue };
+        match text.as_str() {
+            "io" => out.io = true,
+            "os" => out.os = true,
+            other => {
+                let finding = Finding::error(codes::TEXT_BAD_VALUE, format!("`{other}` cannot be opened"));
+                cx.report(finding.at(node.origin).help(did_you_mean(other, "libraries", Openings::NAMES)));
+            }
+        }
+    }
+    fields.finish(cx);
+    Some(out)
 }
 
 fn emits(cx: &mut Cx, node: Node) -> Vec<(EventName, Origin)> {

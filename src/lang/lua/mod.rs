@@ -4,10 +4,12 @@
 
 mod constructors;
 mod convert;
+mod loading;
 mod monitors;
 mod recorder;
 mod sandbox;
 
+use super::files::Sources;
 use super::params::Params;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::limits;
@@ -16,6 +18,7 @@ use mlua::chunk::ChunkMode;
 use mlua::{LuaOptions, StdLib};
 use recorder::{Recorder, Shared};
 use std::cell::RefCell;
+use std::path::PathBuf;
 use std::rc::Rc;
 
 /// What a Lua file made.
@@ -28,16 +31,26 @@ pub struct Made {
     pub monitors: Option<Node>,
 }
 
+/// Where files that a file loads (`rfsm.load`) are looked for.
+#[derive(Debug, Clone)]
+pub struct Loads {
+    /// The set of files.
+    pub from: Sources,
+    /// The folder of the file that loads them.
+    pub folder: PathBuf,
+}
+
 /// Runs the text of `reading`'s file. `stem` names a configuration that stands alone without a name. None, with
 /// findings, when the file does not parse, fails, or exceeds a budget.
-pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str) -> Option<Made> {
+pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, loads: Option<Loads>) -> Option<Made> {
     let text = cx.sources.file(reading.file).text.clone();
     if text.starts_with('\u{1b}') {
         let finding = Finding::error(codes::LUA_BYTECODE, "this is compiled Lua").at(reading.whole);
         cx.refuse(finding.help("only texts are read: give the source file"));
         return None;
     }
-    let recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
+    let mut recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
+    recorder.loads = loads;
     let shared: Shared = Rc::new(RefCell::new(recorder));
     let outcome = run(&shared, &text);
     let mut recorder = std::mem::replace(&mut *shared.borrow_mut(), Recorder::empty(reading));
@@ -73,18 +86,9 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
     let env = sandbox::environment(&lua, shared)?;
     constructors::install(&lua, &env, shared)?;
     monitors::install(&lua, &env, shared)?;
+    loading::install(&lua, &env, shared)?;
     sandbox::start_budget(&lua, shared)?;
-    // A first line `#!…` is blanked and not cut: lines keep their numbers.
-    let text = if text.starts_with('#') {
-        text.split_once('\n').map_or("", |_| &text[text.find('\n').unwrap_or(0)..])
-    } else {
-        text
-    };
-    let chunk = lua.load(text).set_name("=davit").set_mode(ChunkMode::Text).set_environment(env);
-    // Not `eval`, which tries the text as an expression first: a file never is one.
-    shared.borrow_mut().parsing = true;
-    let function = chunk.into_function()?;
-    shared.borrow_mut().parsing = false;
+    let function = chunk(&lua, shared, text, env)?;
     let returned: mlua::Value = function.call(())?;
     lua.remove_global_hook();
     lua.remove_hook();
@@ -93,6 +97,22 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
     }
     let origin = shared.borrow().reading.whole;
     Ok(Some(convert::node(shared, &returned, origin)))
+}
+
+/// A text as a function of Lua.
+fn chunk(lua: &mlua::Lua, shared: &Shared, text: &str, env: mlua::Table) -> mlua::Result<mlua::Function> {
+    // A first line `#!…` is blanked and not cut: lines keep their numbers.
+    let text = if text.starts_with('#') {
+        text.split_once('\n').map_or("", |_| &text[text.find('\n').unwrap_or(0)..])
+    } else {
+        text
+    };
+    let chunk = lua.load(text).set_name("=davit").set_mode(ChunkMode::Text).set_environment(env);
+    // Not `eval`, which tries the text as an expression first: a file never is one.
+    let before = std::mem::replace(&mut shared.borrow_mut().parsing, true);
+    let function = chunk.into_function()?;
+    shared.borrow_mut().parsing = before;
+    Ok(function)
 }
 
 impl Recorder {

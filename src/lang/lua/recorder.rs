@@ -57,6 +57,10 @@ pub struct Recorder {
     pub undefined: FxHashSet<String>,
     /// Whether the text is being parsed, not run.
     pub parsing: bool,
+    /// Where files that it loads are; none: it may not load any.
+    pub loads: Option<super::Loads>,
+    /// How many files are being run inside each other.
+    pub level: usize,
     /// Calls so far on the current line, by constructor.
     line: u32,
     on_line: Vec<(&'static str, u32)>,
@@ -75,6 +79,8 @@ impl Recorder {
             exhausted: None,
             undefined: FxHashSet::default(),
             parsing: false,
+            loads: None,
+            level: 0,
             line: 0,
             on_line: Vec::new(),
         }

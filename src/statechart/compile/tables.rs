@@ -115,7 +115,7 @@ impl Builder<'_> {
                 }
                 #[allow(clippy::cast_possible_truncation)] // saturates: 292 years
                 let nanos = (timed.seconds * 1e9).round() as i64;
-                let timer = Timer { relative: timed.since == Since::Entry, nanos, event };
+                let timer = Timer { relative: timed.since == Since::Entry, nanos, by: timed.by, event };
                 match timer_of.get(&src).map(|at| &mut timers[*at]) {
                     None => {
                         timer_of.insert(src, timers.len());

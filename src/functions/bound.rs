@@ -1,0 +1,347 @@
+//! A machine with its tables: which function, state and transition of the chart is which in Lua, and what each event is.
+
+use super::budget::{Budget, message_of};
+use super::host::{Host, Voice};
+use super::lower::{self, Lowered};
+use crate::limits;
+use crate::model::{Finding, Origin, Severity};
+use crate::statechart::{Chart, EventId, Kind, Machine, NodeId, Printer, View, compile};
+use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
+use rustc_hash::FxHashMap;
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+/// Strange events remembered at once: more than a queue, a step and the call in between can hold.
+const STRANGE: usize = 4 * limits::CHART_QUEUE;
+
+/// What a call may see of the machine, and what it sends.
+#[derive(Debug, Default)]
+pub struct Status {
+    pub active: Vec<NodeId>,
+    pub leaf: Option<NodeId>,
+    /// How many events wait, and how many more would find room.
+    pub waiting: usize,
+    pub room: usize,
+    pub outbox: Vec<EventId>,
+    /// Whether the activity of the active leaf is through.
+    pub through: bool,
+}
+
+/// A machine's tables.
+pub struct Bound {
+    pub budget: Rc<Budget>,
+    pub voice: Rc<Voice>,
+    pub chart: Rc<Chart>,
+    /// As written, for comparing two runs of one text.
+    pub written: crate::model::Statechart,
+    pub fsm: Table,
+    /// By node: states and connectors.
+    pub nodes: Vec<Value>,
+    /// By transition.
+    pub edges: Vec<Value>,
+    /// By number.
+    pub functions: Vec<Function>,
+    pub node_of: FxHashMap<usize, NodeId>,
+    /// By number in the chart: what a listed event is in Lua.
+    listed: Vec<Value>,
+    /// By node: the completion's text.
+    done: Vec<Value>,
+    init: Value,
+    known: FxHashMap<Box<[u8]>, EventId>,
+    /// Values of events that are no texts → number in `listed`, 1-based.
+    odd: Table,
+    strange: RefCell<Vec<Value>>,
+    strange_next: Cell<usize>,
+    pub status: RefCell<Status>,
+    pub thread: RefCell<Option<Thread>>,
+    /// The events of this step as the functions get them.
+    pub events: RefCell<Option<Table>>,
+    /// Words that functions are called with.
+    pub words: Words,
+    /// What a step hook raised: ends a step of an inner machine.
+    pub failed: RefCell<Option<mlua::Error>>,
+    /// Stepped by Davit, not by Lua.
+    pub driven: Cell<bool>,
+    /// The machine of one that is stepped by Lua; none while it is being stepped.
+    pub machine: RefCell<Option<Machine>>,
+    /// `getevents` was given by the model.
+    pub polls: bool,
+    pub idle_hook: bool,
+}
+
+/// Words that functions are called with.
+pub struct Words {
+    pub entry: LuaString,
+    pub exit: LuaString,
+    pub effect: LuaString,
+    pub doo: LuaString,
+}
+
+/// Why a machine could not be made of its tables.
+pub enum Refused {
+    Lua(mlua::Error),
+    Findings(Vec<Finding>),
+}
+
+impl From<mlua::Error> for Refused {
+    fn from(error: mlua::Error) -> Self {
+        Self::Lua(error)
+    }
+}
+
+impl Bound {
+    /// Compiles a machine's tables.
+    pub fn new(lua: &Lua, host: &Host, fsm: &Table) -> std::result::Result<Self, Refused> {
+        let list = lower::flat(&host.native, fsm)?;
+        let timed = host.native.raw_get("timed_class")?;
+        // A transition is known by its number; nothing else needs a place here.
+        let mut places = |_: Option<usize>, number: usize, word: &str| {
+            if word.is_empty() { Origin(u32::try_from(number).unwrap_or(0)) } else { Origin::NONE }
+        };
+        let Lowered { chart: written, functions, transitions, values, problems } =
+            lower::lower(&list, timed, &mut places)?;
+        if !problems.is_empty() {
+            let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
+            return Err(Refused::Findings(findings.collect()));
+        }
+        let (chart, findings) = compile(&written);
+        let Some(chart) = chart else {
+            return Err(Refused::Findings(findings.into_iter().filter(|f| f.severity == Severity::Error).collect()));
+        };
+        let (nodes, node_of) = nodes(&chart, fsm)?;
+        let mut by_number: FxHashMap<u32, Table> = FxHashMap::default();
+        let mut next = transitions.into_iter();
+        for number in 1..=list.raw_len() {
+            let row: Table = list.raw_get(number)?;
+            if row.raw_get::<LuaString>("what")? == "transition" {
+                by_number.extend(next.next().map(|table| (u32::try_from(number).unwrap_or(0), table)));
+            }
+        }
+        let mut edges = vec![Value::Nil; chart.edge_count()];
+        for node in chart.nodes() {
+            for edge in chart.outgoing(node) {
+                if let Some(table) = by_number.get(&chart.edge_origin(edge).0) {
+                    edges[edge.index()] = Value::Table(table.clone());
+                }
+            }
+        }
+        let mut known: FxHashMap<Box<[u8]>, EventId> = FxHashMap::default();
+        let (mut listed, odd) = (Vec::new(), lua.create_table()?);
+        let mut done = vec![Value::Nil; chart.len()];
+        for node in chart.nodes().filter(|node| chart.kind(*node) == Kind::Leaf) {
+            let text = format!("e_done@{}", chart.fqn(node));
+            known.insert(text.as_bytes().into(), chart.completion(node));
+            done[node.index()] = Value::String(lua.create_string(text)?);
+        }
+        known.insert((*b"e_init_fsm").into(), chart.init_event());
+        for (number, name) in chart.events().iter().enumerate() {
+            let value = values.iter().find(|(_, n)| n == name).map(|(value, _)| value.clone());
+            if value.is_none() {
+                known.insert(name.as_str().as_bytes().into(), chart.event(*name));
+            }
+            match &value {
+                Some(Value::String(text)) => {
+                    known.insert(text.as_bytes().as_ref().into(), chart.event(*name));
+                }
+                Some(odd_one) => odd.raw_set(odd_one.clone(), number + 1)?,
+                None => {}
+            }
+            listed.push(value.map_or_else(|| lua.create_string(name.as_str()).map(Value::String), Ok)?);
+        }
+        let given = |key: &str| -> Result<bool> { Ok(matches!(fsm.raw_get(key)?, Value::Function(_))) };
+        let polls = given("_polls")?;
+        let word = |text: &str| lua.create_string(text);
+        let machine = Machine::new(&chart);
+        Ok(Self {
+            budget: host.budget.clone(),
+            voice: host.voice.clone(),
+            written,
+            fsm: fsm.clone(),
+            nodes,
+            edges,
+            functions,
+            node_of,
+            listed,
+            done,
+            init: Value::String(word("e_init_fsm")?),
+            known,
+            odd,
+            strange: RefCell::default(),
+            strange_next: Cell::new(0),
+            status: RefCell::new(Status { room: limits::CHART_QUEUE, ..Status::default() }),
+            thread: RefCell::default(),
+            events: RefCell::default(),
+            words: Words { entry: word("entry")?, exit: word("exit")?, effect: word("effect")?, doo: word("doo")? },
+            failed: RefCell::default(),
+            driven: Cell::new(false),
+            machine: RefCell::new(Some(machine)),
+            polls,
+            idle_hook: given("idle_hook")?,
+            chart: Rc::new(chart),
+        })
+    }
+
+    /// What an event is in Lua.
+    pub fn value(&self, event: EventId) -> Value {
+        if let Some(number) = event.listed() {
+            return self.listed.get(number).cloned().unwrap_or(Value::Nil);
+        }
+        if let Some(number) = event.as_strange() {
+            return self.strange.borrow().get(number as usize).cloned().unwrap_or(Value::Nil);
+        }
+        if let Some(leaf) = event.as_completion() {
+            return self.done.get(leaf.index()).cloned().unwrap_or(Value::Nil);
+        }
+        if event == EventId::OTHER { Value::Nil } else { self.init.clone() }
+    }
+
+    /// The event that a Lua value is.
+    pub fn event(&self, value: Value) -> EventId {
+        match &value {
+            Value::String(text) => {
+                if let Some(event) = self.known.get(&*text.as_bytes()) {
+                    return *event;
+                }
+            }
+            // A number that is none equals nothing, not even itself.
+            Value::Number(v) if v.is_nan() => {}
+            other => {
+                if let Ok(Some(number)) = self.odd.raw_get::<Option<usize>>(other.clone())
+                    && let Some(event) = self.chart.events().get(number - 1)
+                {
+                    return self.chart.event(*event);
+                }
+            }
+        }
+        let mut strange = self.strange.borrow_mut();
+        let number = self.strange_next.get();
+        self.strange_next.set((number + 1) % STRANGE);
+        if number < strange.len() {
+            strange[number] = value;
+        } else {
+            strange.push(value);
+        }
+        EventId::strange(u32::try_from(number).unwrap_or(0))
+    }
+
+    /// Sends events to the machine from within a call.
+    pub fn send(&self, values: impl IntoIterator<Item = Value>) {
+        let mut lost = 0;
+        for value in values {
+            let room = {
+                let status = self.status.borrow();
+                status.outbox.len() < status.room
+            };
+            if !room {
+                lost += 1;
+                continue;
+            }
+            let event = self.event(value);
+            self.status.borrow_mut().outbox.push(event);
+        }
+        if lost > 0 {
+            let most = limits::CHART_QUEUE;
+            self.voice.say(Printer::Err, &format!("{lost} events found no room: at most {most} wait for a step"));
+        }
+    }
+
+    /// The events of the step that a view shows.
+    pub fn events(&self, lua: &Lua, view: &View<'_>) -> Result<Table> {
+        if let Some(table) = &*self.events.borrow() {
+            return Ok(table.clone());
+        }
+        let table = lua.create_table_with_capacity(view.events.len(), 0)?;
+        for event in view.events {
+            table.raw_push(self.value(*event))?;
+        }
+        *self.events.borrow_mut() = Some(table.clone());
+        Ok(table)
+    }
+
+    /// Makes a call that sees what `view` shows; what it sends goes into the view's queue.
+    pub fn calling<R>(&self, view: &mut View<'_>, call: impl FnOnce() -> Result<R>) -> Result<R> {
+        {
+            let mut status = self.status.borrow_mut();
+            status.leaf = view.leaf;
+            status.waiting = view.queue.events().len();
+            status.room = view.queue.room();
+        }
+        let outcome = self.budget.spend(limits::CALL_INSTRUCTIONS, call);
+        let mut status = self.status.borrow_mut();
+        for event in status.outbox.drain(..) {
+            view.queue.push(event);
+        }
+        outcome
+    }
+
+    /// Tells the model's `err` of an error: a tag, a text, and the message.
+    pub fn complain(&self, tag: &str, text: &str, error: &mlua::Error) {
+        let message = message_of(error);
+        let told = self.fsm.raw_get::<Value>("err").and_then(|printer| match printer {
+            Value::Function(err) => {
+                self.budget.spend(limits::CALL_INSTRUCTIONS, || err.call::<()>((tag, text, message.as_str())))
+            }
+            _ => Err(mlua::Error::runtime("no printer")),
+        });
+        if told.is_err() {
+            self.voice.say(Printer::Err, &format!("{tag} {text}{message}"));
+        }
+    }
+
+    /// A transition's text as rFSM writes it.
+    pub fn transition_text(&self, edge: usize) -> String {
+        let text = |tr: &Table| -> Result<String> {
+            let end = |key| -> Result<String> {
+                Ok(match tr.raw_get::<Value>(key)? {
+                    Value::Table(node) => node.raw_get::<Option<String>>("_fqn")?.unwrap_or_default(),
+                    other => other.to_string()?,
+                })
+            };
+            let pn = tr.raw_get::<Option<f64>>("pn")?.map(|pn| format!(", pn={pn}")).unwrap_or_default();
+            let mut events = Vec::new();
+            if let Value::Table(list) = tr.raw_get("events")? {
+                for event in list.sequence_values::<Value>() {
+                    events.push(event?.to_string()?);
+                }
+            }
+            let events = if events.is_empty() { "{}".to_owned() } else { events.join(", ") };
+            Ok(format!("T={{ src='{}', tgt='{}{pn}', events='{events}' }}", end("src")?, end("tgt")?))
+        };
+        match &self.edges[edge] {
+            Value::Table(tr) => text(tr).unwrap_or_default(),
+            _ => String::new(),
+        }
+    }
+
+    /// `active`, `done` or `inactive`.
+    pub fn mode(&self, node: NodeId) -> &'static str {
+        let status = self.status.borrow();
+        if !status.active.contains(&node) {
+            return "inactive";
+        }
+        let settled = self.chart.kind(node) == Kind::Leaf
+            && status.leaf == Some(node)
+            && (self.chart.doo(node).is_none() || status.through);
+        if settled { "done" } else { "active" }
+    }
+}
+
+/// The Lua tables of all nodes of a chart.
+fn nodes(chart: &Chart, fsm: &Table) -> Result<(Vec<Value>, FxHashMap<usize, NodeId>)> {
+    let mut values = vec![Value::Nil; chart.len()];
+    let mut node_of = FxHashMap::default();
+    for node in chart.nodes() {
+        let value = match chart.parent(node) {
+            None => Value::Table(fsm.clone()),
+            Some(parent) => match &values[parent.index()] {
+                Value::Table(parent) => parent.raw_get(chart.name(node).as_str())?,
+                _ => Value::Nil,
+            },
+        };
+        if let Value::Table(table) = &value {
+            node_of.insert(table.to_pointer() as usize, node);
+        }
+        values[node.index()] = value;
+    }
+    Ok((values, node_of))
+}

@@ -1,0 +1,294 @@
+//! The hook: how the engine calls a machine's functions, with what rFSM gives them.
+
+use super::bound::Bound;
+use super::host::Host;
+use crate::limits;
+use crate::model::EventName;
+use crate::model::statechart::FunctionId;
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printer, Queue, Said, View};
+use mlua::thread::ThreadStatus;
+use mlua::{Lua, Result, Table, Value};
+use std::rc::Rc;
+
+/// Calls the functions of one machine.
+pub struct Calls {
+    pub(super) lua: Lua,
+    pub(super) bound: Rc<Bound>,
+    /// What a coordinator's functions share; an inner machine's is held by the outermost one's.
+    pub(super) _host: Option<Rc<Host>>,
+}
+
+impl std::fmt::Debug for Calls {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Functions").field("count", &self.bound.functions.len()).finish()
+    }
+}
+
+impl Calls {
+    /// Calls a step hook with the step's events; answers the events it appended.
+    fn step_hook(&self, field: &str, view: &mut View<'_>, added: Option<&mut Vec<EventId>>) {
+        let bound = &self.bound;
+        let Ok(Value::Function(hook)) = bound.fsm.raw_get(field) else { return };
+        let before = view.events.len();
+        let outcome = bound.events(&self.lua, view).and_then(|events| {
+            bound.calling(view, || hook.call::<()>((&bound.fsm, &events)))?;
+            Ok(events)
+        });
+        match outcome {
+            Ok(events) => {
+                let Some(added) = added else { return };
+                let most = limits::CHART_QUEUE.saturating_sub(before);
+                for i in before + 1..=events.raw_len().min(before + most) {
+                    if let Ok(value) = events.raw_get::<Value>(i) {
+                        added.push(bound.event(value));
+                    }
+                }
+            }
+            // rFSM lets it end the step; who steps by himself is told, who is stepped reads of it.
+            Err(error) if bound.driven.get() => bound.complain("HOOK", &format!("error executing {field}: "), &error),
+            Err(error) => {
+                bound.failed.borrow_mut().get_or_insert(error);
+            }
+        }
+    }
+
+    fn guarded(&self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> Result<Value> {
+        let bound = &self.bound;
+        let events = bound.events(&self.lua, view)?;
+        bound.calling(view, || bound.functions[function.0 as usize].call((&bound.edges[edge.index()], events)))
+    }
+
+    fn resumed(&self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Result<Doo> {
+        let bound = &self.bound;
+        let thread = {
+            let mut kept = bound.thread.borrow_mut();
+            match &*kept {
+                Some(thread) => thread.clone(),
+                None => {
+                    let thread = self.lua.create_thread(bound.functions[function.0 as usize].clone())?;
+                    *kept = Some(thread.clone());
+                    thread
+                }
+            }
+        };
+        let value: Value =
+            bound.calling(view, || thread.resume((&bound.fsm, &bound.nodes[state.index()], &bound.words.doo)))?;
+        Ok(if thread.status() == ThreadStatus::Resumable {
+            Doo::Yielded { idle: !matches!(value, Value::Nil | Value::Boolean(false)) }
+        } else {
+            Doo::Finished
+        })
+    }
+
+    fn polled(&self) -> Result<Vec<Value>> {
+        let bound = &self.bound;
+        let Value::Function(getevents) = bound.fsm.raw_get("getevents")? else { return Ok(Vec::new()) };
+        let events: Value = bound.budget.spend(limits::CALL_INSTRUCTIONS, || getevents.call(&bound.fsm))?;
+        let Value::Table(list) = events else { return Ok(Vec::new()) };
+        list.sequence_values().collect()
+    }
+}
+
+impl Hook for Calls {
+    fn event(&mut self, _: &Chart, name: EventName) -> EventId {
+        match self.lua.create_string(name.as_str()) {
+            Ok(text) => self.bound.event(Value::String(text)),
+            Err(_) => EventId::OTHER,
+        }
+    }
+
+    fn event_text(&self, chart: &Chart, event: EventId) -> String {
+        match self.bound.value(event) {
+            Value::Nil => chart.event_text(event),
+            value => value.to_string().unwrap_or_default(),
+        }
+    }
+
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+        let bound = &self.bound;
+        let seconds = bound.calling(view, || bound.functions[function.0 as usize].call::<f64>(()));
+        match seconds {
+            Ok(seconds) => Some(seconds),
+            Err(error) => {
+                let text = format!("time of state '{}' failed: ", bound.chart.fqn(state));
+                bound.complain("TIMEEVENT", &text, &error);
+                None
+            }
+        }
+    }
+
+    fn said(&mut self, said: &mut Vec<Said>) {
+        self.bound.voice.drain(said);
+    }
+
+    fn polls(&self) -> bool {
+        self.bound.polls || self.bound.idle_hook
+    }
+
+    fn entered(&mut self, _: &Chart, state: NodeId) {
+        let mut status = self.bound.status.borrow_mut();
+        status.active.push(state);
+        status.through = false;
+    }
+
+    fn exited(&mut self, _: &Chart, _: NodeId) {
+        self.bound.status.borrow_mut().active.pop();
+    }
+
+    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
+        let bound = &self.bound;
+        let warn = |args: Vec<String>| {
+            let told = bound.fsm.raw_get::<mlua::Function>("warn").and_then(|warn| {
+                let args: mlua::Variadic<String> = args.iter().cloned().collect();
+                bound.budget.spend(limits::CALL_INSTRUCTIONS, || warn.call::<()>(args))
+            });
+            if told.is_err() {
+                bound.voice.say(Printer::Warn, &args.join(" "));
+            }
+        };
+        warn(vec![format!("conflicting transitions from src {} to", chart.fqn(connector))]);
+        for way in ways {
+            warn(vec!["\t".to_owned(), chart.fqn(chart.ends(way).1).to_string()]);
+        }
+    }
+
+    fn not_entered(&mut self, _: &Chart) {
+        let error = mlua::Error::runtime("no valid path from root.initial");
+        let text = "ERROR: failed to enter fsm root root, no valid path from root.initial";
+        let told = self
+            .bound
+            .fsm
+            .raw_get::<mlua::Function>("err")
+            .and_then(|err| self.bound.budget.spend(limits::CALL_INSTRUCTIONS, || err.call::<()>(text)));
+        if told.is_err() {
+            self.bound.complain("ENTER", "failed to enter fsm root root: ", &error);
+        }
+    }
+
+    fn poll(&mut self, queue: &mut Queue) {
+        if !self.bound.polls {
+            return;
+        }
+        match self.polled() {
+            Ok(values) => {
+                for value in values {
+                    if queue.room() == 0 {
+                        queue.push(EventId::OTHER); // counted as dropped
+                    } else {
+                        queue.push(self.bound.event(value));
+                    }
+                }
+            }
+            Err(error) => self.bound.complain("GETEVENTS", "error executing getevents: ", &error),
+        }
+    }
+
+    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
+        *self.bound.events.borrow_mut() = None;
+        self.step_hook("pre_step_hook", view, Some(added));
+    }
+
+    fn after_step(&mut self, view: &mut View<'_>) {
+        self.step_hook("post_step_hook", view, None);
+        let mut status = self.bound.status.borrow_mut();
+        status.leaf = view.leaf;
+    }
+
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+        match self.guarded(function, edge, view) {
+            Ok(value) => value != Value::Boolean(false),
+            Err(error) => {
+                let text = format!("error executing guard of {}: ", self.bound.transition_text(edge.index()));
+                self.bound.complain("GUARD", &text, &error);
+                false
+            }
+        }
+    }
+
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+        let bound = &self.bound;
+        let value = bound.value(event);
+        let outcome: Result<Value> = bound.calling(view, || bound.functions[function.0 as usize].call(value));
+        match outcome {
+            Ok(value) => !matches!(value, Value::Nil | Value::Boolean(false)),
+            Err(error) => {
+                bound.complain("PREDICATE", "error executing predicate: ", &error);
+                false
+            }
+        }
+    }
+
+    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+        let bound = &self.bound;
+        let function = &bound.functions[function.0 as usize];
+        let outcome = match place {
+            Place::Entry(state) => bound
+                .calling(view, || function.call::<()>((&bound.fsm, &bound.nodes[state.index()], &bound.words.entry))),
+            Place::Exit(state) => bound
+                .calling(view, || function.call::<()>((&bound.fsm, &bound.nodes[state.index()], &bound.words.exit))),
+            Place::Effect(edge) => bound.events(&self.lua, view).and_then(|events| {
+                let words = &bound.words;
+                bound.calling(view, || {
+                    function.call::<()>((&bound.fsm, &bound.edges[edge.index()], &words.effect, events))
+                })
+            }),
+        };
+        if let Err(error) = outcome {
+            let (tag, text) = match place {
+                Place::Entry(state) => ("ENTRY", format!("error executing entry of {}: ", bound.chart.fqn(state))),
+                Place::Exit(state) => ("EXIT", format!("error executing exit of {}: ", bound.chart.fqn(state))),
+                Place::Effect(edge) => {
+                    ("EFFECT", format!("error executing effect of {}: ", bound.transition_text(edge.index())))
+                }
+            };
+            bound.complain(tag, &text, &error);
+        }
+    }
+
+    fn doo_reset(&mut self, _: NodeId) {
+        *self.bound.thread.borrow_mut() = None;
+    }
+
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+        match self.resumed(function, state, view) {
+            Ok(Doo::Finished) => {
+                self.bound.status.borrow_mut().through = true;
+                *self.bound.thread.borrow_mut() = None;
+                Doo::Finished
+            }
+            Ok(doo) => doo,
+            Err(error) => {
+                self.bound.status.borrow_mut().through = true;
+                *self.bound.thread.borrow_mut() = None;
+                let text = format!("doo program of state '{}' failed: ", self.bound.chart.fqn(state));
+                self.bound.complain("DOO", &text, &error);
+                Doo::Failed
+            }
+        }
+    }
+
+    fn go_on(&mut self) -> bool {
+        let bound = &self.bound;
+        if !bound.idle_hook || bound.driven.get() {
+            return false;
+        }
+        let Ok(Value::Function(hook)) = bound.fsm.raw_get("idle_hook") else { return false };
+        match bound.budget.spend(limits::CALL_INSTRUCTIONS, || hook.call::<()>(&bound.fsm)) {
+            Ok(()) => true,
+            Err(error) => {
+                bound.failed.borrow_mut().get_or_insert(error);
+                false
+            }
+        }
+    }
+
+    fn runaway(&mut self, chart: &Chart, connector: NodeId) {
+        let text = format!("connectors lead round in a circle at {}: no path is taken there", chart.fqn(connector));
+        self.bound.voice.say(Printer::Err, &text);
+    }
+}
+
+/// A table's address, by which machines and states are known.
+pub fn address(table: &Table) -> usize {
+    table.to_pointer() as usize
+}

@@ -1,0 +1,22 @@
+//! Coordinators with functions: rFSM models whose guards, effects, entries, exits, activities and predicates are Lua.
+//!
+//! [`read`] runs a model's text and answers its chart as plain data. [`Opener::open`] runs the same text again on the
+//! thread that is to call the functions and answers [`Functions`], the hook with which the engine of
+//! [`crate::statechart`] calls them. Both go the same way, so functions have the same numbers; whether the chart came out
+//! the same is looked at.
+//!
+//! What is absent: stepping (the engine's), places in texts (`lang` makes them of lines), threads, and files: all texts
+//! are given, so that what was checked is what runs.
+
+mod bound;
+mod budget;
+mod calls;
+mod host;
+mod lower;
+mod native;
+mod open;
+mod values;
+
+pub use budget::message_of;
+pub use lower::{Problem, Spot};
+pub use open::{Functions, Lab, NotOpened, Opener, Reads, read};

@@ -1,0 +1,212 @@
+//! From a program to its chart, and from a program to functions that can be called.
+
+use super::budget::{message_of, undefined_global};
+use super::calls::{Calls, address};
+use super::host::{Host, Reader, run, run_program, state};
+use super::lower::{self, Problem, Spot};
+use crate::limits;
+use crate::model::program::{Openings, Program};
+use crate::model::{Origin, Statechart};
+use crate::statechart::{Printer, Said};
+use crate::time::Clock;
+use mlua::{Function, Lua, MultiValue, Table, Value};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+pub use super::calls::Calls as Functions;
+
+/// Why a program gives no machine.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}{message}", line.map(|line| format!("{file}:{line}: ")).unwrap_or_default())]
+pub struct NotOpened {
+    /// The file at fault, by the name it was run under.
+    pub file: String,
+    /// The line, from 1, where Lua knows it.
+    pub line: Option<u32>,
+    /// What is wrong.
+    pub message: String,
+    /// Whether the text is no Lua at all.
+    pub syntax: bool,
+    /// The global name that the model expects and that nobody gave.
+    pub missing: Option<String>,
+}
+
+impl NotOpened {
+    fn new(file: &str, error: &mlua::Error) -> Self {
+        let syntax = matches!(error, mlua::Error::SyntaxError { .. });
+        let full = message_of(error);
+        let missing = undefined_global(&full).map(str::to_owned);
+        let mut parts = full.splitn(3, ':');
+        let place = (parts.next(), parts.next().and_then(|line| line.parse().ok()), parts.next());
+        let (file, line, message) = match place {
+            (Some(file), Some(line), Some(rest)) => (file.to_owned(), Some(line), rest.trim().to_owned()),
+            _ => (file.to_owned(), None, full.clone()),
+        };
+        Self { file, line, message, syntax, missing }
+    }
+
+    fn plain(program: &Program, message: impl Into<String>) -> Self {
+        let file = program.file.clone();
+        Self { file, line: None, message: message.into(), syntax: false, missing: None }
+    }
+}
+
+/// What running a program told.
+#[derive(Debug)]
+pub struct Reads {
+    /// The chart; it may be faulty still, `statechart::compile` says how.
+    pub chart: Statechart,
+    /// What is wrong in its parts.
+    pub problems: Vec<Problem>,
+    /// Whether it needs Lua to run: functions, hooks, plugins, `getevents`.
+    pub runs_lua: bool,
+    /// What was printed.
+    pub said: Vec<Said>,
+}
+
+/// Runs a program and answers its chart. `place` gives places: where a constructor was called, and a word in it (empty:
+/// the whole).
+///
+/// # Errors
+/// [`NotOpened`]: a text does not parse, fails, is over its budget, or gives no state.
+pub fn read(
+    program: &Program,
+    reader: Reader,
+    place: &mut dyn FnMut(Option<&Spot>, &str) -> Origin,
+) -> Result<Reads, NotOpened> {
+    let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
+    let (lua, host) = state(program.open, reader).map_err(failed)?;
+    let template = template(&lua, &host, program)?;
+    let tables: Function = host.native.raw_get("tables").map_err(failed)?;
+    let fsm: Table = host.budget.spend(limits::LUA_INSTRUCTIONS, || tables.call(template)).map_err(failed)?;
+    let list = host.budget.spend(limits::LUA_INSTRUCTIONS, || lower::flat(&host.native, &fsm)).map_err(failed)?;
+    let spots = host.spots.borrow().clone();
+    let mut places = |spot: Option<usize>, _: usize, word: &str| {
+        place(spot.and_then(|number| spots.get(number.wrapping_sub(1))), word)
+    };
+    let timed = host.native.raw_get("timed_class").map_err(failed)?;
+    let lowered = lower::lower(&list, timed, &mut places).map_err(failed)?;
+    let mut runs_lua = !lowered.chart.is_pure();
+    for key in ["pre_step_hook", "post_step_hook", "getevents", "idle_hook"] {
+        runs_lua |= matches!(fsm.raw_get(key).map_err(failed)?, Value::Function(_));
+    }
+    let mut said = Vec::new();
+    host.voice.drain(&mut said);
+    Ok(Reads { chart: lowered.chart, problems: lowered.problems, runs_lua, said })
+}
+
+/// Runs a program to the template it returns.
+fn template(lua: &Lua, host: &Host, program: &Program) -> Result<Table, NotOpened> {
+    let value = run_program(lua, host, program).map_err(|(file, error)| NotOpened::new(&file, &error))?;
+    let kind: Function = host.native.raw_get("kind").map_err(|e| NotOpened::new(&program.file, &e))?;
+    match value {
+        Value::Table(table) if kind.call::<Option<String>>(&table).ok().flatten().as_deref() == Some("state") => {
+            Ok(table)
+        }
+        other => Err(NotOpened::plain(
+            program,
+            format!("the file returns {}, not a state", if other.is_nil() { "nothing" } else { other.type_name() }),
+        )),
+    }
+}
+
+/// Opens the functions of a program where they are to be called.
+#[derive(Debug, Clone)]
+pub struct Opener {
+    program: Arc<Program>,
+    chart: Arc<Statechart>,
+}
+
+impl Opener {
+    /// The functions of `program`, whose chart is `chart`.
+    pub fn new(program: Arc<Program>, chart: Arc<Statechart>) -> Self {
+        Self { program, chart }
+    }
+
+    /// Runs the program on this thread and answers its functions. They cannot leave the thread.
+    ///
+    /// # Errors
+    /// [`NotOpened`]: it fails, or makes another chart than the one that was checked.
+    pub fn open(&self, clock: Option<Clock>) -> Result<Functions, NotOpened> {
+        let program = &*self.program;
+        let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
+        let files = program.files.clone();
+        let reader: Reader = Box::new(move |name| match files.get(name) {
+            Some((shown, text)) => Ok((shown.clone(), text.to_string())),
+            None => Err(format!("`{name}` was not loaded before")),
+        });
+        let (lua, host) = state(program.open, reader).map_err(failed)?;
+        *host.clock.borrow_mut() = clock;
+        let template = template(&lua, &host, program)?;
+        let init: Function = host.rfsm(&lua).and_then(|rfsm| rfsm.raw_get("init")).map_err(failed)?;
+        let made: Value = host.budget.spend(limits::LUA_INSTRUCTIONS, || init.call(template)).map_err(failed)?;
+        let Value::Table(fsm) = made else {
+            let mut said = Vec::new();
+            host.voice.drain(&mut said);
+            let errors: Vec<String> = said.into_iter().filter(|s| s.by == Printer::Err).map(|s| s.text).collect();
+            return Err(NotOpened::plain(program, errors.join("; ")));
+        };
+        let bound = host.machines.borrow().get(&address(&fsm)).cloned();
+        let bound = bound.ok_or_else(|| NotOpened::plain(program, "rfsm.init made no machine"))?;
+        if bound.written != *self.chart {
+            let message = "run again, the file makes another chart: what it makes must not depend on time or chance";
+            return Err(NotOpened::plain(program, message));
+        }
+        // What `init` remarks, `statechart::compile` has said at its place.
+        let mut said = Vec::new();
+        host.voice.drain(&mut said);
+        said.into_iter().filter(|line| line.by == Printer::Err).for_each(|line| host.voice.say(line.by, &line.text));
+        bound.driven.set(true);
+        bound.machine.borrow_mut().take();
+        Ok(Calls { lua, bound, _host: Some(host) })
+    }
+}
+
+/// A Lua state with rFSM in it and no coordinator: texts that make and step machines of their own. For trying things out,
+/// and for tests of the semantics.
+pub struct Lab {
+    lua: Lua,
+    host: Rc<Host>,
+}
+
+impl Lab {
+    /// A fresh one, that can load the given files.
+    ///
+    /// # Errors
+    /// When Lua has no memory for it.
+    pub fn new(files: BTreeMap<String, String>, open: Openings) -> Result<Self, NotOpened> {
+        let reader: Reader = Box::new(move |name| {
+            files
+                .get(name)
+                .map(|text| (name.to_owned(), text.clone()))
+                .ok_or_else(|| format!("there is no file `{name}`"))
+        });
+        let (lua, host) = state(open, reader).map_err(|error| NotOpened::new("", &error))?;
+        Ok(Self { lua, host })
+    }
+
+    /// Runs a text; answers what it returned, as JSON.
+    ///
+    /// # Errors
+    /// [`NotOpened`]: it does not parse, fails, or is over its budget.
+    pub fn run(&self, name: &str, text: &str) -> Result<Vec<serde_json::Value>, NotOpened> {
+        let failed = |error: mlua::Error| NotOpened::new(name, &error);
+        let values: MultiValue =
+            self.host.budget.spend(limits::LUA_INSTRUCTIONS, || run(&self.lua, name, text)).map_err(failed)?;
+        values.iter().map(|value| super::values::to_json(value, 0).map_err(failed)).collect()
+    }
+
+    /// What was printed since the last time.
+    pub fn said(&self) -> Vec<Said> {
+        let mut said = Vec::new();
+        self.host.voice.drain(&mut said);
+        said
+    }
+}
+
+impl std::fmt::Debug for Lab {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Lab")
+    }
+}

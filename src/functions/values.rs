@@ -1,0 +1,60 @@
+//! Plain data to and from Lua.
+
+use mlua::{Lua, Result, Value};
+use serde_json::Value as Json;
+
+/// Levels of nesting that are followed.
+const LEVELS: usize = 64;
+
+/// A parameter as a Lua value.
+pub fn to_lua(lua: &Lua, json: &Json) -> Result<Value> {
+    Ok(match json {
+        Json::Null => Value::Nil,
+        Json::Bool(v) => Value::Boolean(*v),
+        Json::Number(v) => match v.as_i64() {
+            Some(i) => Value::Integer(i),
+            None => Value::Number(v.as_f64().unwrap_or(f64::NAN)),
+        },
+        Json::String(text) => Value::String(lua.create_string(text)?),
+        Json::Array(items) => {
+            let table = lua.create_table_with_capacity(items.len(), 0)?;
+            for item in items {
+                table.raw_push(to_lua(lua, item)?)?;
+            }
+            Value::Table(table)
+        }
+        Json::Object(fields) => {
+            let table = lua.create_table_with_capacity(0, fields.len())?;
+            for (name, value) in fields {
+                table.raw_set(name.as_str(), to_lua(lua, value)?)?;
+            }
+            Value::Table(table)
+        }
+    })
+}
+
+/// A Lua value as JSON; what has no counterpart by its text.
+pub fn to_json(value: &Value, level: usize) -> Result<Json> {
+    Ok(match value {
+        Value::Nil => Json::Null,
+        Value::Boolean(v) => Json::Bool(*v),
+        Value::Integer(v) => Json::from(*v),
+        Value::Number(v) => Json::from(*v),
+        Value::Table(table) if level < LEVELS => {
+            let length = table.raw_len();
+            let mut fields = serde_json::Map::new();
+            let mut items = Vec::with_capacity(length);
+            for i in 1..=length {
+                items.push(to_json(&table.raw_get::<Value>(i)?, level + 1)?);
+            }
+            table.for_each(|key: Value, inner: Value| {
+                if let Value::String(name) = &key {
+                    fields.insert(name.to_string_lossy(), to_json(&inner, level + 1)?);
+                }
+                Ok(())
+            })?;
+            if fields.is_empty() { Json::Array(items) } else { Json::Object(fields) }
+        }
+        other => Json::String(other.to_string()?),
+    })
+}

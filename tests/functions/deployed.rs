@@ -1,0 +1,100 @@
+//! A coordinator with functions at work in a deployment.
+
+use davit::app;
+use davit::lang::{LoadOptions, Sources};
+use davit::platform::simulated::{Options, Simulated};
+use davit::session::Happening;
+use davit::time::Clock;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+const DEPLOYMENT: &str = "
+davit: 1
+name: functions
+platform: simulated
+types:
+  Gain: { properties: { k: { type: float, default: 1.0 } }, operations: {}, ports: {} }
+configurations: [configurations.lua]
+coordinator: coordinator.lua
+trusted: true
+deploy: { event: e_start, up: operational, failed: [fault], within_s: 20 }
+shutdown: { event: e_stop, down: idle, within_s: 20 }
+";
+
+const CONFIGURATIONS: &str = "ConfiguratorConf { make = Configuration { create('g', 'Gain') } }";
+
+const COORDINATOR: &str = r#"
+return rfsm.state {
+  idle = rfsm.state { entry = function(fsm, s) fsm.visits = (fsm.visits or 0) + 1 end },
+  starting = rfsm.state { entry = 'make' },
+  operational = rfsm.state {
+    doo = function(fsm)
+      while true do
+        fsm.rounds = (fsm.rounds or 0) + 1
+        if fsm.rounds == 5 then print('five rounds') end
+        rfsm.yield(true)
+      end
+    end,
+  },
+  stopping = rfsm.state { entry = 'make.undo' },
+  fault = rfsm.state {},
+  rfsm.trans { src = 'initial', tgt = 'idle' },
+  rfsm.trans { src = 'idle', tgt = 'starting', events = { 'e_start' }, guard = function(tr, events) return events[1] == 'e_start' end },
+  rfsm.trans { src = 'starting', tgt = 'operational', events = { 'make.ok' },
+               effect = function(fsm, tr, what, events) print(what .. ' ' .. events[1]) end },
+  rfsm.trans { src = 'starting', tgt = 'fault', events = { 'make.failed', 'make.broken' } },
+  rfsm.trans { src = 'fault', tgt = 'idle', events = { 'e_stop' } },
+  rfsm.trans { src = 'operational', tgt = 'stopping', events = { 'e_stop' } },
+  rfsm.trans { src = 'stopping', tgt = 'idle', events = { 'make.undone' } },
+  rfsm.trans { src = 'stopping', tgt = 'fault', events = { 'make.undo.failed', 'make.undo.broken' } },
+}
+"#;
+
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn a_deployment_with_functions_comes_up_and_goes_down() {
+    let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)];
+    let folder = folder(&files);
+    let read =
+        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
+    let checked = app::check(read).unwrap();
+    assert!(checked.findings.iter().any(|f| f.code == davit::model::codes::COORD_NOT_PURE), "{:?}", checked.findings);
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default()));
+    let session = app::start_on(&checked, platform, &clock);
+    let said: Arc<Mutex<Vec<String>>> = Arc::default();
+    let heard = said.clone();
+    session.hub().observe(Arc::new(move |_, what| {
+        if let Happening::Said { by, text } = what {
+            heard.lock().unwrap().push(format!("{by}: {text}"));
+        }
+    }));
+    session.bring_up().expect("up");
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(*said.lock().unwrap(), ["info: effect make.ok", "info: five rounds"]);
+    session.take_down(false);
+    clock.shutdown();
+}
+
+#[test]
+fn without_trust_the_deployment_is_refused() {
+    let text = DEPLOYMENT.replace("trusted: true\n", "");
+    let from = Sources::memory([
+        ("d.yaml", text.as_str()),
+        ("configurations.lua", CONFIGURATIONS),
+        ("coordinator.lua", COORDINATOR),
+    ]);
+    let loaded = davit::lang::load_from(&from, Path::new("d.yaml"), &LoadOptions::default());
+    assert!(loaded.deployment.is_none());
+    let codes: Vec<_> = loaded.findings.iter().map(|f| f.code).collect();
+    assert!(codes.contains(&davit::model::codes::CHART_FUNCTION), "{:?}", loaded.findings);
+}
