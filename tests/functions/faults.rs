@@ -1,0 +1,138 @@
+//! Functions that misbehave: each call ends, the error is told, and the coordinator goes on.
+
+use super::support::Model;
+use davit::limits;
+
+/// A machine with `a` and `b`, events `e` and `back`; `parts` are put where they belong.
+fn model(a: &str, transition: &str) -> Model {
+    Model::new(&format!(
+        "return rfsm.state {{ a = rfsm.state {{ {a} }}, b = rfsm.state {{ entry = function() print('in b') end }},
+           rfsm.trans {{ src='initial', tgt='a' }}, rfsm.trans {{ src='a', tgt='b', events={{'e'}} {transition} }},
+           rfsm.trans {{ src='b', tgt='a', events={{'back'}} }} }}"
+    ))
+}
+
+/// It reached `b` with one error of that tag, whose text has these words.
+fn told(model: &Model, tag: &str, words: &str) {
+    let seen = model.play(&["run", "e", "run"]);
+    assert_eq!(seen[2].active.last().unwrap(), "root.b", "{seen:?}");
+    let notes: Vec<&String> = seen.iter().flat_map(|s| &s.notes).filter(|n| n.starts_with("error: ")).collect();
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert!(notes[0].contains(tag) && notes[0].contains(words), "{notes:?}");
+}
+
+#[test]
+fn endless_entries_exits_and_effects_end() {
+    let endless = "function() while true do end end";
+    told(&model(&format!("entry = {endless}"), ""), "ENTRY", "million instructions");
+    told(&model(&format!("exit = {endless}"), ""), "EXIT", "million instructions");
+    told(&model("", &format!(", effect = {endless}")), "EFFECT", "million instructions");
+    told(&model(&format!("doo = {endless}"), ""), "DOO", "million instructions");
+}
+
+#[test]
+fn an_endless_guard_says_no() {
+    let model = model("", ", guard = function() repeat until false end");
+    let seen = model.play(&["run", "e"]);
+    assert_eq!(seen[1].active.last().unwrap(), "root.a");
+    assert!(seen[1].notes.iter().any(|n| n.contains("GUARD") && n.contains("million instructions")), "{seen:?}");
+}
+
+#[test]
+fn protected_calls_and_coroutines_do_not_outlive_the_budget() {
+    for body in [
+        "while true do pcall(function() while true do end end) end",
+        "while true do xpcall(function() while true do end end, function() end) end",
+        "while true do coroutine.resume(coroutine.create(function() while true do end end)) end",
+        "while true do coroutine.wrap(function() for i = 1, 10 do end end)() end",
+        "local function f() return f() end f()",
+    ] {
+        told(&model(&format!("entry = function() {body} end"), ""), "ENTRY", "million instructions");
+    }
+}
+
+#[test]
+fn the_budget_is_of_one_call() {
+    // Two thirds of a budget in each of three calls.
+    let work = limits::CALL_INSTRUCTIONS / 6;
+    let body = format!("function() for i = 1, {work} do local x = i * i end end");
+    let model = model(&format!("entry = {body}, exit = {body}"), &format!(", effect = {body}"));
+    assert_eq!(model.notes(&["run", "e", "run"]), ["in b"]);
+}
+
+#[test]
+fn memory_is_bounded() {
+    let eats = "function() local t = {} for i = 1, 1e7 do t[i] = ('x'):rep(1000000) .. i end end";
+    told(&model(&format!("entry = {eats}"), ""), "ENTRY", "MB of memory");
+    told(&model("", ", effect = function() local s = ('x'):rep(1e9) end"), "EFFECT", "");
+}
+
+#[test]
+fn what_is_closed_is_an_error_that_names_it() {
+    for (call, name) in [("os.execute('true')", "os"), ("io.open('x')", "io"), ("debug.sethook()", "debug")] {
+        told(&model(&format!("entry = function() {call} end"), ""), "ENTRY", &format!("'{name}'"));
+    }
+    told(&model("entry = function() dofile('x') end", ""), "ENTRY", "dofile");
+    told(&model("entry = function() assert(load('\\27Lua')) end", ""), "ENTRY", "");
+}
+
+#[test]
+fn deep_recursion_and_errors_that_are_no_texts() {
+    told(&model("entry = function() local function f() return 1 + f() end f() end", ""), "ENTRY", "");
+    told(&model("entry = function() error({ code = 1 }) end", ""), "ENTRY", "");
+    told(&model("entry = function() error() end", ""), "ENTRY", "");
+    told(&model("entry = function() error(setmetatable({}, { __tostring = function() error 'again' end })) end", ""), "ENTRY", "");
+}
+
+#[test]
+fn a_printer_that_fails_does_not_swallow_the_error() {
+    let model = Model::new(
+        "return rfsm.state { err = function() error('the printer too') end, a = rfsm.state { entry = function() error('first', 0) end },
+           rfsm.trans { src='initial', tgt='a' } }",
+    );
+    let notes = model.notes(&["run"]);
+    assert!(notes.iter().any(|n| n.contains("ENTRY") && n.contains("first")), "{notes:?}");
+}
+
+#[test]
+fn a_flood_of_events_and_lines_is_bounded_and_said() {
+    let flood = "entry = function(fsm) for i = 1, 20000 do rfsm.send_events(fsm, 'x' .. i) end end";
+    let seen = model(flood, "").play(&["", "run"]);
+    assert!(seen[0].queue.len() <= limits::CHART_QUEUE, "{}", seen[0].queue.len());
+    assert_eq!(seen[0].queue[0], "x1");
+    assert!(seen[0].notes.iter().any(|n| n.contains("found no room")), "{:?}", seen[0].notes.first());
+    let notes = model("entry = function() for i = 1, 2000 do print(i) end print(('x'):rep(1e6)) end", "").notes(&["run"]);
+    assert_eq!(notes.len(), limits::SAID_LINES + 1);
+    assert!(notes.last().unwrap().contains("more lines"), "{:?}", notes.last());
+}
+
+#[test]
+fn machines_made_for_ever_are_bounded() {
+    let body = "entry = function() for i = 1, 100000 do local m = rfsm.init(rfsm.state { err = false, warn = false, info = false,
+        x = rfsm.state {}, rfsm.trans { src='initial', tgt='x' } }) if not m then print('no more at ' .. i) return end end end";
+    let notes = model(body, "").notes(&["run"]);
+    assert!(notes.iter().any(|n| n.starts_with("no more at")), "{notes:?}");
+}
+
+#[test]
+fn the_coordinators_own_machine_cannot_be_stepped_from_inside() {
+    told(&model("entry = function(fsm) rfsm.run(fsm) end", ""), "ENTRY", "stepped by Davit");
+    told(&model("entry = function(fsm) rfsm.reset(fsm) end", ""), "ENTRY", "stepped by Davit");
+}
+
+#[test]
+fn a_step_hook_that_fails_is_told() {
+    let model = Model::new(
+        "local hooked = false
+         return rfsm.state { a = rfsm.state { entry = function(fsm) rfsm.pre_step_hook_add(fsm, function() error('hook', 0) end) end },
+           rfsm.trans { src='initial', tgt='a' } }",
+    );
+    let notes = model.notes(&["", "x"]);
+    assert!(notes.iter().any(|n| n.contains("HOOK") && n.contains("hook")), "{notes:?}");
+}
+
+#[test]
+fn a_doo_that_never_rests_leaves_room_for_events() {
+    let seen = model("doo = function() while true do rfsm.yield(false) end end", "").play(&["", "e", "run"]);
+    assert_eq!(seen[2].active.last().unwrap(), "root.b");
+}
