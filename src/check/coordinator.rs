@@ -1,8 +1,8 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
 use crate::model::codes::{
-    COORD_ANSWER_NEVER_COMES, COORD_FAILURE_UNHANDLED, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_NOT_PURE,
-    COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
+    COORD_ANSWER_NEVER_COMES, COORD_FAILURE_UNHANDLED, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER,
+    COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Verdict};
@@ -36,13 +36,7 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     raised(deployment, chart, &mut findings);
     heard(deployment, chart, &mut findings);
     unhandled(deployment, chart, &mut findings);
-    if !chart.is_pure() {
-        findings.push(
-            Finding::info(COORD_NOT_PURE, "the coordinator has functions: what depends on them is not verified")
-                .at(deployment.coordinator.root.origin)
-                .help("names of events in place of functions make it pure"),
-        );
-    }
+    findings.extend(super::purity::check(deployment));
     findings
 }
 

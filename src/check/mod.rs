@@ -9,6 +9,7 @@ mod coordinator;
 mod drive;
 mod explore;
 mod monitors;
+mod purity;
 mod reactions;
 mod types;
 mod universe;

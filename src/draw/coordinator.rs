@@ -3,7 +3,7 @@
 use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
 use super::text::short;
 use crate::model::Statechart;
-use crate::model::statechart::{Action, INITIAL, Node as Child, ROOT, State, Transition};
+use crate::model::statechart::{Action, INITIAL, Node as Child, ROOT, State, Transition, Trigger};
 use std::collections::BTreeMap;
 
 /// Lines of a transition's label before the rest is only counted.
@@ -16,7 +16,8 @@ const LABEL_COLUMNS: usize = 34;
 /// References are followed as far as they lead to something; a transition that leads nowhere is not drawn (`check` says
 /// so). Transitions with the same ends are one edge with the events of all.
 pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Picture {
-    let mut picture = Picture::new(Subject::Statechart, Direction::Down, title);
+    let title = if chart.is_pure() { title.to_owned() } else { format!("{title} (functions are not verified)") };
+    let mut picture = Picture::new(Subject::Statechart, Direction::Down, &title);
     let mut drawing = Drawing { picture: &mut picture, index: BTreeMap::new(), active };
     drawing.state_content(&chart.root, ROOT, None);
     drawing.transitions(&chart.root, ROOT);
@@ -149,7 +150,14 @@ fn state_lines(state: &State) -> Vec<String> {
 
 /// Each event of a transition, the last with what the transition raises.
 fn transition_lines(transition: &Transition) -> Vec<String> {
-    let mut lines: Vec<String> = transition.events.iter().map(|(trigger, _)| trigger.to_string()).collect();
+    let mut lines: Vec<String> = transition
+        .events
+        .iter()
+        .map(|(trigger, _)| match trigger {
+            Trigger::Predicate(_) => "[predicate]".to_owned(),
+            other => other.to_string(),
+        })
+        .collect();
     let mut tail = String::new();
     if transition.guard.is_some() {
         tail.push_str(" [guard]");
@@ -191,7 +199,6 @@ fn fold(events: &[String]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::statechart::Trigger;
     use crate::model::{EventName, Ident};
 
     fn state(name: &str, children: Vec<State>, transitions: &[(&str, &str, &[&str])]) -> State {

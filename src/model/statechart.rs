@@ -91,6 +91,13 @@ impl State {
             })
     }
 
+    /// Which of its own parts are functions, by their keys.
+    pub fn functions(&self) -> Vec<&'static str> {
+        let any = |actions: &[(Action, Origin)]| actions.iter().any(|(action, _)| !action.is_pure());
+        let parts = [("entry", any(&self.entry)), ("doo", self.doo.is_some()), ("exit", any(&self.exit))];
+        parts.into_iter().filter_map(|(key, is)| is.then_some(key)).collect()
+    }
+
     /// Visits the place of everything in it.
     pub fn places(&mut self, visit: &mut impl FnMut(&mut Origin)) {
         visit(&mut self.origin);
@@ -194,6 +201,21 @@ impl Transition {
             events: events.into_iter().map(|trigger| (trigger, Origin::NONE)).collect(),
             ..Self::default()
         }
+    }
+
+    /// Which of its parts are functions, by their keys.
+    pub fn functions(&self) -> Vec<&'static str> {
+        let asks = |(trigger, _): &(Trigger, Origin)| match trigger {
+            Trigger::Predicate(_) => true,
+            Trigger::Timed(timed) => timed.by.is_some(),
+            Trigger::Event(_) => false,
+        };
+        let parts = [
+            ("events", self.events.iter().any(asks)),
+            ("guard", self.guard.is_some()),
+            ("effect", self.effect.iter().any(|(action, _)| !action.is_pure())),
+        ];
+        parts.into_iter().filter_map(|(key, is)| is.then_some(key)).collect()
     }
 
     /// Whether nothing in it is a function.

@@ -31,16 +31,32 @@ mod construction {
     fn the_checks_of_init_say_what_rfsm_says() {
         let cases = [
             ("S {}", "ERROR: fsm root without initial connector"),
-            ("S { a = S {}, T { src='initial' } }", "ERROR: T={ src='initial', tgt='none', events='{}' } missing tgt state, parent='root'"),
-            ("S { a = S {}, T { src='initial', tgt='a' }, T { tgt='a', pn=2, events={'x', 'y'} } }",
-             "ERROR: T={ src='none', tgt='a, pn=2', events='x, y' } missing src state, parent='root'"),
-            ("S { a = S {}, T { src='initial', tgt='a', events=3 } }", "ERROR: T={ src='initial', tgt='a', events='{}' } 'events' field must be a table"),
-            ("S { a = S {}, T { src='initial', tgt='b' } }",
-             "ERROR: resolving tgt failed T={ src='root.initial', tgt='b', events='{}' }: no b in root|ERROR: failed to resolve transitions of fsm root"),
+            (
+                "S { a = S {}, T { src='initial' } }",
+                "ERROR: T={ src='initial', tgt='none', events='{}' } missing tgt state, parent='root'",
+            ),
+            (
+                "S { a = S {}, T { src='initial', tgt='a' }, T { tgt='a', pn=2, events={'x', 'y'} } }",
+                "ERROR: T={ src='none', tgt='a, pn=2', events='x, y' } missing src state, parent='root'",
+            ),
+            (
+                "S { a = S {}, T { src='initial', tgt='a', events=3 } }",
+                "ERROR: T={ src='initial', tgt='a', events='{}' } 'events' field must be a table",
+            ),
+            (
+                "S { a = S {}, T { src='initial', tgt='b' } }",
+                "ERROR: resolving tgt failed T={ src='root.initial', tgt='b', events='{}' }: no b in root|ERROR: failed to resolve transitions of fsm root",
+            ),
             ("S { a = S {}, T { src='initial', tgt='root.lighthouse.lamp' } }", ": no lighthouse in lighthouse"),
             ("S { a = S {}, T { src='initial', tgt='.dock' } }", ": no dock in |"),
-            ("S { a = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='internal' } }", "ERROR: internal events not supported (yet?)"),
-            ("S { a = S { b = S {} }, T { src='initial', tgt='a' } }", "ends on composite state without initial connector"),
+            (
+                "S { a = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='internal' } }",
+                "ERROR: internal events not supported (yet?)",
+            ),
+            (
+                "S { a = S { b = S {} }, T { src='initial', tgt='a' } }",
+                "ends on composite state without initial connector",
+            ),
         ];
         for (model, said) in cases {
             run(&format!(
@@ -87,9 +103,13 @@ mod enabled {
 
     #[test]
     fn a_guard_that_answers_nothing_says_yes() {
-        for (answer, to) in [("", "b"), ("return nil", "b"), ("return 0", "b"), ("return true", "b"), ("return false", "a")] {
-            run(&format!("{TWO} T {{ src='a', tgt='b', events={{'e'}}, guard=function() {answer} end }} }})
-                 rfsm.run(fsm) rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(leaf(fsm), 'root.{to}')"));
+        for (answer, to) in
+            [("", "b"), ("return nil", "b"), ("return 0", "b"), ("return true", "b"), ("return false", "a")]
+        {
+            run(&format!(
+                "{TWO} T {{ src='a', tgt='b', events={{'e'}}, guard=function() {answer} end }} }})
+                 rfsm.run(fsm) rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(leaf(fsm), 'root.{to}')"
+            ));
         }
     }
 
@@ -103,23 +123,29 @@ mod enabled {
 
     #[test]
     fn a_guard_that_fails_says_no_and_is_told() {
-        run(&format!("{TWO} T {{ src='a', tgt='b', events={{'e'}}, guard=function() error('bad guard', 0) end }} }})
+        run(&format!(
+            "{TWO} T {{ src='a', tgt='b', events={{'e'}}, guard=function() error('bad guard', 0) end }} }})
              rfsm.run(fsm) lines = {{}} rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(leaf(fsm), 'root.a')
-             eq(lines[1], \"GUARDerror executing guard of T={{ src='root.a', tgt='root.b', events='e' }}: bad guard\")"));
+             eq(lines[1], \"GUARDerror executing guard of T={{ src='root.a', tgt='root.b', events='e' }}: bad guard\")"
+        ));
     }
 
     #[test]
     fn a_predicate_that_fails_is_no_match() {
-        run(&format!("{TWO} T {{ src='a', tgt='b', events={{ function() error 'x' end }} }} }})
-             rfsm.run(fsm) rfsm.send_events(fsm, 'e') eq(rfsm.run(fsm), true) eq(leaf(fsm), 'root.a')"));
+        run(&format!(
+            "{TWO} T {{ src='a', tgt='b', events={{ function() error 'x' end }} }} }})
+             rfsm.run(fsm) rfsm.send_events(fsm, 'e') eq(rfsm.run(fsm), true) eq(leaf(fsm), 'root.a')"
+        ));
     }
 
     #[test]
     fn an_unmatched_event_does_not_count_as_a_step() {
-        run(&format!("{TWO} T {{ src='a', tgt='b', events={{'e'}} }} }})
+        run(&format!(
+            "{TWO} T {{ src='a', tgt='b', events={{'e'}} }} }})
              rfsm.run(fsm) local n = 0 rfsm.post_step_hook_add(fsm, function() n = n + 1 end)
              rfsm.send_events(fsm, 'other') eq(rfsm.step(fsm, 1), true) eq(n, 2, 'the unmatched turn and an idle one')
-             rfsm.send_events(fsm, 'e') n = 0 eq(rfsm.step(fsm, 1), false) eq(n, 1)"));
+             rfsm.send_events(fsm, 'e') n = 0 eq(rfsm.step(fsm, 1), false) eq(n, 1)"
+        ));
     }
 
     #[test]
@@ -237,7 +263,9 @@ mod stepping {
 
     #[test]
     fn a_null_transition_takes_its_own_completion() {
-        run("local fsm = init(S { a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b' } }) rfsm.run(fsm) eq(leaf(fsm), 'root.b')");
+        run(
+            "local fsm = init(S { a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b' } }) rfsm.run(fsm) eq(leaf(fsm), 'root.b')",
+        );
     }
 
     #[test]

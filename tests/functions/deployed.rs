@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-const DEPLOYMENT: &str = "
+pub const DEPLOYMENT: &str = "
 davit: 1
 name: functions
 platform: simulated
@@ -22,9 +22,9 @@ deploy: { event: e_start, up: operational, failed: [fault], within_s: 20 }
 shutdown: { event: e_stop, down: idle, within_s: 20 }
 ";
 
-const CONFIGURATIONS: &str = "ConfiguratorConf { make = Configuration { create('g', 'Gain') } }";
+pub const CONFIGURATIONS: &str = "ConfiguratorConf { make = Configuration { create('g', 'Gain') } }";
 
-const COORDINATOR: &str = r#"
+pub const COORDINATOR: &str = r#"
 return rfsm.state {
   idle = rfsm.state { entry = function(fsm, s) fsm.visits = (fsm.visits or 0) + 1 end },
   starting = rfsm.state { entry = 'make' },

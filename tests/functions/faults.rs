@@ -81,7 +81,11 @@ fn deep_recursion_and_errors_that_are_no_texts() {
     told(&model("entry = function() local function f() return 1 + f() end f() end", ""), "ENTRY", "");
     told(&model("entry = function() error({ code = 1 }) end", ""), "ENTRY", "");
     told(&model("entry = function() error() end", ""), "ENTRY", "");
-    told(&model("entry = function() error(setmetatable({}, { __tostring = function() error 'again' end })) end", ""), "ENTRY", "");
+    told(
+        &model("entry = function() error(setmetatable({}, { __tostring = function() error 'again' end })) end", ""),
+        "ENTRY",
+        "",
+    );
 }
 
 #[test]
@@ -101,7 +105,8 @@ fn a_flood_of_events_and_lines_is_bounded_and_said() {
     assert!(seen[0].queue.len() <= limits::CHART_QUEUE, "{}", seen[0].queue.len());
     assert_eq!(seen[0].queue[0], "x1");
     assert!(seen[0].notes.iter().any(|n| n.contains("found no room")), "{:?}", seen[0].notes.first());
-    let notes = model("entry = function() for i = 1, 2000 do print(i) end print(('x'):rep(1e6)) end", "").notes(&["run"]);
+    let notes =
+        model("entry = function() for i = 1, 2000 do print(i) end print(('x'):rep(1e6)) end", "").notes(&["run"]);
     assert_eq!(notes.len(), limits::SAID_LINES + 1);
     assert!(notes.last().unwrap().contains("more lines"), "{:?}", notes.last());
 }

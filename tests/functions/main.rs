@@ -3,7 +3,9 @@
 mod confirmed;
 mod deployed;
 mod faults;
+mod guide;
 mod lab;
 mod loading;
+mod purity;
 mod rfsm;
 mod support;

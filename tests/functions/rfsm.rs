@@ -164,7 +164,9 @@ mod connector {
 
     #[test]
     fn full_chain_taken() {
-        run(&format!("{CHAIN} rfsm.send_events(fsm, 'e1', 'e2') rfsm.run(fsm) eq(leaf(fsm), 'root.b') eq(lines, {{'ax', 'xy'}})"));
+        run(&format!(
+            "{CHAIN} rfsm.send_events(fsm, 'e1', 'e2') rfsm.run(fsm) eq(leaf(fsm), 'root.b') eq(lines, {{'ax', 'xy'}})"
+        ));
     }
 
     #[test]
@@ -292,11 +294,13 @@ mod timeevent {
 
     #[test]
     fn timeout_via_function() {
-        run(&format!("{CLOCK} local wait = 5
+        run(&format!(
+            "{CLOCK} local wait = 5
              local fsm = init(S {{ a = S {{}}, b = S {{}}, T {{ src='initial', tgt='a' }},
                T {{ src='a', tgt='b', events={{ te.e_after(function() return wait end, 'w') }} }} }})
              rfsm.run(fsm) advance(4) rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.a')
-             advance(2) rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.b')"));
+             advance(2) rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.b')"
+        ));
     }
 
     #[test]
@@ -416,8 +420,10 @@ mod marsh {
 
     #[test]
     fn actinfo2tab() {
-        run(&format!("{FSM} local m = require 'rfsm.marsh' eq(m.actinfo2tab(fsm), false) rfsm.run(fsm)
-             local t = m.actinfo2tab(fsm) eq({{t.fqn, t.mode}}, {{'root.a.x', 'done'}})"));
+        run(&format!(
+            "{FSM} local m = require 'rfsm.marsh' eq(m.actinfo2tab(fsm), false) rfsm.run(fsm)
+             local t = m.actinfo2tab(fsm) eq({{t.fqn, t.mode}}, {{'root.a.x', 'done'}})"
+        ));
     }
 
     #[test]
