@@ -39,6 +39,9 @@ pub const CHART_REACTIONS: usize = 1 << 20;
 /// Levels of states in a statechart. People write five; the walk through a chart is recursive.
 pub const CHART_DEPTH: usize = 100;
 
+/// Elements of an XML document inside each other: as deep as states may be nested, and what the innermost holds.
+pub const XML_DEPTH: usize = CHART_DEPTH + 8;
+
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;
 

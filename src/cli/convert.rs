@@ -34,6 +34,8 @@ enum To {
     Lua,
     /// YAML.
     Yaml,
+    /// SCXML, for coordinators. The outermost state wins here, the innermost there; functions are left out.
+    Scxml,
 }
 
 impl Run for Args {
@@ -41,6 +43,7 @@ impl Run for Args {
         let language = match self.to {
             To::Lua => Language::Lua,
             To::Yaml => Language::Yaml,
+            To::Scxml => Language::Scxml,
         };
         if is_deployment(&self.file) {
             let loaded = lang::load(&self.file, &self.parameters.options()?);

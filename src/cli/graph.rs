@@ -1,11 +1,16 @@
 //! `davit graph`
 
 use super::exit::Exit;
-use super::input::{Input, Parameters, coordinator, is_deployment};
+use super::input::{Coordinator, Input, Parameters, coordinator, is_deployment};
 use super::plan::{asked, drive, driven};
+use super::remote::{ASK, ask};
 use super::{Answer, Context, Failure, Run, write_output};
 use crate::check::Until;
+use crate::diagnostics::Language;
 use crate::draw;
+use crate::lang;
+use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Draw a deployment: its components as they are when up, its coordinator, or its bring-up plan.
@@ -26,6 +31,12 @@ pub struct Args {
     /// Which coordinator, of a deployment with several.
     #[arg(long, value_name = "NAME")]
     of: Option<String>,
+    /// Mark the states that are active in the running deployment.
+    #[arg(long)]
+    live: bool,
+    /// The running deployment's name, if it is not the file's.
+    #[arg(long, value_name = "NAME", requires = "live")]
+    on: Option<String>,
     /// Write to this file instead of printing.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -55,6 +66,12 @@ enum Format {
     Dot,
     /// Mermaid, as code hosts draw it.
     Mermaid,
+    /// PlantUML (coordinators only).
+    Plantuml,
+    /// SCXML, for other statechart programs (coordinators only).
+    Scxml,
+    /// The graph as rFSM's `rfsm2json` writes it (coordinators only).
+    Json,
 }
 
 impl Run for Args {
@@ -62,7 +79,16 @@ impl Run for Args {
         let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
         let picture = if what == What::Coordinator {
             let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &[])?;
-            draw::coordinator(&format!("{}: coordinator", read.name), &read.chart, &[])
+            let active = if self.live { self.active(&read)? } else { Vec::new() };
+            let title = format!("{}: coordinator", read.name);
+            let text = match self.format {
+                Format::Plantuml => draw::coordinator_plantuml(&title, &read.chart, &active),
+                Format::Json => draw::coordinator_json(&read.chart, &active) + "\n",
+                Format::Scxml => lang::print::coordinator(&read.chart, Language::Scxml),
+                _ => return self.write(context, &draw::coordinator(&title, &read.chart, &active)),
+            };
+            write_output(context, self.output.as_deref(), &text)?;
+            return Ok(Exit::Done);
         } else {
             let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read(context)?;
             let refused = |findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() };
@@ -93,12 +119,37 @@ impl Run for Args {
                 }
             }
         };
+        self.write(context, &picture)
+    }
+}
+
+impl Args {
+    fn write(&self, context: &Context, picture: &draw::Picture) -> Answer {
         let text = match self.format {
             Format::Svg => picture.svg(),
             Format::Dot => picture.dot(),
             Format::Mermaid => picture.mermaid(),
+            Format::Plantuml | Format::Scxml | Format::Json => {
+                return Err(Failure::usage(
+                    CLI_FORMAT_OF_COORDINATORS,
+                    "only a coordinator can be written in this format",
+                    "add `--what coordinator`, or ask for `svg`, `dot` or `mermaid`",
+                ));
+            }
         };
         write_output(context, self.output.as_deref(), &text)?;
         Ok(Exit::Done)
+    }
+
+    /// The active states of the coordinator in the running deployment.
+    fn active(&self, read: &Coordinator) -> Result<Vec<String>, Failure> {
+        let name = self.on.as_deref().or(read.deployment.as_deref());
+        let status = ask(name, "status", &json!({}), ASK)?;
+        let states = match &read.of {
+            Some(of) => &status["coordinators"][of.as_str()],
+            None => &status["coordinator"],
+        };
+        let states = states.as_array().cloned().unwrap_or_default();
+        Ok(states.iter().filter_map(|state| state.as_str().map(str::to_owned)).collect())
     }
 }

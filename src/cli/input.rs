@@ -82,6 +82,10 @@ impl From<Refused> for Failure {
 pub struct Coordinator {
     /// A name to show: the file's without its ending.
     pub name: String,
+    /// The deployment that names it, if it was read from one.
+    pub deployment: Option<String>,
+    /// Its name in a deployment.
+    pub of: Option<String>,
     /// The coordinator.
     pub chart: Statechart,
     /// Its texts, when it has functions.
@@ -111,8 +115,10 @@ pub fn coordinator(
         let loaded = lang::load(path, &options);
         return match loaded.deployment {
             Some(d) => {
-                let (chart, program) = chosen(d, of)?;
-                Ok(Coordinator { name, chart, program, sources: loaded.sources, findings: loaded.findings })
+                let deployment = Some(d.name.to_string());
+                let (of, chart, program) = chosen(d, of)?;
+                let (sources, findings) = (loaded.sources, loaded.findings);
+                Ok(Coordinator { name, deployment, of: Some(of), chart, program, sources, findings })
             }
             None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
         };
@@ -120,14 +126,15 @@ pub fn coordinator(
     let loaded = lang::load_coordinator(&Sources::Disk, path, &options);
     match loaded.coordinator {
         Some(chart) => {
-            Ok(Coordinator { name, chart, program: loaded.program, sources: loaded.sources, findings: loaded.findings })
+            let (program, sources, findings) = (loaded.program, loaded.sources, loaded.findings);
+            Ok(Coordinator { name, deployment: None, of: of.map(str::to_owned), chart, program, sources, findings })
         }
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }
 }
 
 /// The coordinator of that name; without one, the only one.
-fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(Statechart, Option<Arc<Program>>), Failure> {
+fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(String, Statechart, Option<Arc<Program>>), Failure> {
     let names = deployment.coordinators();
     let number = match of {
         None if names.len() == 1 => Some(0),
@@ -150,7 +157,7 @@ fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(Statechart, Optio
         None => deployment.coordinator,
         Some(at) => deployment.beside.into_iter().nth(at).map_or(deployment.coordinator, |own| own.chart),
     };
-    Ok((chart, program))
+    Ok((names[number].to_string(), chart, program))
 }
 
 fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {

@@ -16,6 +16,8 @@ pub enum Language {
     Lua,
     /// YAML: every place is known exactly.
     Yaml,
+    /// SCXML, for coordinators: every element's place is known exactly.
+    Scxml,
 }
 
 /// A text that was read.
@@ -216,7 +218,7 @@ impl SourceMap {
         let source = self.file(whole.file);
         let inside = match source.language {
             Language::Lua => extent::balanced(&source.text, whole.span.clone()),
-            Language::Yaml => whole.span,
+            Language::Yaml | Language::Scxml => whole.span,
         };
         Some(self.location(whole.file, extent::find(&source.text, inside, word)?))
     }

@@ -5,6 +5,7 @@
 mod components;
 mod coordinator;
 mod dot;
+mod exchange;
 pub mod layout;
 mod mermaid;
 pub mod picture;
@@ -14,6 +15,7 @@ mod text;
 
 pub use components::components;
 pub use coordinator::coordinator;
+pub use exchange::{coordinator_json, coordinator_plantuml};
 pub use picture::Picture;
 pub use plan::plan;
 

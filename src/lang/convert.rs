@@ -4,7 +4,7 @@ use super::files::Sources;
 use super::load::{self, Content, LoadOptions};
 use super::print;
 use crate::diagnostics::{Language, SourceMap};
-use crate::model::Findings;
+use crate::model::{Finding, Findings, codes};
 use std::path::Path;
 
 /// What converting gave.
@@ -23,9 +23,14 @@ pub struct Converted {
 /// A file of configurations, of monitors, or a coordinator's file, in the language given. The model is the same; comments, loops,
 /// parameters and the layout of the text are not part of it.
 pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions) -> Converted {
-    let (content, findings, sources, unreadable) = load::load_any(from, path, options);
+    let (content, mut findings, sources, unreadable) = load::load_any(from, path, options);
     let text = match content {
         _ if crate::model::finding::has_errors(&findings) => None,
+        Some(Content::Configurations(_) | Content::Monitors(_)) if to == Language::Scxml => {
+            let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "SCXML has words for coordinators only");
+            findings.push(finding.help("write them in Lua or YAML"));
+            None
+        }
         Some(Content::Configurations(list)) => Some(print::configurations(&list, to)),
         Some(Content::Monitors(list)) => Some(print::monitors(&list, to)),
         Some(Content::Coordinator(chart)) => Some(print::coordinator(&chart, to)),

@@ -123,6 +123,7 @@ pub fn language(path: &Path) -> Option<Language> {
     match path.extension()?.to_str()? {
         "lua" => Some(Language::Lua),
         "yaml" | "yml" => Some(Language::Yaml),
+        "scxml" => Some(Language::Scxml),
         _ => None,
     }
 }

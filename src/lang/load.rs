@@ -4,6 +4,7 @@ use super::files::{self, Sources};
 use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
 use super::params::Params;
+use super::scxml;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use super::trusted::{self, Trust, Trusted};
 use super::yaml;
@@ -167,6 +168,7 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
             let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)))?;
             (made.configurations, made.chart, made.monitors)
         }
+        Language::Scxml => return scxml::read(cx, reading).map(Content::Coordinator),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             let is = |key: &str| matches!(&node.kind, Kind::Map(entries) if entries.iter().any(|e| e.key == key));
@@ -213,8 +215,8 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
 /// Reads a text into the source map. `named_at` is the place that named the file.
 fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -> Option<(Reading, Language)> {
     let Some(language) = files::language(path) else {
-        let message = format!("{} is neither Lua nor YAML by its name", path.display());
-        let help = "files end in `.lua`, `.yaml` or `.yml`";
+        let message = format!("{} is neither Lua, YAML nor SCXML by its name", path.display());
+        let help = "files end in `.lua`, `.yaml` or `.yml`, or `.scxml` for a coordinator";
         cx.refuse(Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, message).at(named_at).help(help));
         return None;
     };
@@ -246,6 +248,7 @@ fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin
             }
             made.configurations
         }
+        Language::Scxml => only_charts(cx, reading, "configurations"),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             only_key(cx, node, reading, "configurations", "a file of configurations")
@@ -264,11 +267,19 @@ fn monitor_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, para
             }
             made.monitors
         }
+        Language::Scxml => only_charts(cx, reading, "monitors"),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             only_key(cx, node, reading, "monitors", "a file of monitors")
         }
     }
+}
+
+/// SCXML has words for charts and for nothing else.
+fn only_charts(cx: &mut Cx, reading: Reading, what: &str) -> Option<Node> {
+    let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, format!("{what} are not written in SCXML"));
+    cx.refuse(finding.at(reading.whole).help("an SCXML file can be a coordinator"));
+    None
 }
 
 fn nothing(cx: &mut Cx, reading: Reading, what: &str, how: &str) {
@@ -335,6 +346,7 @@ fn coordinator(
             }
             made.chart?
         }
+        (Language::Scxml, _) => return scxml::read(cx, reading).map(|chart| (chart, None)),
         (Language::Yaml, _) => {
             let node = yaml::read(cx, reading)?;
             only_key(cx, node, reading, "coordinator", "a coordinator's file")?

@@ -12,6 +12,7 @@ mod lower;
 mod lua;
 mod params;
 pub mod print;
+mod scxml;
 mod tree;
 mod trusted;
 mod words;

@@ -287,6 +287,15 @@ codes! {
         "The component's type is declared `actuator: true`: starting or stopping it moves something. Here that happens only because `_default` covers it, which is easily overlooked. Name the component in the list if it is meant.";
     STALE_PLAN = "conf::stale_plan", "the system has changed since the plan was made",
         "A plan holds every decision and is valid for the system it was made from, no other. The system has changed since: make the plan anew.";
+    // ---- SCXML -------------------------------------------------------------------------------------------------------
+    SCXML_NO_COUNTERPART = "scxml::no_counterpart", "something of SCXML has no counterpart here",
+        "A coordinator holds no data, runs no code, and is in one state at a time. What of an SCXML document needs more (parallel regions, history, a data model, conditions, scripts, invocations, events that the chart raises to itself, transitions without a target) is refused, each at its place, with what to do instead.";
+    SCXML_PRIORITY = "scxml::priority", "SCXML would take another transition",
+        "Two active states, one inside the other, wait for the same event. In SCXML the inner one wins, in rFSM's semantics (and here) the outer one. Give the two transitions different events, or change the chart so that only one of them can be meant.";
+    SCXML_PREFIX = "scxml::prefix", "SCXML compares only the beginning of an event's name",
+        "In SCXML `e` also means `e.x` and `e.y`; here names are compared whole. List every event that is meant.";
+    SCXML_SENT_HOME = "scxml::sent_home", "an event would come back to the chart in SCXML",
+        "A `<send>` without a target puts the event into the chart's own queue. Here a name that is raised leaves the coordinator: it is a request, or an event for others. Write a target if that is meant; else go to the state in question.";
     // ---- stack -----------------------------------------------------------------------------------------------------
     STACK_EMPTY = "stack::empty", "there is nothing to undo",
         "The stack holds no frame that could be popped: nothing was applied, or all of it was undone already, or it was committed. `davit stack` shows the frames.";
@@ -511,6 +520,8 @@ codes! {
          a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
+    CLI_FORMAT_OF_COORDINATORS = "cli::format_of_coordinators", "the format is one of coordinators only",
+        "PlantUML, SCXML and rFSM's JSON have a form for statecharts and none for components or plans. Ask for `--what coordinator`, or for a picture.";
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";

@@ -8,6 +8,7 @@ pub mod event;
 pub mod finding;
 pub mod monitor;
 pub mod names;
+pub mod outline;
 pub mod program;
 pub mod run_state;
 pub mod snapshot;

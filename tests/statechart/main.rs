@@ -6,4 +6,5 @@ mod naive;
 mod random;
 mod rfsm;
 mod scripted;
+mod scxml;
 mod support;

@@ -219,7 +219,7 @@ fn a_reaction_taken_at_once_is_the_one_taken_step_by_step() {
     assert!(taken.get() * 10 > all.get(), "only {} in {} charts: the test has become empty", taken.get(), all.get());
 }
 
-fn cases() -> u32 {
+pub fn cases() -> u32 {
     std::env::var("DAVIT_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(10_000)
 }
 

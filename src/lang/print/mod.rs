@@ -3,6 +3,7 @@
 
 mod lua;
 mod monitor;
+pub mod scxml;
 mod yaml;
 
 pub use lua::{configurations_lua, coordinator_lua};
@@ -13,11 +14,12 @@ use crate::diagnostics::Language;
 use crate::model::{Configuration, Deployment, Ident, Statechart};
 use std::time::Duration;
 
-/// Configurations in a language.
+/// Configurations in a language; YAML for SCXML, which has no word for them.
 pub fn configurations(list: &[Configuration], language: Language) -> String {
     match language {
         Language::Lua => configurations_lua(list),
-        Language::Yaml => configurations_yaml(list),
+        // SCXML has no word for configurations.
+        Language::Yaml | Language::Scxml => configurations_yaml(list),
     }
 }
 
@@ -26,17 +28,19 @@ pub fn coordinator(chart: &Statechart, language: Language) -> String {
     match language {
         Language::Lua => coordinator_lua(chart),
         Language::Yaml => coordinator_yaml(chart),
+        Language::Scxml => scxml::coordinator_scxml(chart),
     }
 }
 
 /// A deployment as files, by name: itself first (always YAML), then its configurations, its coordinators and its
 /// monitors, where it has any, in the language given.
 pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, String)> {
-    let ending = match language {
-        Language::Lua => "lua",
-        Language::Yaml => "yaml",
+    let (ending, other) = match language {
+        Language::Lua => ("lua", "lua"),
+        Language::Yaml => ("yaml", "yaml"),
+        Language::Scxml => ("scxml", "yaml"),
     };
-    let c = format!("configurations.{ending}");
+    let c = format!("configurations.{other}");
     let one = deployment.first.is_none() && deployment.beside.is_empty();
     let file =
         |name: &Ident| if one { format!("coordinator.{ending}") } else { format!("{name}.coordinator.{ending}") };
@@ -45,7 +49,7 @@ pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, S
         .chain(deployment.beside.iter().map(|b| &b.chart))
         .map(|chart| coordinator(chart, language))
         .collect();
-    let m = (!deployment.monitors.is_empty()).then(|| format!("monitors.{ending}"));
+    let m = (!deployment.monitors.is_empty()).then(|| format!("monitors.{other}"));
     let main = deployment_yaml(deployment, &[&c], &coordinators, m.as_deref());
     let mut files = vec![
         (format!("{}.deployment.yaml", deployment.name), main),

@@ -11,14 +11,14 @@ use std::time::Duration;
 fn text(t: &str, language: Language) -> String {
     match language {
         Language::Lua => lua::quoted(t),
-        Language::Yaml => yaml::text(t),
+        Language::Yaml | Language::Scxml => yaml::text(t),
     }
 }
 
 fn list(items: &[String], language: Language) -> String {
     match language {
         Language::Lua => format!("{{ {} }}", items.join(", ")),
-        Language::Yaml => format!("[{}]", items.join(", ")),
+        Language::Yaml | Language::Scxml => format!("[{}]", items.join(", ")),
     }
 }
 
@@ -26,7 +26,7 @@ fn list(items: &[String], language: Language) -> String {
 fn call(word: &str, args: &[String], language: Language) -> String {
     match language {
         Language::Lua => format!("{word}({})", args.join(", ")),
-        Language::Yaml => match args {
+        Language::Yaml | Language::Scxml => match args {
             // A list alone would be taken for several arguments.
             [one] if !one.starts_with('[') => format!("{{ {word}: {one} }}"),
             _ => format!("{{ {word}: {} }}", list(args, language)),
@@ -38,7 +38,7 @@ fn call(word: &str, args: &[String], language: Language) -> String {
 fn many(word: &str, items: &[String], language: Language) -> String {
     match language {
         Language::Lua => format!("{word} {}", list(items, language)),
-        Language::Yaml => format!("{{ {word}: {} }}", list(items, language)),
+        Language::Yaml | Language::Scxml => format!("{{ {word}: {} }}", list(items, language)),
     }
 }
 
@@ -46,14 +46,14 @@ fn many(word: &str, items: &[String], language: Language) -> String {
 fn method(word: &str, on: &str, argument: &str, language: Language) -> String {
     match language {
         Language::Lua => format!("{on}:{word}({argument})"),
-        Language::Yaml => call(word, &[on.to_owned(), argument.to_owned()], language),
+        Language::Yaml | Language::Scxml => call(word, &[on.to_owned(), argument.to_owned()], language),
     }
 }
 
 fn interval(i: Interval, language: Language) -> String {
     let infinite = match language {
         Language::Lua => "math.huge",
-        Language::Yaml => ".inf",
+        Language::Yaml | Language::Scxml => ".inf",
     };
     list(&[seconds(i.from), i.to.map_or(infinite.to_owned(), seconds)], language)
 }

@@ -1,0 +1,234 @@
+//! Printing a coordinator as SCXML (W3C, 2015).
+//!
+//! The meaning is kept as far as SCXML can hold it; what it has no word for stands in attributes of our own namespace,
+//! which other interpreters ignore and [`crate::lang`] reads back, so that nothing is lost on the way there and back:
+//!
+//! * names raised are `<send target="#_parent">`: they leave the chart and do not come back by themselves;
+//! * the completion of a leaf is an internal event, raised last on its entry;
+//! * a time event is a delayed `<send>`, cancelled on exit; `e_at` counts from the clock's start, which SCXML does not know;
+//! * connectors are states with transitions that have a condition on the event, decided one after the other, not beforehand;
+//! * **the outermost state wins in rFSM, the innermost in SCXML**, and priority numbers order only one state's transitions;
+//! * functions are left out.
+
+use crate::model::Origin;
+use crate::model::outline::{Link, Outline};
+use crate::model::statechart::{Action, INITIAL, Since, Statechart, Trigger};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// The namespace of SCXML.
+pub const SCXML: &str = "http://www.w3.org/2005/07/scxml";
+/// The namespace of what SCXML has no word for.
+pub const OURS: &str = "urn:davit:scxml:1";
+
+/// The chart as an SCXML document.
+pub fn coordinator_scxml(chart: &Statechart) -> String {
+    let outline = Outline::of(chart);
+    let mut out = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    let _ = writeln!(
+        out,
+        "<scxml xmlns=\"{SCXML}\" xmlns:davit=\"{OURS}\" version=\"1.0\" datamodel=\"ecmascript\" davit:semantics=\"rfsm\" initial=\"root\">"
+    );
+    out.push_str(
+        "  <!-- Written by davit. Of transitions that one event enables in several active states, the outermost is meant;\n       \
+         SCXML takes the innermost. What is sent to #_parent is a request or an event for the outside. -->\n",
+    );
+    let mut writer = Writer { out: &mut out, outline: &outline };
+    writer.node(0, 1);
+    out.push_str("</scxml>\n");
+    out
+}
+
+/// A text inside an attribute's quotes.
+fn quoted(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// An event's name in the characters that SCXML allows in one.
+pub fn plain_event(name: &str) -> String {
+    let plain = |c: char| if c.is_alphanumeric() || matches!(c, '_' | '-' | '.') { c } else { '.' };
+    let text: String = name.chars().map(plain).collect();
+    text.split('.').filter(|piece| !piece.is_empty()).collect::<Vec<_>>().join(".")
+}
+
+struct Writer<'a> {
+    out: &'a mut String,
+    outline: &'a Outline<'a>,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, depth: usize, text: &str) {
+        let _ = writeln!(self.out, "{}{text}", "  ".repeat(depth));
+    }
+
+    fn links(&self, of: usize) -> Vec<Link<'_>> {
+        self.outline.links.iter().filter(|link| link.src == of).cloned().collect()
+    }
+
+    /// The one transition of an initial connector that needs no event: then `<initial>` says it.
+    fn simple_initial(&self, at: usize) -> Option<Link<'_>> {
+        let initial = self.outline.child(at, INITIAL).filter(|i| self.outline.items[*i].state.is_none())?;
+        match &self.links(initial)[..] {
+            [one] if one.transition.events.is_empty() && one.transition.guard.is_none() => Some(one.clone()),
+            _ => None,
+        }
+    }
+
+    /// The id to go to for going to `at`.
+    fn target(&self, at: usize) -> String {
+        let item = &self.outline.items[at];
+        match item.parent {
+            Some(around) if item.name == INITIAL && self.simple_initial(around).is_some() => {
+                self.outline.items[around].fqn.clone()
+            }
+            _ => item.fqn.clone(),
+        }
+    }
+
+    fn node(&mut self, at: usize, depth: usize) {
+        let outline = self.outline;
+        let item = &outline.items[at];
+        let composite = outline.is_composite(at);
+        let initial = self.simple_initial(at).map(|link| (self.target(link.tgt), link.transition.effect.clone()));
+        let mut head = format!("<state id=\"{}\"", quoted(&item.fqn));
+        let Some(state) = item.state else {
+            self.line(depth, &format!("{head} davit:kind=\"connector\">"));
+            self.transitions(at, depth + 1);
+            return self.line(depth, "</state>");
+        };
+        if composite && initial.is_none() && outline.child(at, INITIAL).is_some() {
+            let _ = write!(head, " initial=\"{}.{INITIAL}\"", quoted(&item.fqn));
+        }
+        if !state.config.is_empty() {
+            let ids: Vec<&str> = state.config.iter().map(|(id, _)| id.as_str()).collect();
+            let _ = write!(head, " davit:config=\"{}\"", ids.join(" "));
+        }
+        self.line(depth, &format!("{head}>"));
+        if let Some((target, effect)) = initial {
+            self.line(depth + 1, "<initial>");
+            self.transition(depth + 2, &format!(" target=\"{}\"", quoted(&target)), &effect);
+            self.line(depth + 1, "</initial>");
+        }
+        let timers = self.timers(at);
+        let configs: Vec<&str> = state.config.iter().map(|(id, _)| id.as_str()).collect();
+        if !state.entry.is_empty() || !configs.is_empty() || !timers.is_empty() || !composite {
+            self.line(depth + 1, "<onentry>");
+            self.actions(depth + 2, &state.entry);
+            for id in &configs {
+                self.line(depth + 2, &format!("<send event=\"{id}\" target=\"#_parent\" davit:config=\"true\"/>"));
+            }
+            for (event, delay) in &timers {
+                let event = quoted(event);
+                let send = format!("<send event=\"{event}\" id=\"{event}\" delay=\"{delay}s\" davit:timer=\"true\"/>");
+                self.line(depth + 2, &send);
+            }
+            if !composite {
+                let done = plain_event(&format!("e_done@{}", item.fqn));
+                self.line(depth + 2, &format!("<raise event=\"{}\" davit:done=\"true\"/>", quoted(&done)));
+            }
+            self.line(depth + 1, "</onentry>");
+        }
+        if !state.exit.is_empty() || !configs.is_empty() || !timers.is_empty() {
+            self.line(depth + 1, "<onexit>");
+            for event in timers.keys() {
+                self.line(depth + 2, &format!("<cancel sendid=\"{}\"/>", quoted(event)));
+            }
+            for id in configs.iter().rev() {
+                self.line(depth + 2, &format!("<send event=\"{id}.undo\" target=\"#_parent\" davit:config=\"true\"/>"));
+            }
+            self.actions(depth + 2, &state.exit);
+            self.line(depth + 1, "</onexit>");
+        }
+        self.transitions(at, depth + 1);
+        for child in outline.children(at).collect::<Vec<_>>() {
+            let folded = outline.items[child].name == INITIAL
+                && outline.items[child].state.is_none()
+                && self.simple_initial(at).is_some();
+            if !folded {
+                self.node(child, depth + 1);
+            }
+        }
+        self.line(depth, "</state>");
+    }
+
+    /// Time events of a state that count from its entry, with their seconds.
+    fn timers(&self, at: usize) -> BTreeMap<String, f64> {
+        let fqn = &self.outline.items[at].fqn;
+        let links = self.links(at);
+        let triggers = links.iter().flat_map(|link| &link.transition.events);
+        let timed = triggers.filter_map(|(trigger, _)| match trigger {
+            Trigger::Timed(timed) if timed.since == Since::Entry => {
+                Some((plain_event(&timed.event_of(fqn)), timed.seconds.max(0.0)))
+            }
+            _ => None,
+        });
+        timed.collect()
+    }
+
+    fn transitions(&mut self, at: usize, depth: usize) {
+        let outline = self.outline;
+        let fqn = &outline.items[at].fqn;
+        let connector = outline.items[at].state.is_none();
+        for link in outline.links.iter().filter(|link| link.src == at) {
+            let transition = link.transition;
+            let mut plain = Vec::new();
+            let mut written = Vec::new();
+            for (trigger, _) in &transition.events {
+                let name = match trigger {
+                    Trigger::Event(name) if name.as_str() == "e_done" => format!("e_done@{fqn}"),
+                    Trigger::Event(name) => name.to_string(),
+                    Trigger::Timed(timed) => timed.event_of(fqn),
+                    Trigger::Predicate(_) => continue,
+                };
+                plain.push(plain_event(&name));
+                written.push(trigger.to_string());
+            }
+            let mut attributes = String::new();
+            if connector && !plain.is_empty() {
+                let names: Vec<String> = plain.iter().map(|name| format!("'{name}'")).collect();
+                let _ = write!(attributes, " cond=\"[{}].indexOf(_event.name) &gt;= 0\"", quoted(&names.join(",")));
+            } else if !connector {
+                let event = if plain.is_empty() { "*".to_owned() } else { plain.join(" ") };
+                let _ = write!(attributes, " event=\"{}\"", quoted(&event));
+            }
+            if plain != written || connector && !written.is_empty() {
+                let _ = write!(attributes, " davit:event=\"{}\"", quoted(&written.join(" ")));
+            }
+            if transition.pn != 0.0 {
+                let _ = write!(attributes, " davit:pn=\"{}\"", transition.pn);
+            }
+            let _ = write!(attributes, " target=\"{}\"", quoted(&self.target(link.tgt)));
+            self.transition(depth, &attributes, &transition.effect);
+        }
+    }
+
+    fn transition(&mut self, depth: usize, attributes: &str, effect: &[(Action, Origin)]) {
+        if effect.is_empty() {
+            return self.line(depth, &format!("<transition{attributes}/>"));
+        }
+        self.line(depth, &format!("<transition{attributes}>"));
+        self.actions(depth + 1, effect);
+        self.line(depth, "</transition>");
+    }
+
+    fn actions(&mut self, depth: usize, actions: &[(Action, Origin)]) {
+        for (action, _) in actions {
+            match action {
+                Action::Raise(event) => {
+                    self.line(depth, &format!("<send event=\"{}\" target=\"#_parent\"/>", quoted(event.as_str())));
+                }
+                Action::Function(_) => self.line(depth, "<!-- a function, left out -->"),
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Places in a document, and its depth before it is parsed.
+
+use crate::lang::tree::{Cx, Reading};
+use crate::limits;
+use crate::model::Origin;
+
+/// Where nesting goes past the bound, if it does. Counted before parsing, roughly: what stands in comments counts as well.
+pub fn too_deep(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let (mut depth, mut at, mut quote) = (0_usize, 0, None);
+    let mut opened = false;
+    while at < bytes.len() {
+        let byte = bytes[at];
+        match (quote, byte) {
+            (Some(q), b) if b == q => quote = None,
+            (Some(_), _) => {}
+            (None, b'"' | b'\'') if opened => quote = Some(byte),
+            (None, b'<') => match bytes.get(at + 1) {
+                Some(b'/') => depth = depth.saturating_sub(1),
+                Some(b'!' | b'?') => {}
+                _ => {
+                    depth += 1;
+                    opened = true;
+                    if depth > limits::XML_DEPTH {
+                        return Some(at);
+                    }
+                }
+            },
+            (None, b'>') if opened => {
+                if at > 0 && bytes[at - 1] == b'/' {
+                    depth -= 1;
+                }
+                opened = false;
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    None
+}
+
+/// Byte offsets as places.
+pub struct Places<'t> {
+    reading: Reading,
+    text: &'t str,
+    /// Offset, line and column about every so many bytes: a document may be one long line.
+    marks: Vec<(usize, u32, u32)>,
+}
+
+/// Bytes between two marks.
+const STRIDE: usize = 1024;
+
+impl<'t> Places<'t> {
+    pub fn new(reading: Reading, text: &'t str) -> Self {
+        let mut marks = vec![(0, 1, 0)];
+        let (mut line, mut column) = (1, 0);
+        for (at, c) in text.char_indices() {
+            if at >= marks.len() * STRIDE {
+                marks.push((at, line, column));
+            }
+            (line, column) = if c == '\n' { (line + 1, 0) } else { (line, column + 1) };
+        }
+        Self { reading, text, marks }
+    }
+
+    pub fn place(&self, cx: &mut Cx, offset: usize, length: u32) -> Origin {
+        let after = self.marks.partition_point(|(at, ..)| *at <= offset);
+        let (from, mut line, mut column) = self.marks[after.saturating_sub(1)];
+        for c in self.text.get(from..offset).unwrap_or_default().chars() {
+            (line, column) = if c == '\n' { (line + 1, 0) } else { (line, column + 1) };
+        }
+        cx.sources.exact(self.reading.file, line, column, length)
+    }
+}

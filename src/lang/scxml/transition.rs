@@ -1,0 +1,141 @@
+//! Transitions and what triggers them.
+
+use super::content::NO_COUNTERPART;
+use super::{Reader, is_state, own};
+use crate::lang::print::scxml::SCXML;
+use crate::model::finding::did_you_mean;
+use crate::model::statechart::{INITIAL, ROOT, Since, Transition, Trigger};
+use crate::model::{EventName, codes};
+use roxmltree::Node as Element;
+use std::collections::BTreeMap;
+
+impl<'t> Reader<'_, 't> {
+    /// Events that a state sends itself later, with their seconds.
+    pub(super) fn delays(&mut self, element: Element<'_, 't>) -> BTreeMap<String, f64> {
+        let sends = element.children().filter(|c| c.has_tag_name((SCXML, "onentry"))).flat_map(|c| c.children());
+        let timers = sends.filter(|c| c.has_tag_name((SCXML, "send")) && own(*c, "timer").is_none());
+        timers.filter_map(|c| Some((c.attribute("event")?.to_owned(), seconds(c.attribute("delay")?)?))).collect()
+    }
+
+    pub(super) fn one_target(&mut self, element: Element<'_, 't>, ids: &str) -> Option<String> {
+        let mut all = ids.split_whitespace();
+        let (first, more) = (all.next()?, all.next());
+        if more.is_some() {
+            self.report(
+                element,
+                codes::SCXML_NO_COUNTERPART,
+                "several targets are entered in parallel".to_owned(),
+                NO_COUNTERPART[0].1,
+            );
+            return None;
+        }
+        match self.ids.get(first) {
+            Some(target) if target == ROOT => Some(format!("{ROOT}.{INITIAL}")),
+            Some(target) => Some(target.clone()),
+            None => {
+                let help = did_you_mean(first, "states", self.ids.keys().map(String::as_str));
+                self.report(element, codes::TEXT_BAD_VALUE, format!("there is no state `{first}`"), &help);
+                None
+            }
+        }
+    }
+
+    pub(super) fn transition(
+        &mut self,
+        element: Element<'_, 't>,
+        src: &str,
+        fqn: &str,
+        source: Element<'_, 't>,
+        delays: &BTreeMap<String, f64>,
+    ) -> Option<Transition> {
+        let origin = self.at(element);
+        let Some(ids) = element.attribute("target") else {
+            let help = "a transition always leads somewhere: raise the names on the entry of a state";
+            self.report(element, codes::SCXML_NO_COUNTERPART, "a transition without a target".to_owned(), help);
+            return None;
+        };
+        let target = self.one_target(element, ids)?;
+        if element.attribute("cond").is_some() && own(element, "event").is_none() {
+            let help = "let what decides raise one event or another";
+            self.report(element, codes::SCXML_NO_COUNTERPART, "a condition on data".to_owned(), help);
+            return None;
+        }
+        let inside = target.strip_prefix(fqn).is_some_and(|rest| rest.starts_with('.'));
+        if element.attribute("type") == Some("internal") && inside && src != INITIAL && source.children().any(is_state)
+        {
+            let help = "here the state is left and entered again; write the transition at the states inside";
+            self.report(
+                element,
+                codes::SCXML_NO_COUNTERPART,
+                "an internal transition of a state around its target".to_owned(),
+                help,
+            );
+            return None;
+        }
+        let mut out = Transition { origin, ..Transition::default() };
+        out.src = Some((src.to_owned(), origin));
+        out.tgt = Some((target, origin));
+        let events = own(element, "event").or_else(|| element.attribute("event")).unwrap_or_default();
+        let exact = own(element, "event").is_some();
+        for event in events.split_whitespace().filter(|event| *event != "*") {
+            self.trigger(element, event, exact, delays, &mut out);
+        }
+        if events.split_whitespace().any(|event| event == "*") {
+            out.events.clear();
+        }
+        if let Some(pn) = own(element, "pn") {
+            out.pn = pn.parse().ok().filter(|pn: &f64| pn.is_finite()).unwrap_or_default();
+        }
+        let (effect, timers) = self.actions(element);
+        if let Some(event) = timers.keys().next() {
+            let message = format!("`{event}` is sent later by a transition");
+            self.report(
+                element,
+                codes::SCXML_NO_COUNTERPART,
+                message,
+                "send it on the entry of the state that waits for it",
+            );
+        }
+        out.effect = effect;
+        Some(out)
+    }
+
+    fn trigger(
+        &mut self,
+        element: Element<'_, 't>,
+        event: &str,
+        exact: bool,
+        delays: &BTreeMap<String, f64>,
+        out: &mut Transition,
+    ) {
+        let event = if exact { event } else { event.strip_suffix(".*").unwrap_or(event) };
+        if let Some(seconds) = delays.get(event).filter(|_| !exact) {
+            out.events.push((Trigger::timed(Since::Entry, *seconds), out.origin));
+            return;
+        }
+        if let Some(id) = event.strip_prefix("done.state.").filter(|_| !exact) {
+            let finals = self.finals.get(id).cloned().unwrap_or_default();
+            if finals.is_empty() {
+                let help = "give the state a `<final>` inside: its completion is that of one of those";
+                self.report(element, codes::SCXML_NO_COUNTERPART, format!("`{event}` never comes"), help);
+            }
+            let names = finals.iter().filter_map(|fqn| EventName::new(&format!("e_done@{fqn}")).ok());
+            out.events.extend(names.map(|name| (Trigger::Event(name), out.origin)));
+            return;
+        }
+        match Trigger::parse(event) {
+            Ok(trigger) => out.events.push((trigger, out.origin)),
+            Err(error) => self.report(element, codes::TEXT_BAD_NAME, error.to_string(), "write the name of an event"),
+        }
+    }
+}
+
+/// A CSS2 time in seconds.
+pub(super) fn seconds(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let (number, unit) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1e-3),
+        None => (text.strip_suffix('s')?, 1.0),
+    };
+    number.trim().parse().ok().map(|v: f64| v * unit).filter(|v| v.is_finite() && *v >= 0.0)
+}

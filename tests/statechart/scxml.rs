@@ -1,0 +1,231 @@
+//! SCXML: what is written comes back as a chart of the same behaviour; what other programs write is read as far as it has
+//! a meaning here, and every element that has none is named at its place.
+
+use crate::random::chart;
+use davit::diagnostics::Language;
+use davit::lang::{self, LoadOptions, Sources, print};
+use davit::model::codes;
+use davit::model::finding::Severity;
+use davit::model::statechart::Statechart;
+use davit::statechart::{Sim, compile};
+use proptest::prelude::*;
+use std::cell::Cell;
+use std::path::Path;
+
+fn load(text: &str) -> lang::LoadedCoordinator {
+    lang::load_coordinator(&Sources::memory([("m.scxml", text)]), Path::new("m.scxml"), &LoadOptions::default())
+}
+
+fn read(text: &str) -> Statechart {
+    let loaded = load(text);
+    loaded.coordinator.unwrap_or_else(|| panic!("{:#?}\n{text}", loaded.findings))
+}
+
+/// Code, severity and line:column of each finding.
+fn findings(text: &str) -> Vec<String> {
+    let loaded = load(text);
+    let told = |f: &davit::model::Finding| {
+        assert!(f.help.is_some(), "no help: {}", f.message);
+        let at = loaded.sources.locate(f.origin).map_or("-".to_owned(), |l| format!("{}:{}", l.line, l.column));
+        let weight = if f.severity == Severity::Error { "" } else { "warning " };
+        format!("{weight}{} {at} {}", f.code, f.message)
+    };
+    loaded.findings.iter().map(told).collect()
+}
+
+const HEAD: &str = "<scxml xmlns=\"http://www.w3.org/2005/07/scxml\" version=\"1.0\" initial=\"a\">\n";
+
+fn document(body: &str) -> String {
+    format!("{HEAD}{body}</scxml>\n")
+}
+
+/// Both do the same with the same lines; charts that are refused are refused both times.
+fn same_after_the_round(bytes: &[u8], script: &[u8]) -> Result<bool, TestCaseError> {
+    let model = chart(bytes);
+    let (Some(first), _) = compile(&model) else { return Ok(false) };
+    let text = print::coordinator(&model, Language::Scxml);
+    let loaded = load(&text);
+    prop_assert!(loaded.findings.is_empty(), "{:?}\n{text}", loaded.findings);
+    let back = loaded.coordinator.unwrap();
+    let (second, findings) = compile(&back);
+    let Some(second) = second else { panic!("{findings:#?}\n{text}") };
+    let (mut one, mut other) = (Sim::new(&first), Sim::new(&second));
+    for byte in script {
+        let line = match byte % 8 {
+            0 => "advance 0.7".to_owned(),
+            1 => "run".to_owned(),
+            2 => "e1 e3 e_done@root.a".to_owned(),
+            n => format!("e{}", n % 5),
+        };
+        prop_assert_eq!(
+            one.line(&line).unwrap(),
+            other.line(&line).unwrap(),
+            "line `{}` of {:#?}\n{}",
+            line,
+            model,
+            text
+        );
+    }
+    // What was read is written the same again.
+    prop_assert_eq!(print::coordinator(&back, Language::Scxml), text);
+    Ok(true)
+}
+
+#[test]
+fn what_is_written_comes_back_with_the_same_behaviour() {
+    let (ran, all) = (Cell::new(0), Cell::new(0));
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: crate::random::cases() / 4,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let bytes = proptest::collection::vec(any::<u8>(), 0..220);
+    let script = proptest::collection::vec(any::<u8>(), 1..16);
+    let result = runner.run(&(bytes, script), |(bytes, script)| {
+        ran.set(ran.get() + usize::from(same_after_the_round(&bytes, &script)?));
+        all.set(all.get() + 1);
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+    assert!(ran.get() * 4 > all.get(), "only {} of {} charts: the test has become empty", ran.get(), all.get());
+}
+
+#[test]
+fn a_foreign_document_runs() {
+    let chart = read(
+        "<?xml version=\"1.0\"?>
+<scxml xmlns=\"http://www.w3.org/2005/07/scxml\" version=\"1.0\" initial=\"off\">
+  <!-- a lamp with a timer -->
+  <state id=\"off\"><transition event=\"switch\" target=\"on\"/></state>
+  <state id=\"on\">
+    <onentry><send event=\"lamp.on\" target=\"#_scxml_lamp\"/></onentry>
+    <onexit><send event=\"lamp.off\" target=\"#_scxml_lamp\"/></onexit>
+    <transition event=\"switch\" target=\"off\"/>
+    <transition event=\"done.state.on\" target=\"tired\"/>
+    <state id=\"dim\"><transition event=\"more.*\" target=\"bright\"/></state>
+    <state id=\"bright\">
+      <onentry><send event=\"late\" id=\"t\" delay=\"500ms\"/></onentry>
+      <onexit><cancel sendid=\"t\"/></onexit>
+      <transition event=\"late\" target=\"spent\"><send event=\"warn\" target=\"#_parent\"/></transition>
+    </state>
+    <final id=\"spent\"/>
+  </state>
+  <state id=\"tired\"><transition event=\"*\" target=\"off\"/></state>
+</scxml>",
+    );
+    let (chart, _) = compile(&chart);
+    let chart = chart.unwrap();
+    let mut sim = Sim::new(&chart);
+    let mut line = |text: &str| {
+        let seen = sim.line(text).unwrap();
+        (seen.active.last().unwrap().clone(), seen.actions)
+    };
+    assert_eq!(line("run").0, "root.off");
+    let (at, done) = line("switch");
+    assert_eq!(at, "root.on.dim", "the first state written is where it begins");
+    assert!(done.contains(&"raise lamp.on".to_owned()), "{done:?}");
+    assert_eq!(line("more").0, "root.on.bright");
+    assert_eq!(line("advance 0.4").0, "root.on.bright");
+    line("advance 0.2");
+    let (at, done) = line("");
+    assert_eq!(at, "root.on.spent");
+    assert!(done.contains(&"raise warn".to_owned()), "{done:?}");
+    let (at, done) = line("");
+    assert_eq!((at.as_str(), done.contains(&"raise lamp.off".to_owned())), ("root.tired", true));
+    assert_eq!(line("").0, "root.off", "any event, and its own completion is one");
+}
+
+#[test]
+fn every_element_without_a_counterpart_is_named_at_its_place() {
+    let said = |body: &str| findings(&document(body));
+    for (body, at, what) in [
+        ("<parallel id=\"a\"/>", "2:1", "parallel"),
+        ("<state id=\"a\"><history id=\"h\"/></state>", "2:15", "history"),
+        ("<state id=\"a\"/><datamodel><data id=\"x\"/></datamodel>", "2:27", "data"),
+        ("<state id=\"a\"/><script>x</script>", "2:16", "script"),
+        ("<state id=\"a\"><invoke/></state>", "2:15", "invoke"),
+        ("<state id=\"a\"><onentry><assign/></onentry></state>", "2:24", "assign"),
+        ("<state id=\"a\"><onentry><raise event=\"e\"/></onentry></state>", "2:24", "raise"),
+        ("<state id=\"a\"><onexit><if cond=\"x\"/></onexit></state>", "2:23", "if"),
+        ("<state id=\"a\"><onexit><foreach/></onexit></state>", "2:23", "foreach"),
+        ("<state id=\"a\"><onexit><send event=\"e\" target=\"#_internal\"/></onexit></state>", "2:23", "send"),
+        ("<final id=\"a\"><donedata/></final>", "2:15", "donedata"),
+    ] {
+        let found = said(body);
+        let expected = format!("{} {at} `{what}` has no counterpart here", codes::SCXML_NO_COUNTERPART);
+        assert_eq!(found, [expected], "{body}");
+    }
+    for (body, words) in [
+        ("<state id=\"a\"><transition event=\"e\"/></state>", "a transition without a target"),
+        ("<state id=\"a\"><transition event=\"e\" cond=\"x\" target=\"a\"/></state>", "a condition on data"),
+        ("<state id=\"a\"><transition event=\"e\" target=\"a b\"/></state><state id=\"b\"/>", "entered in parallel"),
+        (
+            "<state id=\"a\"><transition event=\"e\" type=\"internal\" target=\"b\"/><state id=\"b\"/></state>",
+            "an internal transition",
+        ),
+        ("<state id=\"a\"><onentry><send eventexpr=\"x\"/></onentry></state>", "without a fixed name"),
+        ("<state id=\"a\"><onentry><send event=\"x\" delayexpr=\"y\"/></onentry></state>", "a delay that is computed"),
+        ("<state id=\"a\"><onentry><send event=\"x\" delay=\"1s\"/></onentry></state>", "no transition of this state"),
+        ("<state id=\"a\"><onentry><send event=\"x\" delay=\"soon\"/></onentry></state>", "`soon` is not a time"),
+        ("<state id=\"a\"><transition event=\"done.state.a\" target=\"a\"/></state>", "never comes"),
+        ("<state id=\"a\"><transition event=\"e\" target=\"aa\"/></state>", "there is no state `aa`"),
+        ("<state id=\"a-b\"/><state id=\"a\"/>", "`a-b` is not the name of a state"),
+        ("<state id=\"a\"/><state id=\"a\"/>", "two states have the id `a`"),
+        ("<state id=\"a\"><transitoin/></state>", "SCXML has no element `transitoin`"),
+        ("<state id=\"a\"><initial/><state id=\"b\"/></state>", "`initial` holds no transition"),
+    ] {
+        let found = said(body);
+        assert!(matches!(&found[..], [one] if one.contains(words)), "{body}: {found:?}");
+    }
+    assert!(findings("<html/>")[0].contains("text::nothing"));
+    assert!(findings(&document("")).iter().any(|f| f.contains("no state")));
+}
+
+#[test]
+fn what_would_be_decided_otherwise_is_a_warning() {
+    let inner = document(
+        "<state id=\"a\"><transition event=\"e\" target=\"b\"/>\n<state id=\"c\"><transition event=\"e.x\" target=\"d\"/></state><state id=\"d\"/></state><state id=\"b\"/>",
+    );
+    assert!(
+        matches!(&findings(&inner)[..], [one] if one.starts_with("warning scxml::priority 3:15")),
+        "{:?}",
+        findings(&inner)
+    );
+    let prefix = document(
+        "<state id=\"a\"><transition event=\"e\" target=\"b\"/><transition event=\"e.x\" target=\"a\"/></state><state id=\"b\"/>",
+    );
+    assert!(
+        matches!(&findings(&prefix)[..], [one] if one.starts_with("warning scxml::prefix")),
+        "{:?}",
+        findings(&prefix)
+    );
+    let home = document("<state id=\"a\"><onentry><send event=\"e\"/></onentry></state>");
+    assert!(
+        matches!(&findings(&home)[..], [one] if one.starts_with("warning scxml::sent_home")),
+        "{:?}",
+        findings(&home)
+    );
+}
+
+#[test]
+fn hostile_documents_are_refused() {
+    let bomb = "<!DOCTYPE x [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;\">]>\n<scxml>&b;</scxml>";
+    assert!(findings(bomb)[0].starts_with("text::syntax"), "{:?}", findings(bomb));
+    let deep = document(&"<state id=\"a\">".repeat(100_000));
+    let found = findings(&deep);
+    assert!(matches!(&found[..], [one] if one.starts_with("text::too_deep")), "{found:?}");
+    let quoted =
+        document(&format!("<state id=\"a\"><onentry><log expr=\"{}\"/></onentry></state>", "&lt;x>".repeat(1000)));
+    assert_eq!(findings(&quoted), [""; 0], "what looks like elements inside a value is none");
+    let many = document(&"<q/>".repeat(1_100_000));
+    assert!(findings(&many)[0].starts_with("text::too_many_values"), "{}", findings(&many)[0]);
+    for broken in ["", "<", "<scxml", "<scxml>", "<scxml></state></scxml>", "\u{0}", "<a b=\"&x;\"/>"] {
+        assert!(!findings(broken).is_empty(), "{broken:?}");
+    }
+    let wide: String =
+        (0..20_000).map(|n| format!("<state id=\"s{n}\"><transition event=\"e\" target=\"a\"/></state>")).collect();
+    let wide = read(&document(&format!("<state id=\"a\"/>{wide}")));
+    assert_eq!(wide.root.children.len(), 20_001);
+}
