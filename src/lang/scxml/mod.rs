@@ -139,10 +139,8 @@ impl<'t> Reader<'_, 't> {
     /// Gives every state its full name.
     fn name_all(&mut self, element: Element<'_, 't>, fqn: &str) {
         let around = element.attribute("id").map(|id| format!("{id}."));
-        let mut number = 0;
-        for child in element.children().filter(|child| is_state(*child)) {
-            number += 1;
-            let id = child.attribute("id").map_or_else(|| format!("state_{number}"), str::to_owned);
+        for (number, child) in element.children().filter(|child| is_state(*child)).enumerate() {
+            let id = child.attribute("id").map_or_else(|| format!("state_{}", number + 1), str::to_owned);
             let name = around.as_ref().and_then(|around| id.strip_prefix(around)).unwrap_or(&id).to_owned();
             if let Err(error) = Ident::new(&name) {
                 let message = format!("`{id}` is not the name of a state: {}", error.reason);
@@ -200,7 +198,6 @@ impl<'t> Reader<'_, 't> {
             }
         }
         self.others(element);
-        let mut used = Vec::new();
         if fqn == ROOT {
             for child in element.children().filter(|c| c.has_tag_name((SCXML, "transition"))) {
                 self.report(
@@ -211,11 +208,10 @@ impl<'t> Reader<'_, 't> {
                 );
             }
         }
-        used.extend(delayed.keys().cloned());
-        for event in used {
+        for event in delayed.keys() {
             let heard = element.children().any(|c| {
                 c.has_tag_name((SCXML, "transition"))
-                    && c.attribute("event").is_some_and(|e| e.split_whitespace().any(|e| e == event))
+                    && c.attribute("event").is_some_and(|e| e.split_whitespace().any(|e| e == event.as_str()))
             });
             if !heard {
                 let message = format!("`{event}` is sent later, and no transition of this state waits for it");
