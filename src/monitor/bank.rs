@@ -203,7 +203,8 @@ impl Bank {
         if now < self.last {
             self.troubles.backwards += 1;
         }
-        let now = now.max(self.last);
+        let before = self.last;
+        let now = now.max(before);
         self.last = now;
         if !self.watches.iter().any(|w| w.enabled) {
             return;
@@ -223,7 +224,7 @@ impl Bank {
             *known = fresh;
         }
         for (i, watch) in self.watches.iter_mut().enumerate().filter(|(_, w)| w.enabled) {
-            watch.step(now, &self.samples, &mut |event| raise(i, event));
+            watch.step(before, now, &self.samples, &mut |event| raise(i, event));
         }
     }
 
@@ -297,7 +298,7 @@ impl Watch {
         }
     }
 
-    fn step(&mut self, now: Time, samples: &[Sample], raise: &mut dyn FnMut(EventName)) {
+    fn step(&mut self, before: Time, now: Time, samples: &[Sample], raise: &mut dyn FnMut(EventName)) {
         let new = self.verdict.is_none();
         match self.sampling {
             Sampling::Every(period) => {
@@ -311,23 +312,28 @@ impl Watch {
             }
             Sampling::OnSample => {
                 let changed = self.slots.iter().zip(&self.held).any(|(slot, held)| samples[*slot].differs(held));
-                if !new && !changed && now < self.wake() {
+                if !new && !changed && now < time_of(self.program.next()).min(self.again) {
                     return;
                 }
             }
         }
         let mut target = now.as_nanos().saturating_mul(2);
+        // What was not there at the last look, whatever its stamp, counts from right behind it.
+        let looked = match self.sampling {
+            Sampling::OnSample => before.as_nanos().saturating_mul(2).max(self.program.position()),
+            Sampling::Every(_) => self.program.position(),
+        };
         if !new {
             // A second look at one instant counts as the next nanosecond.
             if target <= self.program.position() {
                 target = (self.program.position() | 1) + 1;
             }
             loop {
-                let position = self.program.next().min(self.pending(samples));
+                let position = self.program.next().min(self.pending(looked, samples));
                 if position >= target {
                     break;
                 }
-                self.arrive(position, samples);
+                self.arrive(looked, position, samples);
                 self.program.evaluate(position, &self.held);
                 if self.sampling == Sampling::OnSample {
                     self.repeat(time_of(position - 1), raise);
@@ -347,23 +353,23 @@ impl Watch {
         self.repeat(now, raise);
     }
 
-    /// The position from which a sample counts that is not held yet: its own instant, but after what is evaluated already.
-    fn arrival(&self, i: usize, sample: &Sample) -> Option<u64> {
+    /// The position from which a sample counts that is not held yet: its own instant, but after the last look.
+    fn arrival(&self, looked: u64, i: usize, sample: &Sample) -> Option<u64> {
         let news = self.stamped[i] && sample.present && sample.differs(&self.held[i]);
-        news.then(|| sample.at.as_nanos().saturating_mul(2).max(self.program.position() + 1))
+        news.then(|| sample.at.as_nanos().saturating_mul(2).max(looked.max(self.program.position()) + 1))
     }
 
     /// The first position from which a sample counts that is not held yet.
-    fn pending(&self, samples: &[Sample]) -> u64 {
-        let arrivals = self.slots.iter().enumerate().filter_map(|(i, slot)| self.arrival(i, &samples[*slot]));
+    fn pending(&self, looked: u64, samples: &[Sample]) -> u64 {
+        let arrivals = self.slots.iter().enumerate().filter_map(|(i, slot)| self.arrival(looked, i, &samples[*slot]));
         arrivals.min().unwrap_or(u64::MAX)
     }
 
     /// Takes the samples that count from `position` on.
-    fn arrive(&mut self, position: u64, samples: &[Sample]) {
+    fn arrive(&mut self, looked: u64, position: u64, samples: &[Sample]) {
         for i in 0..self.slots.len() {
             let sample = samples[self.slots[i]];
-            if self.arrival(i, &sample).is_some_and(|arrival| arrival <= position) {
+            if self.arrival(looked, i, &sample).is_some_and(|arrival| arrival <= position) {
                 self.held[i] = sample;
             }
         }

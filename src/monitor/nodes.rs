@@ -182,9 +182,10 @@ impl Truth {
     pub fn value(&mut self, position: u64, held: &[Sample], numbers: &[f64], before: &[Grade]) -> Grade {
         match self {
             Self::Compare { left, op, right, hysteresis, holds } => {
-                let grade = compare(numbers[*left], *op, numbers[*right], if *holds { *hysteresis } else { 0.0 });
-                *holds = grade.holds;
-                grade
+                let (left, right) = (numbers[*left], numbers[*right]);
+                *holds = compare(left, *op, right, if *holds { *hysteresis } else { 0.0 }).holds;
+                // How far from the contrary: from the bound that would end it, or that would begin it.
+                compare(left, *op, right, if *holds { *hysteresis } else { 0.0 })
             }
             Self::Age { slot, op, bound, start } => {
                 let begun = *start.get_or_insert(position);

@@ -122,7 +122,7 @@ fn hysteresis_keeps_what_began() {
         rig.sample("A.x", i as u64 * MS, v);
         seen.push((rig.bank.is_true(0).unwrap(), rig.bank.robustness(0).unwrap()));
     }
-    let robust = [-1.0, 0.0, 0.5, 1.0, 0.5, 0.0, -1.0, 1.0, f64::NEG_INFINITY, -1.0];
+    let robust = [-1.0, 0.0, 2.5, 1.0, 0.5, -2.0, -1.0, 3.0, f64::NEG_INFINITY, -1.0];
     let truth = [false, false, true, true, true, false, false, true, false, false];
     assert_eq!(seen, truth.into_iter().zip(robust).collect::<Vec<_>>());
 }

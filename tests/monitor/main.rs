@@ -1,4 +1,6 @@
 //! Monitors: the evaluator, against a reference that evaluates the definitions over the whole history.
 
 mod events;
+mod naive;
+mod random;
 mod support;
