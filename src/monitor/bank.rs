@@ -329,7 +329,8 @@ impl Watch {
                 target = (self.program.position() | 1) + 1;
             }
             loop {
-                let position = self.program.next().min(self.pending(looked, samples));
+                // Always onwards: time stands still for nobody.
+                let position = self.program.next().min(self.pending(looked, samples)).max(self.program.position() + 1);
                 if position >= target {
                     break;
                 }

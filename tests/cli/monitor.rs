@@ -54,6 +54,20 @@ lost (off)  0            0 s       –                 –
     assert!(ran.out.contains("1.100000001 s  e_lost"), "{}", ran.out);
 }
 
+/// The worked example of the chapter is what the program prints.
+#[test]
+fn the_chapter_shows_what_is_printed() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let chapter = std::fs::read_to_string(root.join("docs/monitors.md")).unwrap();
+    for file in ["first", "tuned"] {
+        let command = format!("davit monitor examples/monitors/{file}.lua --samples examples/monitors/contact.csv");
+        let args: Vec<&str> = command.split(' ').skip(1).collect();
+        let ran = crate::demo::at_home(&args);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        assert!(chapter.contains(&format!("$ {command}\n{}```", ran.out)), "{}", ran.out);
+    }
+}
+
 #[test]
 fn json_is_one_object_a_line() {
     let demo = demo(SAMPLES);

@@ -325,3 +325,21 @@ fn memory_is_bounded_and_merging_raises_nothing() {
         assert_eq!(exact.bank.troubles().merged, 0);
     }
 }
+
+/// Where a condition holds at an instant only, what must hold since begins right behind it.
+#[test]
+fn since_an_instant() {
+    let rise = || boxed(c(ConditionKind::Rise(boxed(above("A.x", 1.0)))));
+    let since = c(ConditionKind::Since {
+        hold: boxed(c(ConditionKind::No(rise()))),
+        from: rise(),
+        interval: Interval { from: ms(0), to: Some(ms(100)) },
+    });
+    let mut rig = Rig::new(&[monitor(since)]);
+    rig.sample("A.x", 0, 0.0);
+    rig.sample("A.x", 10 * MS, 5.0);
+    rig.sample("A.x", 20 * MS, 0.0);
+    rig.run(500 * MS);
+    // The interval is closed: the instant counts up to 100 ms after it.
+    assert_eq!(rig.events(), ["10000000 e_on", "110000001 e_off"]);
+}

@@ -1,5 +1,6 @@
 //! Monitors: the evaluator, against a reference that evaluates the definitions over the whole history.
 
+mod check;
 mod events;
 mod naive;
 mod random;

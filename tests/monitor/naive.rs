@@ -149,7 +149,7 @@ impl History {
                         let mut best = Grade::BOTTOM;
                         for u in window(now, interval) {
                             let mut held = hold[u + 1..=now].iter().fold(Grade::TOP, |a, b| a.and(*b));
-                            if (start + u) % STEPS != 0 && u < now {
+                            if !(start + u).is_multiple_of(STEPS) && u < now {
                                 held = held.and(hold[u]);
                             }
                             best = best.or(from[u].and(held));

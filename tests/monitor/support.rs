@@ -84,9 +84,7 @@ impl Rig {
 
     /// Steps at every time the bank wants one, up to and with `now`.
     pub fn run(&mut self, now: u64) {
-        while let Some(wake) = self.bank.next_wake().filter(|w| w.0 < now) {
-            self.step(wake.0);
-        }
+        self.run_before(now);
         self.step(now);
     }
 
@@ -100,7 +98,10 @@ impl Rig {
     }
 
     fn run_before(&mut self, now: u64) {
+        let mut last = None;
         while let Some(wake) = self.bank.next_wake().filter(|w| w.0 < now) {
+            assert!(last.is_none_or(|last| wake > last), "woken twice for {wake}");
+            last = Some(wake);
             self.step(wake.0);
         }
     }

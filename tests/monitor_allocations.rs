@@ -1,0 +1,77 @@
+//! Evaluating monitors allocates nothing, whatever they hold: counted by the allocator.
+
+use davit::lang::{LoadOptions, Sources, load_monitors};
+use davit::monitor::{Bank, Sample};
+use davit::time::Time;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: everything is the system allocator's; the counter is beside it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+const MONITORS: &str = r#"
+local high = above("A.x", 0.5, { hysteresis = 0.1 })
+Monitors {
+  a = monitor { when = high:for_at_least(3), event = "e", cleared = "c", repeat_every = 0.5 },
+  b = monitor { when = any { since(high, rise(below("A.y", 0.2)), { 0.5, 9 }), silent("A.y", 0.01), faulted("A") }, event = "e" },
+  c = monitor { when = all { high:once { 0.1, 20 }, no(high:historically { 1, math.huge }) }, event = "e", every = 0.01 },
+  d = monitor { when = below(sample_rate("A.y", 10), max { 300, norm { "A.x", "A.y" } }), event = "e" },
+  f = monitor { when = above("A.x", 0.9), event = "e" },
+  g = monitor { when = below("A.z", 100):within_last(20), event = "e" },
+  e = monitor { when = below(difference("A.z", abs("A.x")), 1):within_last(20), event = "e" },
+}
+"#;
+
+// One test: the counter is the whole program's.
+#[test]
+fn evaluating_allocates_nothing() {
+    let loaded = load_monitors(&Sources::memory([("m.lua", MONITORS)]), Path::new("m.lua"), &LoadOptions::default());
+    assert!(loaded.findings.is_empty(), "{:?}", loaded.findings);
+    let mut bank = Bank::new(&loaded.monitors);
+    let mut samples = vec![Sample::default(); bank.inputs().len()];
+    let mut raised = 0_u64;
+    let mut seed = 7_u64;
+    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    for i in 0..30_000_u64 {
+        let now = Time(i * 1_000_000);
+        for (n, sample) in samples.iter_mut().enumerate() {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            if (seed >> 60) > n as u64 {
+                // Noise, and a ramp that needs more memory than an operator has.
+                let noise = (seed >> 33) as f64 / (1_u64 << 31) as f64;
+                let value = if n == 3 { i as f64 * 1e-3 } else { noise };
+                *sample = Sample { value, at: now, writes: sample.writes + 1, present: true };
+            }
+        }
+        if i % 1000 == 999 {
+            bank.enable((i / 1000 % 2) as usize, i / 1000 % 4 < 2, now);
+        }
+        bank.step(now, &mut |n| samples[n], &mut |_, _| raised += 1);
+        let _ = (bank.next_wake(), bank.is_true(0), bank.robustness(1));
+    }
+    let allocations = ALLOCATIONS.load(Ordering::SeqCst) - before;
+    assert!(raised > 100, "{raised} events");
+    assert!(bank.troubles().merged > 0, "the memory of no operator was used up");
+    assert_eq!(allocations, 0);
+}
