@@ -48,7 +48,8 @@ Monitors {
 fn evaluating_allocates_nothing() {
     let loaded = load_monitors(&Sources::memory([("m.lua", MONITORS)]), Path::new("m.lua"), &LoadOptions::default());
     assert!(loaded.findings.is_empty(), "{:?}", loaded.findings);
-    let mut bank = Bank::new(&loaded.monitors);
+    // A copy too: a component is made of a template.
+    let mut bank = Bank::new(&loaded.monitors).clone();
     let mut samples = vec![Sample::default(); bank.inputs().len()];
     let mut raised = 0_u64;
     let mut seed = 7_u64;

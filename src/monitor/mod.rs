@@ -22,6 +22,7 @@ mod nodes;
 mod pieces;
 mod program;
 pub mod replay;
+mod ring;
 pub mod table;
 mod window;
 

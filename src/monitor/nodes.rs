@@ -2,9 +2,9 @@
 
 use super::bank::Sample;
 use super::grade::Grade;
+use super::ring::Ring;
 use super::window::{Since, Window};
 use crate::model::monitor::Comparison;
-use std::collections::VecDeque;
 
 /// A number, from samples and from numbers before it in the list.
 #[derive(Debug, Clone)]
@@ -68,7 +68,7 @@ pub struct Rate {
     /// Of the input, when last looked at.
     writes: u64,
     /// Where, and how many; old to new.
-    counts: VecDeque<(u64, u64)>,
+    counts: Ring<(u64, u64)>,
     total: u64,
     most: usize,
     merged: u64,
@@ -79,7 +79,7 @@ impl Rate {
     #[allow(clippy::cast_precision_loss)]
     pub fn new(window: u64, most: usize) -> Self {
         let most = most.max(2);
-        let counts = VecDeque::with_capacity(most);
+        let counts = Ring::new(most);
         let seconds = window as f64 / 2e9;
         Self { window, seconds, start: None, writes: 0, counts, total: 0, most, merged: 0 }
     }

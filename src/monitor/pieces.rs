@@ -1,13 +1,13 @@
 //! The pieces of a signal that may still become the largest in a sliding window.
 
 use super::grade::Grade;
-use std::collections::VecDeque;
+use super::ring::Ring;
 
 /// Pieces from old to new, each with the position at which it leaves the window; values fall from front to back, since a
 /// piece that is followed by a larger one can never be the largest again.
 #[derive(Debug, Clone)]
 pub struct Pieces {
-    ring: VecDeque<(u64, Grade)>,
+    ring: Ring<(u64, Grade)>,
     most: usize,
     upward: bool,
     merged: u64,
@@ -18,7 +18,7 @@ impl Pieces {
     /// small.
     pub fn new(most: usize, upward: bool) -> Self {
         let most = most.max(2);
-        Self { ring: VecDeque::with_capacity(most), most, upward, merged: 0 }
+        Self { ring: Ring::new(most), most, upward, merged: 0 }
     }
 
     /// Forgets everything but the count of what was merged.
