@@ -203,7 +203,7 @@ impl Args {
             return;
         }
         let out = &context.out;
-        let style = if raised.event == monitor.raise { Style::Care } else { Style::Good };
+        let style = if Some(raised.event) == monitor.raise { Style::Care } else { Style::Good };
         out.line(format!(
             "{:>14} s  {}  {} {}",
             decimal(raised.at),

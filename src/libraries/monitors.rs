@@ -150,7 +150,8 @@ impl Monitors {
         let (mut enabled, mut verdicts, mut robustness) = (Vec::new(), Vec::new(), Vec::new());
         for monitor in &plan.monitors {
             let name = monitor.name.as_str();
-            let doc = monitor.description.clone().unwrap_or_else(|| format!("Raises `{}`.", monitor.raise));
+            let raises = || monitor.raise.map_or_else(|| "Watches.".to_owned(), |event| format!("Raises `{event}`."));
+            let doc = monitor.description.clone().unwrap_or_else(raises);
             enabled.push(b.doc(&doc).property(name, monitor.enabled));
             verdicts.push(b.doc("Whether its condition is true.").output(&format!("is_{name}")));
             let margin = format!("{name}_robustness");

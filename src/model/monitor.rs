@@ -15,8 +15,8 @@ pub struct Monitor {
     pub name: Ident,
     /// What it watches for.
     pub when: Condition,
-    /// Raised when the condition becomes true.
-    pub raise: EventName,
+    /// Raised when the condition becomes true; none: the monitor only shows its verdict.
+    pub raise: Option<EventName>,
     /// Raised when it becomes false again.
     pub cleared: Option<EventName>,
     /// While it stays true, `raise` is raised again each time this has passed.
@@ -346,7 +346,7 @@ impl Monitor {
 
     /// The events it may raise.
     pub fn events(&self) -> impl Iterator<Item = EventName> + '_ {
-        std::iter::once(self.raise).chain(self.cleared)
+        self.raise.into_iter().chain(self.cleared)
     }
 }
 

@@ -120,7 +120,7 @@ struct Watch {
     held: Box<[Sample]>,
     /// Which of them are ports, whose samples tell their instant.
     stamped: Box<[bool]>,
-    raise: EventName,
+    raise: Option<EventName>,
     cleared: Option<EventName>,
     repeat: Option<Duration>,
     sampling: Sampling,
@@ -381,7 +381,7 @@ impl Watch {
         let holds = self.program.grade().holds;
         let before = self.verdict.replace(holds).unwrap_or(false);
         if holds && !before {
-            raise(self.raise);
+            self.raise.into_iter().for_each(&mut *raise);
             self.again = self.repeat.map_or(Time::NEVER, |period| at + period);
         } else if before && !holds {
             self.again = Time::NEVER;
@@ -396,7 +396,7 @@ impl Watch {
         if let Some(period) = self.repeat
             && now >= self.again
         {
-            raise(self.raise);
+            self.raise.into_iter().for_each(&mut *raise);
             let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
             let missed = (now.as_nanos() - self.again.as_nanos()) / period;
             self.again = Time(self.again.as_nanos().saturating_add(period.saturating_mul(missed + 1)));

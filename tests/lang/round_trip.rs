@@ -280,7 +280,7 @@ fn condition() -> impl Strategy<Value = Condition> {
 
 fn monitors() -> impl Strategy<Value = Vec<Monitor>> {
     let sampling = option::of(time()).prop_map(|t| t.map_or(Sampling::OnSample, Sampling::Every));
-    let events = (event(), option::of(event()));
+    let events = (option::of(event()), option::of(event()));
     let one = (ident(), condition(), events, option::of(time()), sampling, any::<bool>(), option::of(any_text()))
         .prop_map(|(name, when, (raise, cleared), repeat, sampling, enabled, description)| Monitor {
             name,

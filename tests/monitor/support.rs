@@ -32,7 +32,7 @@ pub fn monitor(when: Condition) -> Monitor {
     Monitor {
         name: Ident::new("m").unwrap(),
         when,
-        raise: EventName::new("e_on").unwrap(),
+        raise: Some(EventName::new("e_on").unwrap()),
         cleared: Some(EventName::new("e_off").unwrap()),
         repeat: None,
         sampling: Sampling::OnSample,

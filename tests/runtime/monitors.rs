@@ -56,7 +56,7 @@ fn monitor(name: &str, when: Condition, enabled: bool) -> Monitor {
     Monitor {
         name: ident(name),
         when,
-        raise: EventName::new(&format!("e_{name}")).unwrap(),
+        raise: Some(EventName::new(&format!("e_{name}")).unwrap()),
         cleared: Some(EventName::new(&format!("e_no_{name}")).unwrap()),
         repeat: None,
         sampling: Sampling::OnSample,

@@ -49,7 +49,7 @@ fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
     let mut fields = Fields::new("a monitor", origin, entries);
     let when = fields.required(cx, "when", "when = above(\"A.x\", 2.0)");
     let when = when.and_then(|node| condition::condition(cx, node, 0));
-    let raise = fields.required(cx, "event", "event = \"e_high\"");
+    let raise = fields.take("event");
     let raise = raise.and_then(|node| name::<EventName>(cx, &node, "`event`", "event = \"e_high\""));
     let cleared = fields.take("cleared");
     let cleared = cleared.and_then(|node| name::<EventName>(cx, &node, "`cleared`", "cleared = \"e_calm\""));
@@ -66,7 +66,7 @@ fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
     Some(Monitor {
         name: id?,
         when: when?,
-        raise: raise?,
+        raise,
         cleared,
         repeat,
         sampling: every.map_or(Sampling::OnSample, Sampling::Every),

@@ -132,7 +132,9 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
             part("description", if is_lua { lua::quoted(description) } else { yaml::quoted(description) });
         }
         part("when", condition(&m.when, language));
-        part("event", text(m.raise.as_str(), language));
+        if let Some(raise) = m.raise {
+            part("event", text(raise.as_str(), language));
+        }
         if let Some(cleared) = m.cleared {
             part("cleared", text(cleared.as_str(), language));
         }

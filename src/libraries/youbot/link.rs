@@ -46,8 +46,13 @@ crate::runtime::record! {
         pub aligned: bool,
         /// Its coupling is engaged.
         pub copying: bool,
+        /// It began anew within the last [`RESTART_SHOWN`] seconds.
+        pub restarted: bool,
     }
 }
+
+/// How long it is shown that the other robot began anew, in s: long enough for whoever looks at a few Hz.
+pub const RESTART_SHOWN: f64 = 0.25;
 
 /// Arrivals remembered for the loss: a second of 1 kHz.
 const ARRIVALS: usize = 1024;

@@ -13,6 +13,5 @@ pub mod parameters;
 pub mod plant;
 pub mod rigid_body;
 pub mod robot;
-pub mod watch;
 
 pub use components::library;

@@ -13,6 +13,7 @@ pub struct CartImpedance {
     ext_ref_mode: In<bool>,
     f_des: Out<Vector3<f64>>,
     f_raw_norm: Out<f64>,
+    f_jump: Out<f64>,
     ref_age: Out<f64>,
     active: Out<bool>,
     stiffness: Prop<f64>,
@@ -23,6 +24,28 @@ pub struct CartImpedance {
     ref_max_age: Prop<f64>,
     offset: Prop<Vector3<f64>>,
     law: Impedance,
+    recent: Recent,
+}
+
+/// The newest values of a norm, with their times in s.
+#[derive(Default)]
+struct Recent {
+    values: [(f64, f64); 16],
+    next: usize,
+}
+
+impl Recent {
+    /// Over how long a rise is a jump, in s: ten updates of the control loop. Slower loops see the last ones.
+    const WINDOW: f64 = 0.01;
+
+    /// How much the newest value is above the smallest of the window before it.
+    fn rise(&mut self, now: f64, value: f64) -> f64 {
+        let within = self.values.iter().filter(|(at, _)| *at > 0.0 && now - at <= Self::WINDOW + 1e-9);
+        let least = within.fold(value, |least, (_, v)| least.min(*v));
+        self.values[self.next % 16] = (now, value);
+        self.next += 1;
+        value - least
+    }
 }
 
 impl Component for CartImpedance {
@@ -35,6 +58,7 @@ impl Component for CartImpedance {
         .start_after("youbot.Arm_Kinematics")
         .on_start(|c, _| {
             c.law.reset();
+            c.recent = Recent::default();
             Ok(())
         });
         b.doc("The force begins from zero again.").no_effect().operation("reset", |c, _, (): ()| {
@@ -51,6 +75,7 @@ impl Component for CartImpedance {
                 .unit("N")
                 .output("f_des"),
             f_raw_norm: b.doc("Norm of the force it would want, coupled or not.").unit("N").output("f_raw_norm"),
+            f_jump: b.doc("How much that norm has risen within 10 ms.").unit("N").output("f_jump"),
             ref_age: b.doc("Age of the reference; not written before the first one.").unit("s").output("ref_age"),
             active: b.doc("Whether the force is put out.").output("active"),
             stiffness: b.doc("Spring.").unit("N/m").range(0.0..=1000.0).property("stiffness", p.stiffness),
@@ -77,6 +102,7 @@ impl Component for CartImpedance {
                 .range(-100.0..=100.0)
                 .property("offset", p.offset),
             law: Impedance::default(),
+            recent: Recent::default(),
         }
     }
 
@@ -102,6 +128,7 @@ impl Component for CartImpedance {
         self.f_des.write(out.force);
         if let Some(reference) = reference {
             self.f_raw_norm.write(out.raw_norm);
+            self.f_jump.write(self.recent.rise(cx.now().as_secs_f64(), out.raw_norm));
             self.ref_age.write(reference.age);
         }
         self.active.write(coupled);

@@ -1,7 +1,7 @@
 //! `youbot.Link_Tx` and `youbot.Link_Rx`: the two ends of the link to the other robot.
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::link::{LinkStats, Packet, PeerState, Receiver};
+use crate::libraries::youbot::link::{LinkStats, Packet, PeerState, RESTART_SHOWN, Receiver};
 use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
 
 /// Sends where the tool is.
@@ -74,6 +74,8 @@ pub struct LinkRx {
     max_seq_gap: Prop<i64>,
     window: Prop<f64>,
     receiver: Receiver,
+    epoch: Option<i64>,
+    restarted: f64,
 }
 
 impl Component for LinkRx {
@@ -82,6 +84,7 @@ impl Component for LinkRx {
             .start_after("youbot.Link_Tx")
             .on_start(|c, _| {
                 c.receiver.reset();
+                (c.epoch, c.restarted) = (None, f64::NEG_INFINITY);
                 Ok(())
             });
         b.doc("Forgets packets and measurements.").no_effect().operation("reset_stats", |c, _, (): ()| {
@@ -99,6 +102,8 @@ impl Component for LinkRx {
                 .property("max_seq_gap", 50_i64),
             window: b.doc("Over how long loss is counted.").unit("s").range(0.1..=1.0).property("window", 1.0),
             receiver: Receiver::default(),
+            epoch: None,
+            restarted: f64::NEG_INFINITY,
         }
     }
 
@@ -113,7 +118,11 @@ impl Component for LinkRx {
         }
         if news && let Some(p) = self.receiver.newest() {
             self.ext_ref.write(ExtRef { p: p.p, v: p.v, stamp: p.stamp });
-            self.peer_state.write(PeerState { epoch: p.epoch, aligned: p.aligned, copying: p.copying });
+            if self.epoch.replace(p.epoch).is_some_and(|before| before != p.epoch) {
+                self.restarted = now;
+            }
+            let restarted = now - self.restarted < RESTART_SHOWN;
+            self.peer_state.write(PeerState { epoch: p.epoch, aligned: p.aligned, copying: p.copying, restarted });
         }
         if let Some(stats) = self.receiver.stats(now) {
             self.link_stats.write(stats);

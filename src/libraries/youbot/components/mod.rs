@@ -6,7 +6,6 @@ mod dynamics;
 mod impedance;
 mod kinematics;
 mod link;
-mod monitors;
 mod operator;
 mod peer;
 mod reporter;
@@ -18,7 +17,6 @@ pub use dynamics::DynamicsComponent;
 pub use impedance::CartImpedance;
 pub use kinematics::ArmKinematics;
 pub use link::{LinkRx, LinkTx};
-pub use monitors::{ForceMonitor, LinkMonitor, SafetyMonitor};
 pub use operator::{ModeSwitch, Operator};
 pub use peer::Peer;
 pub use reporter::Reporter;
@@ -37,9 +35,6 @@ pub fn library() -> Library {
         .with::<LinkTx>("youbot.Link_Tx")
         .with::<LinkRx>("youbot.Link_Rx")
         .with::<Peer>("youbot.Peer")
-        .with::<LinkMonitor>("youbot.Link_Monitor")
-        .with::<ForceMonitor>("youbot.Force_Monitor")
-        .with::<SafetyMonitor>("youbot.Safety_Monitor")
         .with::<Operator>("youbot.Operator")
         .with::<ModeSwitch>("youbot.Mode_Switch")
         .with::<Reporter>("youbot.Reporter")

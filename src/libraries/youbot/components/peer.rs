@@ -7,7 +7,6 @@ use crate::libraries::youbot::link::Packet;
 use crate::libraries::youbot::network::{Network, Quality};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::libraries::youbot::robot::{CONTROL_PERIOD, Robot};
-use crate::libraries::youbot::watch::Held;
 use crate::model::Tunable;
 use crate::runtime::{Answer, Builder, Component, Context, Failure, In, Out, Prop};
 use nalgebra::Vector3;
@@ -39,6 +38,18 @@ pub struct Peer {
     seed: Prop<i64>,
     world: Box<World>,
     epoch: i64,
+}
+
+/// A condition that must hold for a time.
+#[derive(Debug, Clone, Copy, Default)]
+struct Held(f64);
+
+impl Held {
+    /// Whether `condition` has held for `time` seconds, `dt` after the last call.
+    fn update(&mut self, condition: bool, time: f64, dt: f64) -> bool {
+        self.0 = if condition { self.0 + dt } else { 0.0 };
+        condition && self.0 >= time - 1e-9
+    }
 }
 
 struct World {

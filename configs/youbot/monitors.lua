@@ -1,0 +1,78 @@
+-- What is watched at one robot of the youBot coupling, and what the coordinator is told of it.
+--
+-- Thresholds and times are those of the application (docs/monitors.md has the words). What lasts is told again every half
+-- second: a coordinator that was elsewhere when it began still hears of it.
+
+local AGAIN = 0.5
+
+-- The link to the other robot ------------------------------------------------------------------------------------------
+
+local stats = "Link_Rx.link_stats"
+
+-- Statistics that are not renewed any more are those of a receiver that has stopped.
+local lost  = any { silent(stats, 0.1), above(stats .. ".age", 0.1), above(stats .. ".gap", 0.05), above(stats .. ".loss", 0.5) }
+local bad   = any { above(age(stats), 0.02), above(stats .. ".age", 0.02), above(stats .. ".gap", 0.02),
+                    above(stats .. ".jitter", 0.01), above(stats .. ".loss", 0.1) }
+local ok    = all { at_most(stats .. ".age", 0.015), at_most(stats .. ".jitter", 0.005), at_most(stats .. ".loss", 0.05) }
+
+-- Good from the moment it is ok, until it is bad: between the two thresholds it stays what it was.
+local fine  = all { no(lost), no(bad), since(no(any { lost, bad }), ok, { 0, math.huge }) }
+-- Once it was fine for a second, it has settled; after that it may be degraded, and is restored by half a second.
+local settled  = since(no(lost), fine:for_at_least(1.0), { 0, math.huge })
+local good     = since(no(any { lost, bad:for_at_least(0.05) }), all { settled, fine:for_at_least(0.5) }, { 0, math.huge })
+local degraded = all { settled, no(good) }
+
+-- The coupled force ----------------------------------------------------------------------------------------------------
+
+local force = "Cart_Impedance.f_raw_norm"
+local heard = no(silent(force, 0.2))
+local near  = all { heard, below(force, 2.0) }:for_at_least(0.3)
+local peer  = "Link_Rx.peer_state"
+
+Monitors {
+
+  link_lost     = monitor { when = no(settled), event = "e_link_lost", repeat_every = AGAIN },
+  qos_ok        = monitor { when = all { settled, good }, event = "e_qos_ok", repeat_every = AGAIN },
+  qos_degraded  = monitor { when = degraded, event = "e_qos_degraded", repeat_every = AGAIN },
+  qos_restored  = monitor { when = all { rise(good), degraded:within_last(0.02) }, event = "e_qos_restored" },
+
+  peer_left = monitor { description = "our coupling is engaged and the other robot's is not, or it began anew",
+    when = any { all { is_true("Cart_Impedance.active"), no(is_true(peer .. ".copying")), no(is_true(peer .. ".aligned")) }
+                   :for_at_least(0.25),
+                 is_true(peer .. ".restarted") },
+    event = "e_peer_left", repeat_every = AGAIN },
+
+  -- This robot's own arm is near the other's; what is told to the other robot, and needs no event.
+  near = monitor { when = near },
+
+  -- Aligned means that both say so: coordinators do not negotiate.
+  aligned = monitor {
+    when = all { near, no(silent(peer, 0.2)), any { is_true(peer .. ".aligned"), is_true(peer .. ".copying") } },
+    event = "e_aligned", repeat_every = AGAIN },
+  misaligned = monitor { when = all { heard, above(force, 8.0) }:for_at_least(0.1),
+    event = "e_misaligned", repeat_every = AGAIN },
+  force_spike = monitor { description = "somebody pushes hard, or the reference jumps",
+    when = any { above(force, 25.0), above("Cart_Impedance.f_jump", 15.0) },
+    event = "e_force_spike", repeat_every = AGAIN },
+
+  -- What must not happen -------------------------------------------------------------------------------------------------
+
+  torque_saturated = monitor { when = above("Dynamics.tau_sat", 0):for_at_least(0.5),
+    event = "e_torque_sat", repeat_every = AGAIN },
+  overspeed = monitor {
+    when = above(max { abs("youbot.jointstate.vel[0]"), abs("youbot.jointstate.vel[1]"), abs("youbot.jointstate.vel[2]"),
+                       abs("youbot.jointstate.vel[3]"), abs("youbot.jointstate.vel[4]") }, 1.5),
+    event = "e_overspeed", repeat_every = AGAIN },
+  base_overspeed = monitor { when = above(norm { "youbot.odometry.vx", "youbot.odometry.vy" }, 0.6),
+    event = "e_base_overspeed", repeat_every = AGAIN },
+  overtemperature = monitor {
+    when = above(max { "youbot.motor_states.temp[0]", "youbot.motor_states.temp[1]", "youbot.motor_states.temp[2]",
+                       "youbot.motor_states.temp[3]", "youbot.motor_states.temp[4]" }, 80.0),
+    event = "e_OVERTEMP", repeat_every = AGAIN },
+  bus_errors = monitor {
+    when = above(max { "youbot.driver_state.pd_send_err", "youbot.driver_state.pd_recv_err" }, 100),
+    event = "e_EC_TIMEOUT", repeat_every = AGAIN },
+  controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard",
+    when = silent("Cart_Impedance.active", 0.05),
+    event = "e_controller_lost", repeat_every = AGAIN },
+}
