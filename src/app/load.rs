@@ -76,10 +76,7 @@ pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result
         }
     };
     // The monitors are a component type of this deployment.
-    let libraries = match &deployment.monitors[..] {
-        [] => libraries,
-        monitors => libraries.with(monitors::library(monitors)),
-    };
+    let libraries = monitors::added_to(libraries, &deployment.monitors);
     let platform = deployment.platform.as_str();
     if !PLATFORMS.contains(&platform) {
         findings.push(

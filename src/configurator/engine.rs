@@ -73,7 +73,7 @@ pub(super) struct Engine {
     /// A component came back: a broken system may be mended.
     pub returned: bool,
     /// Prepared switches.
-    pub switches: FxHashMap<ConfigId, Fast>,
+    pub switches: FxHashMap<ConfigId, Box<Fast>>,
     pub confirming: Vec<Confirming>,
     /// Confirming events that came since the request under way began.
     pub heard: Vec<EventName>,

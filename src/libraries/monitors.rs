@@ -4,28 +4,23 @@
 //! configuration enables one by setting it, and its undo restores what was. What a monitor looks at need not exist, nor
 //! be connected: the component has probes of it.
 
+use crate::model::Monitor;
 use crate::model::RunState;
-use crate::model::monitor::{Counter, Part};
-use crate::model::{Monitor, TypeName};
+use crate::model::monitor::{Counter, MONITORS_TYPE, Part};
 use crate::monitor::{Bank, Input, Sample, state_value};
-use crate::runtime::{Builder, Component, Context, EventOut, Kind, Library, Out, Probes, Prop, Wanted};
+use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Wanted};
 use std::sync::Arc;
-
-/// The type's name.
-pub const TYPE: &str = "davit.Monitors";
-
-/// The name of the type.
-///
-/// # Panics
-/// Never.
-pub fn type_name() -> TypeName {
-    TypeName::new(TYPE).expect("a type's name")
-}
 
 /// The library with the component type that evaluates `monitors`.
 pub fn library(monitors: &[Monitor]) -> Library {
     let plan = Arc::new(Plan::new(monitors));
-    Library::new("davit").with_kind(Kind::made_by(TYPE, move |b| Monitors::new_of(&plan, b)))
+    Library::new("davit").with_kind(Kind::made_by(MONITORS_TYPE, move |b| Monitors::new_of(&plan, b)))
+}
+
+/// The libraries of a deployment with these monitors: with one more if there are any.
+#[must_use]
+pub fn added_to(libraries: Libraries, monitors: &[Monitor]) -> Libraries {
+    if monitors.is_empty() { libraries } else { libraries.with(library(monitors)) }
 }
 
 /// What all instances share.

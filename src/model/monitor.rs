@@ -8,6 +8,10 @@ use super::run_state::RunState;
 use std::fmt;
 use std::time::Duration;
 
+/// The component type that runs the monitors of a deployment. A configuration creates one, in the activity whose rounds
+/// evaluate them; each monitor is a property of it, true while it is enabled.
+pub const MONITORS_TYPE: &str = "davit.Monitors";
+
 /// A monitor: watches a condition and raises an event when it becomes true.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Monitor {

@@ -99,7 +99,7 @@ fn a_monitor_sees_ports_it_is_not_connected_to() {
         monitor("held", held, true),
         monitor("flag", Condition::new(ConditionKind::IsTrue(signal("s.reading.ok"))), true),
     ]);
-    b.create("watch", monitors::TYPE, "fast", &[]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
     b.create("s", "Source", "fast", &[]);
     b.start(&["watch", "s"]);
     b.clock.sleep(20 * MS);
@@ -118,7 +118,7 @@ fn a_monitor_sees_ports_it_is_not_connected_to() {
 fn enabling_is_a_property_and_forgets() {
     let b = bed(&[monitor("high", above("s.y", 2.0), false)]);
     b.create("s", "Source", "fast", &[("level", Value::Float(3.0))]);
-    b.create("watch", monitors::TYPE, "fast", &[]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
     b.start(&["s", "watch"]);
     b.clock.sleep(20 * MS);
     assert_eq!(raised(&b), [""; 0]);
@@ -144,7 +144,7 @@ fn what_is_watched_may_go_and_come_back() {
             true,
         ),
     ]);
-    b.create("watch", monitors::TYPE, "fast", &[]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
     b.start(&["watch"]);
     for _ in 0..3 {
         b.create("s", "Source", "slow", &[("level", Value::Float(3.0))]);
@@ -169,7 +169,7 @@ fn an_in_port_is_seen_through_its_connection() {
     let b = bed(&[monitor("high", above("g.u", 2.0), true)]);
     b.create("s", "Source", "fast", &[("level", Value::Float(3.0))]);
     b.create("g", "standard.Gain", "fast", &[]);
-    b.create("watch", monitors::TYPE, "fast", &[]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
     b.start(&["s", "g", "watch"]);
     b.clock.sleep(5 * MS);
     assert_eq!(raised(&b), [""; 0]);
@@ -191,7 +191,7 @@ fn counters_of_activities_are_seen() {
         hysteresis: None,
     });
     let b = bed(&[monitor("five", counted, true)]);
-    b.create("watch", monitors::TYPE, "fast", &[]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
     b.create("s", "Source", "slow", &[]);
     b.start(&["watch", "s"]);
     b.clock.sleep(30 * MS);
@@ -204,7 +204,7 @@ fn counters_of_activities_are_seen() {
 fn in_an_event_driven_activity_a_write_wakes_it() {
     let b = bed(&[monitor("high", above("s.y", 2.0), true)]);
     b.create("s", "Source", "slow", &[]);
-    b.create("watch", monitors::TYPE, "events", &[]);
+    b.create("watch", MONITORS_TYPE, "events", &[]);
     b.start(&["s", "watch"]);
     b.clock.sleep(15 * MS);
     set(&b, "s.level", Value::Float(3.0));

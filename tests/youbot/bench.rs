@@ -154,6 +154,7 @@ impl Bench {
         let (deployment, _) = super::files::deployment(name);
         let libraries = Libraries::new()
             .with(davit::libraries::youbot::library())
+            .with(davit::libraries::monitors::library(&deployment.monitors))
             .with(Library::new("test").with::<Probe>("test.Probe"));
         let clock = Clock::simulated();
         let guard = clock.enter();

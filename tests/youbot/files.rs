@@ -1,7 +1,7 @@
 //! The deployment files: the paper's configurations as they stand, and the series that brings the robot up and down.
 
 use davit::lang::{LoadOptions, load};
-use davit::libraries::builtin;
+use davit::libraries::{builtin, monitors};
 use davit::model::{Catalogue, ConfigId, Deployment};
 use davit::plan::{Context, plan};
 use davit::system::System;
@@ -48,7 +48,8 @@ pub fn deployment(name: &str) -> (Deployment, Arc<Catalogue>) {
     let path = format!("deployments/{name}.yaml");
     let loaded = load(Path::new(&path), &LoadOptions::default());
     let deployment = loaded.deployment.unwrap_or_else(|| panic!("{path}: {:?}", loaded.findings));
-    let mut catalogue = builtin().select(&deployment.libraries).expect("built in").catalogue();
+    let libraries = builtin().select(&deployment.libraries).expect("built in");
+    let mut catalogue = monitors::added_to(libraries, &deployment.monitors).catalogue();
     for ty in &deployment.types {
         catalogue.insert(ty.clone());
     }
@@ -95,7 +96,7 @@ fn every_series_goes_up_and_comes_down_to_nothing() {
 /// The hypothesis of the paper: one coordinator, unchanged, over two platforms.
 #[test]
 fn the_same_coordinator_over_another_platform() {
-    let (youbot, _) = deployment("youbot_arm");
+    let (youbot, of_the_youbot) = deployment("youbot_arm");
     let (generic, catalogue) = deployment("generic_arm");
     let text = |name: &str| {
         let yaml = std::fs::read_to_string(format!("deployments/{name}.yaml")).unwrap();
@@ -103,7 +104,6 @@ fn the_same_coordinator_over_another_platform() {
     };
     assert_eq!(text("youbot_arm"), text("generic_arm"));
     assert_ne!(youbot.platform, generic.platform);
-    let of_the_youbot = builtin().catalogue();
     for configuration in &generic.configurations {
         assert!(youbot.configuration(configuration.id).is_some(), "{}", configuration.id);
     }
@@ -111,8 +111,8 @@ fn the_same_coordinator_over_another_platform() {
     // And the coordinator names neither a component nor a type of either platform.
     let coordinator = std::fs::read_to_string("configs/youbot/coordinator.lua").unwrap();
     let code: String = coordinator.lines().map(|l| l.split("--").next().unwrap_or_default()).collect();
-    for (deployment, catalogue) in [(&youbot, of_the_youbot), (&generic, (*catalogue).clone())] {
-        let mut system = System::new(Arc::new(catalogue));
+    for (deployment, catalogue) in [(&youbot, of_the_youbot), (&generic, catalogue)] {
+        let mut system = System::new(catalogue);
         go(&mut system, deployment, &UP[..3]);
         for name in system.snapshot().components.keys() {
             let name = name.to_string();
