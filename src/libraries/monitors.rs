@@ -4,9 +4,8 @@
 //! configuration enables one by setting it, and its undo restores what was. What a monitor looks at need not exist, nor
 //! be connected: the component has probes of it.
 
-use crate::model::Monitor;
-use crate::model::RunState;
 use crate::model::monitor::{Counter, MONITORS_TYPE, Part};
+use crate::model::{Monitor, RunState};
 use crate::monitor::{Bank, Input, Sample, state_value};
 use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Wanted};
 use std::sync::Arc;
