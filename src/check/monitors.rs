@@ -3,13 +3,14 @@
 use super::coordinator::{is_internal, looks_like_answer};
 use super::universe::Universe;
 use crate::model::codes::{
-    MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
-    UNKNOWN_COMPONENT, UNKNOWN_PORT,
+    MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD,
+    UNKNOWN_ACTIVITY, UNKNOWN_COMPONENT, UNKNOWN_PORT,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{ConditionKind, Part, PortSignal, SignalKind};
+use crate::model::monitor::{ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
 use crate::model::{
-    ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Monitor, Origin, PortType, ValueType,
+    Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Monitor, Origin, PortType,
+    ValueType,
 };
 use crate::statechart::Chart;
 use std::collections::BTreeSet;
@@ -21,7 +22,24 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         check.path = format!("monitors.{}", monitor.name);
         check.monitor(monitor);
     }
+    check.findings.extend(never_run(deployment));
     check.findings
+}
+
+/// Monitors that no component runs.
+fn never_run(deployment: &Deployment) -> Option<Finding> {
+    let first = deployment.monitors.first()?;
+    let runs = |change: &Change| matches!(&change.kind, ChangeKind::Create { ty, .. } if ty.as_str() == MONITORS_TYPE);
+    if deployment.configurations.iter().flat_map(|c| &c.changes).any(runs) {
+        return None;
+    }
+    let message = format!("no configuration creates a `{MONITORS_TYPE}`: nothing watches `{}`", first.name);
+    Some(
+        Finding::warning(MONITOR_NOT_RUN, message)
+            .at(deployment.key_origin("monitors"))
+            .path("monitors")
+            .help(format!("add `create(\"Monitors\", \"{MONITORS_TYPE}\", {{ activity = … }})` to the bring-up")),
+    )
 }
 
 /// What is wrong with the events.

@@ -594,6 +594,11 @@ codes! {
         "Answers of the configurator, such as `engage.ok`, and the events of the statechart itself, such as \
          `e_done@root.a`, tell the coordinator what has happened. If a monitor raised one, the coordinator would be told \
          what has not. Give the monitor's event another name.";
+    MONITOR_NOT_RUN = "monitor::not_run", "the monitors of a deployment never run",
+        "A deployment's monitors are a component of it, of the type `davit.Monitors`: they watch while it runs, in the \
+         rounds of its activity. No configuration creates one, so nothing is watched. Create it where the other \
+         components are created, as in `create(\"Monitors\", \"davit.Monitors\", { activity = \"safety\" })`, in an \
+         activity whose period is short enough for what is to be noticed.";
     MONITOR_UNHEARD = "monitor::unheard", "nobody listens to an event of a monitor",
         "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
          watches in vain. The name may be misspelt in one of the two places.";

@@ -27,7 +27,7 @@ shutdown: { event: e_shutdown, down: idle, within_s: 20 }
 
 const CONFIGURATIONS: &str = "\
 ConfiguratorConf {
-  build = Configuration { create(\"Arm\", \"Arm\", { activity = \"control\" }), post_conf_state = { '_default:running' } },
+  build = Configuration { create(\"Arm\", \"Arm\", { activity = \"control\" }), create(\"M\", \"davit.Monitors\"), post_conf_state = { '_default:running' } },
 }
 ";
 
@@ -53,7 +53,11 @@ Monitors {
 
 /// The findings as `code line:column`, and as a terminal shows them.
 fn findings(monitors: &str, coordinator: &str) -> (Vec<String>, String) {
-    let files = [("d.yaml", DEPLOYMENT), ("c.lua", CONFIGURATIONS), ("k.lua", coordinator), ("m.lua", monitors)];
+    findings_with(CONFIGURATIONS, monitors, coordinator)
+}
+
+fn findings_with(configurations: &str, monitors: &str, coordinator: &str) -> (Vec<String>, String) {
+    let files = [("d.yaml", DEPLOYMENT), ("c.lua", configurations), ("k.lua", coordinator), ("m.lua", monitors)];
     let loaded = load_from(&Sources::memory(files), Path::new("d.yaml"), &LoadOptions::default());
     let shown = render(&loaded.findings, &loaded.sources, false);
     let deployment = loaded.deployment.unwrap_or_else(|| panic!("{shown}"));
@@ -61,6 +65,7 @@ fn findings(monitors: &str, coordinator: &str) -> (Vec<String>, String) {
     for ty in &deployment.types {
         catalogue.insert(ty.clone());
     }
+    catalogue.extend(&davit::libraries::monitors::library(&deployment.monitors).catalogue());
     let report = check::run(deployment, &catalogue);
     // The coordinator of the example has findings of its own, which are no business of monitors.
     let own = |code: &str| ["monitor::", "conf::unknown", "coord::near"].iter().any(|start| code.starts_with(start));
@@ -106,6 +111,13 @@ fn mistakes() {
         }
     }
     assert!(wrong.is_empty(), "{} answers differ:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn monitors_that_nothing_runs() {
+    let without = CONFIGURATIONS.replace(", create(\"M\", \"davit.Monitors\")", "");
+    let (codes, shown) = findings_with(&without, MONITORS, COORDINATOR);
+    assert_eq!(codes, ["monitor::not_run 14:1"], "{shown}");
 }
 
 /// What a monitor raises is known: an event that is nearly one of them is probably meant to be it.
