@@ -1,10 +1,10 @@
 //! A machine with its tables: which function, state and transition of the chart is which in Lua, and what each event is.
 
-use super::budget::{Budget, message_of};
+use super::budget::{Budget, message_of, undefined_global};
 use super::host::{Host, Voice};
 use super::lower::{self, Lowered};
 use crate::limits;
-use crate::model::{Finding, Origin, Severity};
+use crate::model::{Finding, Openings, Origin, Severity};
 use crate::statechart::{Chart, EventId, Kind, Machine, NodeId, Printer, View, compile};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use rustc_hash::FxHashMap;
@@ -276,7 +276,11 @@ impl Bound {
 
     /// Tells the model's `err` of an error: a tag, a text, and the message.
     pub fn complain(&self, tag: &str, text: &str, error: &mlua::Error) {
-        let message = message_of(error);
+        let mut message = message_of(error);
+        if let Some(name) = undefined_global(&message).filter(|name| Openings::NAMES.contains(name)) {
+            message =
+                format!("{message}: closed to this model, `trusted: {{ open: [{name}] }}` in a deployment opens it");
+        }
         let told = self.fsm.raw_get::<Value>("err").and_then(|printer| match printer {
             Value::Function(err) => {
                 self.budget.spend(limits::CALL_INSTRUCTIONS, || err.call::<()>((tag, text, message.as_str())))

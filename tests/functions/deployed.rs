@@ -59,14 +59,13 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-#[test]
-fn a_deployment_with_functions_comes_up_and_goes_down() {
-    let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)];
+/// Brings a deployment with this coordinator up, lets `seconds` pass, takes it down; answers what its functions said.
+fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
+    let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", coordinator)];
     let folder = folder(&files);
-    let read =
-        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
-    let checked = app::check(read).unwrap();
-    assert!(checked.findings.iter().any(|f| f.code == davit::model::codes::COORD_NOT_PURE), "{:?}", checked.findings);
+    let libraries = davit::runtime::Libraries::new();
+    let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries).unwrap();
+    let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let clock = Clock::simulated();
     let _me = clock.enter();
     let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default()));
@@ -79,10 +78,59 @@ fn a_deployment_with_functions_comes_up_and_goes_down() {
         }
     }));
     session.bring_up().expect("up");
-    clock.sleep(Duration::from_secs(1));
-    assert_eq!(*said.lock().unwrap(), ["info: effect make.ok", "info: five rounds"]);
+    clock.sleep(Duration::from_secs(seconds));
     session.take_down(false);
     clock.shutdown();
+    let said = said.lock().unwrap().clone();
+    said
+}
+
+#[test]
+fn an_activity_that_never_rests_lets_the_time_pass() {
+    let text =
+        COORDINATOR.replace("rfsm.yield(true)", "rfsm.yield(false)").replace("fsm.rounds == 5", "fsm.rounds == 900");
+    assert!(said_by(&text, 1).contains(&"info: five rounds".to_owned()), "a thousand rounds a second");
+}
+
+#[test]
+fn functions_that_fail_or_hang_keep_no_deployment_from_coming_up() {
+    for body in ["error('oh', 0)", "while true do end", "local t = {} for i = 1, 1e9 do t[i] = ('x'):rep(1e6) .. i end"]
+    {
+        let text = COORDINATOR.replace("entry = 'make' }", &format!("entry = {{ 'make', function() {body} end }} }}"));
+        let said = said_by(&text, 1);
+        assert!(
+            said.iter().any(|s| s.starts_with("err: ENTRY error executing entry of root.starting: ")),
+            "{body}: {said:?}"
+        );
+        assert!(said.contains(&"info: effect make.ok".to_owned()), "{said:?}");
+    }
+}
+
+#[test]
+fn time_events_and_getevents_run_on_the_projects_clock() {
+    let text = COORDINATOR
+        .replace("return rfsm.state {", "local n = 0\nreturn rfsm.state { getevents = function() n = n + 1 if n % 100 == 0 then return { 'e_tick' } end return {} end,")
+        .replace("doo = function", "not_doo = function")
+        .replace(
+            "rfsm.trans { src = 'fault'",
+            "rfsm.trans { src = 'operational', tgt = 'operational', events = { rfsm_timeevent.e_after(0.3) }, effect = function() print('later') end },
+             rfsm.trans { src = 'operational', tgt = 'operational', events = { 'e_tick' }, effect = function() print('tick') end },
+             rfsm.trans { src = 'fault'",
+        );
+    let said = said_by(&text, 2);
+    let count = |what: &str| said.iter().filter(|s| s.as_str() == what).count();
+    assert!((2..=6).contains(&count("info: tick")) && count("info: later") >= 3, "{said:?}");
+}
+
+#[test]
+fn a_deployment_with_functions_comes_up_and_goes_down() {
+    let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)];
+    let folder = folder(&files);
+    let read =
+        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
+    let checked = app::check(read).unwrap();
+    assert!(checked.findings.iter().any(|f| f.code == davit::model::codes::COORD_NOT_PURE), "{:?}", checked.findings);
+    assert_eq!(said_by(COORDINATOR, 1), ["info: effect make.ok", "info: five rounds"]);
 }
 
 #[test]

@@ -69,6 +69,7 @@ fn memory_is_bounded() {
 
 #[test]
 fn what_is_closed_is_an_error_that_names_it() {
+    told(&model("entry = function() io.open('x') end", ""), "ENTRY", "open: [io]");
     for (call, name) in [("os.execute('true')", "os"), ("io.open('x')", "io"), ("debug.sethook()", "debug")] {
         told(&model(&format!("entry = function() {call} end"), ""), "ENTRY", &format!("'{name}'"));
     }
@@ -140,4 +141,41 @@ fn a_step_hook_that_fails_is_told() {
 fn a_doo_that_never_rests_leaves_room_for_events() {
     let seen = model("doo = function() while true do rfsm.yield(false) end end", "").play(&["", "e", "run"]);
     assert_eq!(seen[2].active.last().unwrap(), "root.b");
+}
+
+/// Texts that a careless or hostile model may have: none may take the program down, whatever is said of them.
+#[test]
+fn strange_models_are_refused_or_read() {
+    use super::support::read;
+    let use_functions = "entry = function() end";
+    let texts = [
+        "local s = rfsm.state { entry = function() end } s.me = s return s".to_owned(),
+        "local s = rfsm.state { entry = function() end } for i = 1, 1000 do s = rfsm.state { x = s, entry = s.entry } end return s".to_owned(),
+        "local t = { f = function() end } t.t = t return rfsm.state { t = t, a = rfsm.state { entry = t.f }, rfsm.trans { src='initial', tgt='a' } }".to_owned(),
+        "return rfsm.state { entry = 1, exit = {}, doo = 'x', rfsm.trans { src = {}, tgt = function() end, guard = 3, effect = true, pn = 'high', events = 7 } }".to_owned(),
+        "return rfsm.state { [1.5] = rfsm.state { entry = function() end }, [true] = rfsm.trans {}, rfsm.conn {} }".to_owned(),
+        "return setmetatable({ entry = function() end }, { rfsm = true, __index = function() error('index') end })".to_owned(),
+        "return setmetatable({ type = function() return 'state' end, entry = function() end }, { rfsm = true, __pairs = function() error('pairs') end })".to_owned(),
+        "rfsm.state.type = nil return rfsm.state { entry = function() end }".to_owned(),
+        "string.format, table.insert, pairs, ipairs, type = nil return rfsm.state { entry = function() end, a = rfsm.state {}, rfsm.trans { src='initial', tgt='a' } }".to_owned(),
+        "_G.rfsm = nil return 7".to_owned(),
+        "setmetatable(_G, nil) return rfsm.state { entry = function() end }".to_owned(),
+        "return rfsm.load('model.lua')".to_owned(),
+        "return rfsm.load('/etc/passwd')".to_owned(),
+        format!(r"return rfsm.state {{ {use_functions}, rfsm.trans {{ src='a\0b', tgt='\255', events={{ '\255', 'x y', 0/0, -0.0 }} }} }}"),
+        format!("local s = rfsm.state {{ {use_functions} }} for i = 1, 20000 do s['s' .. i] = rfsm.state {{}} end return s"),
+        "coroutine.yield(1) return rfsm.state { entry = function() end }".to_owned(),
+        "error(nil) return function() end".to_owned(),
+        "return function() end".to_owned(),
+        r"\27Lua".to_owned(),
+    ];
+    for text in texts {
+        let loaded = read(&[("model.lua", &text)], &[]);
+        assert!(loaded.coordinator.is_some() || !loaded.findings.is_empty(), "nothing is said of {text}");
+        assert!(
+            loaded.findings.iter().all(|f| f.help.is_some() || f.severity != davit::model::Severity::Error),
+            "{:?}",
+            loaded.findings
+        );
+    }
 }

@@ -3,13 +3,20 @@ local native, rfsm = ...
 
 local modules = {}
 
--- Wraps a state's exit: `after` runs when the model's own exit did not fail.
+-- Adds to a state's exit: `after` runs when the model's own exit did not fail. Names that it raises stay.
 local function after_exit(state, after)
   local own = rawget(state, "exit")
-  state.exit = function(fsm, s, what)
-    if type(own) == "function" then own(fsm, s, what) end
-    after(s)
+  if type(own) == "function" then
+    state.exit = function(fsm, s, what)
+      own(fsm, s, what)
+      after(s)
+    end
+    return
   end
+  local list = {}
+  for i, part in ipairs(type(own) == "table" and own or { own }) do list[i] = part end
+  list[#list + 1] = function(_, s) after(s) end
+  state.exit = list
 end
 
 local function active_states(fsm)
