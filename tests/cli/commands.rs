@@ -288,3 +288,28 @@ fn a_reader_that_goes_away_is_no_panic() {
         assert_eq!(output.status.code(), Some(0), "{args:?}: {err}");
     }
 }
+
+#[test]
+fn sim_runs_a_model_with_functions_and_what_stands_in_for_its_host() {
+    let demo = Demo::new();
+    demo.write(
+        "model.lua",
+        "local name = robot.name\nreturn rfsm.state { a = rfsm.state { entry = function(fsm, s) print(name, s._fqn) end },
+           b = rfsm.state { doo = function() error('worn out', 0) end }, rfsm.trans { src = 'initial', tgt = 'a' },
+           rfsm.trans { src = 'a', tgt = 'b', events = { 'e_go' }, guard = function(tr, events) return #events == 2 end } }",
+    );
+    demo.write("host.lua", "robot = { name = 'youBot' }");
+    demo.write("events.txt", "run\ne_go\ne_go now\nrun\n");
+    let missing = demo.run(&["sim", "model.lua", "--events", "events.txt"]);
+    assert_eq!(missing.code, 1, "{}", missing.err);
+    assert!(missing.err.contains("lua::host_missing") && missing.err.contains("`robot`"), "{}", missing.err);
+    let ran = demo.run(&["sim", "model.lua", "--host", "host.lua", "--events", "events.txt", "--json"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let lines: Vec<Value> = ran.out.lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
+    assert_eq!(lines[0]["active"], json!(["root", "root.a"]));
+    assert_eq!(lines[1]["transition"], json!(false));
+    assert_eq!(lines[2]["actions"], json!(["exit root.a", "entry root.b"]));
+    assert_eq!(lines[3]["mode"], json!("done"), "the activity failed");
+    assert!(ran.err.contains("note: youBot root.a"), "{}", ran.err);
+    assert!(ran.err.contains("note: error: DOO doo program of state 'root.b' failed: worn out"), "{}", ran.err);
+}

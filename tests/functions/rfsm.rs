@@ -257,11 +257,11 @@ mod doo {
 
     #[test]
     fn event_preempts_doo() {
-        run("local n = 0
-             local fsm = init(S { a = S { doo = function() while true do n = n + 1 rfsm.yield(true) end end }, b = S {},
+        run("local n, begun = 0, 0
+             local fsm = init(S { a = S { doo = function() begun = begun + 1 while true do n = n + 1 rfsm.yield(true) end end }, b = S {},
                T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} }, T { src='b', tgt='a', events={'f'} } })
              rfsm.run(fsm) eq(n, 1) rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(leaf(fsm), 'root.b') eq(n, 1)
-             rfsm.send_events(fsm, 'f') rfsm.run(fsm) eq(n, 2, 'it begins anew')");
+             rfsm.send_events(fsm, 'f') rfsm.run(fsm) eq(n, 2) eq(begun, 2, 'it begins anew')");
     }
 
     #[test]
