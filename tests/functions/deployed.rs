@@ -81,8 +81,7 @@ fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
     clock.sleep(Duration::from_secs(seconds));
     session.take_down(false);
     clock.shutdown();
-    let said = said.lock().unwrap().clone();
-    said
+    said.lock().unwrap().clone()
 }
 
 #[test]
