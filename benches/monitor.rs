@@ -20,7 +20,7 @@ fn monitor(kind: ConditionKind) -> Monitor {
     Monitor {
         name: Ident::new("m").expect("a name"),
         when: Condition::new(kind),
-        raise: EventName::new("e").expect("a name"),
+        raise: Some(EventName::new("e").expect("a name")),
         cleared: None,
         repeat: None,
         sampling: Sampling::OnSample,
