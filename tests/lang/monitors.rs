@@ -133,7 +133,7 @@ fn mistakes_in_lua() {
             ("hysteresis = 1.5", "hysteresis = -1.5", "monitor::bad_hysteresis 6:12", "0 or more"),
             ("hysteresis = 1.5", "hystersis = 1.5", "text::unknown_key 6:48", "`hysteresis`"),
             ("cleared =", "clered =", "text::unknown_key 7:29", "`cleared`"),
-            ("event = \"e_odd\",", "", "text::missing_key 15:9", "event ="),
+            ("when = calm:for_at_least(0.3), ", "", "text::missing_key 4:13", "when ="),
             ("event = \"e_odd\"", "event = \"e odd\"", "text::bad_name 20:13", "blanks"),
             ("enabled = false", "enabled = 0", "text::wrong_type 13:38", "true or false"),
             (
