@@ -42,6 +42,9 @@ pub const CHART_DEPTH: usize = 100;
 /// Elements of an XML document inside each other: as deep as states may be nested, and what the innermost holds.
 pub const XML_DEPTH: usize = CHART_DEPTH + 8;
 
+/// Lines of an interactive `davit sim` that can be taken back: taking one back does all the others again.
+pub const SIM_LINES: usize = 10_000;
+
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;
 

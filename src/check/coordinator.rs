@@ -268,7 +268,13 @@ fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         if site.scoped && matches!(site.when, When::Exit(_)) {
             continue;
         }
-        for answer in bad_answers(ask) {
+        // A configuration that must be confirmed is undone behind the coordinator's back if it is not. `cancelled` needs
+        // nobody: it comes only when the request was taken back, by whoever made it or by an operator.
+        let reverted = match ask {
+            Ask::Apply(id) => deployment.configuration(id).is_some_and(|c| c.confirm.is_some()),
+            _ => false,
+        };
+        for answer in bad_answers(ask).into_iter().chain(reverted.then(|| Verdict::Reverted.event(ask))) {
             let heard = edges(chart).any(|edge| {
                 let hears =
                     chart.triggers(edge).is_none_or(|t| t.iter().any(|e| chart.event_text(*e) == answer.as_str()));
@@ -285,7 +291,7 @@ fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         }
     }
     for (name, (site, answers)) in missing {
-        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed"));
+        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed") || a.as_str().ends_with(".reverted"));
         let list: Vec<String> = answers.iter().map(|a| format!("`{a}`")).collect();
         let message = format!("no transition hears {} of the request raised here", list.join(" or "));
         let finding = if failed {

@@ -26,6 +26,8 @@ mod run;
 mod shutdown;
 mod signals;
 mod sim;
+mod sim_editor;
+mod sim_session;
 mod stack;
 mod status;
 mod types;

@@ -3,6 +3,7 @@
 use super::exit::Exit;
 use super::input::{Parameters, coordinator};
 use super::output::Style;
+use super::sim_editor::edit;
 use super::{Answer, Context, Failure, Run};
 use crate::functions::Opener;
 use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
@@ -18,7 +19,7 @@ use std::sync::Arc;
 ///
 /// One line is one set of events, separated by blanks, queued in the order written and followed by one step; an empty
 /// line queues nothing; the first line also enters the machine. A line `run` runs to idle; `advance 0.5` moves the clock
-/// by half a second and does one step.
+/// by half a second and does one step. At a terminal: Tab completes, `undo` takes lines back, `help` lists the rest.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A coordinator's file, or a deployment that names one.
@@ -63,9 +64,15 @@ impl Run for Args {
         };
         let prompt = self.events.is_none() && std::io::stdin().is_terminal() && !self.json;
         match read.program {
-            None => self.lines(context, Sim::new(&chart), input, prompt),
+            None if prompt => edit(context, || Ok(Sim::new(&chart))),
+            None => self.lines(context, Sim::new(&chart), input),
             Some(program) => {
                 let opener = Opener::new(program, Arc::new(read.chart));
+                if prompt {
+                    let open =
+                        || opener.open(None).map_err(|failure| format!("the functions cannot be run: {failure}"));
+                    return edit(context, || Ok(Sim::with(&chart, open()?)));
+                }
                 let functions = opener.open(None).map_err(|failure| {
                     Failure::usage(
                         FUNCTIONS_NOT_OPENED,
@@ -74,25 +81,18 @@ impl Run for Args {
                     )
                     .as_json(self.json)
                 })?;
-                self.lines(context, Sim::with(&chart, functions), input, prompt)
+                self.lines(context, Sim::with(&chart, functions), input)
             }
         }
     }
 }
 
 impl Args {
-    fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>, prompt: bool) -> Answer {
+    fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> Answer {
         let out = &context.out;
-        if prompt {
-            out.line("a line is a set of events; `run`; `advance SECONDS`; end with Ctrl-D");
-        }
         let mut exit = Exit::Done;
         let mut lines = BufReader::new(input).lines();
         loop {
-            if prompt {
-                self.offer(context, &sim);
-                out.text("> ");
-            }
             let line = match lines.next() {
                 None => break,
                 Some(Ok(line)) => line,
@@ -113,35 +113,15 @@ impl Args {
                     out.json_line(&seen);
                 }
                 Ok(seen) => {
-                    if !prompt {
-                        out.line(out.paint(Style::Dim, format!("> {line}")));
-                    }
+                    out.line(out.paint(Style::Dim, format!("> {line}")));
                     out.line(seen);
                 }
                 Err(error) => {
                     out.error(format!("{error}\n"));
-                    if !prompt {
-                        exit = Exit::Usage;
-                    }
+                    exit = Exit::Usage;
                 }
             }
         }
         Ok(exit)
-    }
-
-    /// The events that lead on from where the machine is.
-    fn offer<F: Hook>(&self, context: &Context, sim: &Sim<'_, F>) {
-        let chart = sim.chart();
-        let mut events: Vec<String> = Vec::new();
-        for state in sim.machine().active() {
-            for edge in chart.outgoing(*state) {
-                events.extend(chart.triggers(edge).unwrap_or(&[]).iter().map(|e| chart.event_text(*e)));
-            }
-        }
-        events.sort();
-        events.dedup();
-        if !events.is_empty() {
-            context.out.line(context.out.paint(Style::Dim, format!("heard here: {}", events.join(" "))));
-        }
     }
 }

@@ -424,7 +424,9 @@ codes! {
     COORD_FAILURE_UNHANDLED = "coord::failure_unhandled", "nobody hears that a request failed",
         "Every request can fail. The coordinator asks for a configuration in a state where no transition waits for \
          `ID.failed` (or `ID.broken`), so after a failure it stays where it is as if nothing had happened. Add a transition \
-         to a state that knows what to do: try again, go back, or stop.";
+         to a state that knows what to do: try again, go back, or stop. The same holds for `ID.reverted` of a configuration that \
+         must be confirmed (`confirm`). `ID.cancelled` needs no transition: it comes only when the request was taken back by \
+         its own undo.";
     COORD_NOT_PURE = "coord::not_pure", "the coordinator has functions",
         "A coordinator of states, transitions and names of events can be verified in full. Functions can do anything, so \
          what `check` says about requests, failures and shutdown holds only as far as no function is involved. Names of \

@@ -151,6 +151,14 @@ impl Machine {
         self.mode = if chart.nodes[leaf.index()].doo.is_some() { Mode::Active } else { Mode::Done };
     }
 
+    /// Whether `event`, alone in its step, would take a transition now. Guards and predicates are taken to refuse.
+    pub fn would_take(&self, chart: &Chart, event: EventId) -> bool {
+        let mut trial = self.clone();
+        trial.queue.events.clear();
+        trial.queue.push(event);
+        trial.triggers(chart)
+    }
+
     /// Whether the events that wait trigger a transition; guards may be called. They wait no more then.
     pub(super) fn triggers(&mut self, chart: &Chart) -> bool {
         self.events.clear();

@@ -294,6 +294,39 @@ fn what_is_wrong_with_the_names_is_said() {
     assert!(text.contains("two coordinators `two`"), "{text}");
 }
 
+#[test]
+fn a_configuration_that_is_undone_unless_confirmed_wants_to_be_heard() {
+    let chart = |hears: &str| {
+        format!(
+            "return state {{
+              idle = state {{}}, on = state {{ entry = \"base\" }}, fault = state {{}},
+              trans {{ src = \"initial\", tgt = \"idle\" }},
+              trans {{ src = \"idle\", tgt = \"on\", events = {{ \"e_start\" }} }},
+              trans {{ src = \"on\", tgt = \"fault\", events = {{ \"base.failed\", \"base.broken\"{hears} }} }},
+              trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\", \"e_sure\" }}, effect = \"base.undo\" }},
+              trans {{ src = \"fault\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},
+            }}"
+        )
+    };
+    let deployment = "configurations: [conf.lua]
+coordinator: one.lua
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+";
+    let conf =
+        |confirm: &str| format!("ConfiguratorConf {{ base = Configuration {{ create(\"a\", \"Drive\"){confirm} }} }}");
+    let said = |confirm: &str, hears: &str| {
+        let checked = accepted(deployment, &[("conf.lua", &conf(confirm)), ("one.lua", &chart(hears))]);
+        let found = checked.findings.into_iter().find(|f| f.message.contains("base.reverted"));
+        found.map(|f| (f.code, f.severity))
+    };
+    let confirm = ", confirm = { event = \"e_sure\", within = 1.0 }";
+    let warning = davit::model::Severity::Warning;
+    assert_eq!(said(confirm, ""), Some((codes::COORD_FAILURE_UNHANDLED, warning)));
+    assert_eq!(said(confirm, ", \"base.reverted\""), None);
+    assert_eq!(said("", ""), None);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
