@@ -38,7 +38,7 @@ impl Component for Node {
 }
 
 fn libraries() -> Libraries {
-    Libraries::new().with(Library::new("bench").with::<Node>("Node"))
+    Libraries::new().with(Library::new("bench").with::<Node>("bench.Node"))
 }
 
 /// The switch: stop, a 3-vector, a port, start; and `others` components that have nothing to do with it.
