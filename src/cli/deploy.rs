@@ -113,7 +113,7 @@ fn foreground(
             tell_not_up(&context.out, progress, name.as_str(), &not_up)
         }
         Ok(()) => {
-            tell_up(&context.out, progress, &session);
+            tell_up(&context.out, progress, &session, in_background);
             if in_background {
                 detach::tell_up();
                 progress.silence();
@@ -178,7 +178,7 @@ fn watch(
     })
 }
 
-fn tell_up(out: &Output, progress: &Progress, session: &Session) {
+fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {
     let status = session.status();
     progress.line(format!(
         "{} {} after {:.3} s: {} components, {} connections, {} frames on the stack",
@@ -189,7 +189,8 @@ fn tell_up(out: &Output, progress: &Progress, session: &Session) {
         status.system.connections.len(),
         status.stack.len(),
     ));
-    progress.line(out.paint(Style::Dim, "Ctrl-C shuts it down in order"));
+    let way = if in_background { "`davit shutdown` takes it down in order" } else { "Ctrl-C shuts it down in order" };
+    progress.line(out.paint(Style::Dim, way));
 }
 
 fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp) -> Exit {
