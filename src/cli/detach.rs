@@ -7,17 +7,25 @@ use super::exit::Exit;
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_SYSTEM;
 use std::io::{BufRead, BufReader, Write};
+use std::os::fd::AsRawFd;
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
 
 /// The line that says that the deployment is up. Not JSON and not a word anybody prints by chance.
 const UP: &str = "\u{1}davit up\u{1}";
 
-/// Says, in the process in the background, that the deployment is up. Nothing is written after it: nobody reads.
+/// Says, in the process in the background, that the deployment is up. Nothing is written after it: nobody reads. Its
+/// streams are let go, so that a pipe that the command was typed with (`| tail`) ends with the command.
 pub fn tell_up() {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{UP}");
     let _ = out.flush();
+    if let Ok(nowhere) = std::fs::OpenOptions::new().write(true).open("/dev/null") {
+        for stream in [libc::STDOUT_FILENO, libc::STDERR_FILENO] {
+            // SAFETY: both are open descriptors of this process, and nobody holds on to what they were.
+            let _ = unsafe { libc::dup2(nowhere.as_raw_fd(), stream) };
+        }
+    }
 }
 
 /// Starts the process in the background, passes its words on until it is up, and returns.

@@ -3,7 +3,7 @@
 use super::recorder::{Classed, Shared};
 use super::{convert, sandbox};
 use crate::lang::tree::{Entry, Kind, Node};
-use crate::model::{Finding, Origin, codes};
+use crate::model::{Code, Finding, Origin, codes};
 use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
 use std::borrow::Cow;
 
@@ -34,36 +34,10 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
     for (verb, names) in CHANGES {
         env.raw_set(*verb, change(lua, shared, verb, names)?)?;
     }
-    for verb in ["Configuration", "ConfiguratorConf"] {
-        let recorder = shared.clone();
-        let function = lua.create_function(move |lua, args: MultiValue| {
-            let origin = recorder.borrow_mut().call_at(sandbox::line(lua), verb);
-            let node = match args.front() {
-                Some(Value::Table(table)) => match convert::parts(&recorder, table, origin, 1) {
-                    Some(parts) => Node::new(Kind::Made(verb, parts.named, parts.list), origin),
-                    None => Node::new(Kind::Poison, origin),
-                },
-                Some(Value::LightUserData(handle)) if convert::index_of(*handle).is_none() => {
-                    Node::new(Kind::Poison, origin)
-                }
-                _ => {
-                    let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`{verb}` takes one table")).at(origin);
-                    recorder.borrow_mut().cx.report(finding.help(format!("write `{verb} {{ … }}`")));
-                    Node::new(Kind::Poison, origin)
-                }
-            };
-            // A list inside ConfiguratorConf has no names.
-            let mut recorder = recorder.borrow_mut();
-            if let ("ConfiguratorConf", Kind::Made(_, _, list)) = (verb, &node.kind)
-                && !list.is_empty()
-            {
-                let finding = Finding::error(codes::CONF_UNNAMED, "an element of `ConfiguratorConf` has no name");
-                recorder.cx.report(finding.at(origin).help("write `name = Configuration { … }`"));
-            }
-            Ok(convert::handle(recorder.record(verb, origin, node)))
-        })?;
-        env.raw_set(verb, function)?;
-    }
+    env.raw_set("Configuration", of_a_table(lua, shared, "Configuration", None)?)?;
+    // A list inside ConfiguratorConf has no names.
+    let unnamed = (codes::CONF_UNNAMED, "write `name = Configuration { … }`");
+    env.raw_set("ConfiguratorConf", of_a_table(lua, shared, "ConfiguratorConf", Some(unnamed))?)?;
     let rfsm = lua.create_table()?;
     let keep = lua.create_table()?;
     for (class, names) in CLASSES {
@@ -94,6 +68,41 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
             Ok(convert::poison())
         })?,
     )
+}
+
+/// A constructor that takes one table and records it. `unnamed`: elements without a name are an error, with this help.
+pub fn of_a_table(
+    lua: &Lua,
+    shared: &Shared,
+    verb: &'static str,
+    unnamed: Option<(Code, &'static str)>,
+) -> mlua::Result<Function> {
+    let recorder = shared.clone();
+    lua.create_function(move |lua, args: MultiValue| {
+        let origin = recorder.borrow_mut().call_at(sandbox::line(lua), verb);
+        let node = match args.front() {
+            Some(Value::Table(table)) => match convert::parts(&recorder, table, origin, 1) {
+                Some(parts) => Node::new(Kind::Made(verb, parts.named, parts.list), origin),
+                None => Node::new(Kind::Poison, origin),
+            },
+            Some(Value::LightUserData(handle)) if convert::index_of(*handle).is_none() => {
+                Node::new(Kind::Poison, origin)
+            }
+            _ => {
+                let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`{verb}` takes one table")).at(origin);
+                recorder.borrow_mut().cx.report(finding.help(format!("write `{verb} {{ … }}`")));
+                Node::new(Kind::Poison, origin)
+            }
+        };
+        let mut recorder = recorder.borrow_mut();
+        if let (Some((code, help)), Kind::Made(_, _, list)) = (unnamed, &node.kind)
+            && !list.is_empty()
+        {
+            let finding = Finding::error(code, format!("an element of `{verb}` has no name"));
+            recorder.cx.report(finding.at(origin).help(help));
+        }
+        Ok(convert::handle(recorder.record(verb, origin, node)))
+    })
 }
 
 fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'static str]) -> mlua::Result<Function> {

@@ -1,5 +1,6 @@
 //! The words of the monitor language, as Lua functions and methods that record what they are given.
 
+use super::constructors::of_a_table;
 use super::recorder::{Recorder, Shared};
 use super::{convert, sandbox};
 use crate::lang::tree::{Entry, Kind, Node};
@@ -13,35 +14,9 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
     for word in CONDITIONS.iter().chain(SIGNALS) {
         env.raw_set(word.name, recording(lua, shared, word)?)?;
     }
-    for verb in ["monitor", "Monitors"] {
-        let recorder = shared.clone();
-        let function = lua.create_function(move |lua, args: MultiValue| {
-            let origin = recorder.borrow_mut().call_at(sandbox::line(lua), verb);
-            let node = match args.front() {
-                Some(Value::Table(table)) => match convert::parts(&recorder, table, origin, 1) {
-                    Some(parts) => Node::new(Kind::Made(verb, parts.named, parts.list), origin),
-                    None => Node::new(Kind::Poison, origin),
-                },
-                Some(Value::LightUserData(handle)) if convert::index_of(*handle).is_none() => {
-                    Node::new(Kind::Poison, origin)
-                }
-                _ => {
-                    let finding = Finding::error(codes::LUA_ARGUMENTS, format!("`{verb}` takes one table")).at(origin);
-                    recorder.borrow_mut().cx.report(finding.help(format!("write `{verb} {{ … }}`")));
-                    Node::new(Kind::Poison, origin)
-                }
-            };
-            let mut recorder = recorder.borrow_mut();
-            if let ("Monitors", Kind::Made(_, _, list)) = (verb, &node.kind)
-                && !list.is_empty()
-            {
-                let finding = Finding::error(codes::MONITOR_UNNAMED, "an element of `Monitors` has no name");
-                recorder.cx.report(finding.at(origin).help("write `name = monitor { … }`"));
-            }
-            Ok(convert::handle(recorder.record(verb, origin, node)))
-        })?;
-        env.raw_set(verb, function)?;
-    }
+    env.raw_set("monitor", of_a_table(lua, shared, "monitor", None)?)?;
+    let unnamed = (codes::MONITOR_UNNAMED, "write `name = monitor { … }`");
+    env.raw_set("Monitors", of_a_table(lua, shared, "Monitors", Some(unnamed))?)?;
     Ok(())
 }
 
