@@ -1,0 +1,117 @@
+//! What a request for a prepared switch allocates on its whole way: queue, configurator, embedded platform, progress,
+//! answer. Counted over all threads of the process.
+
+use davit::configurator::{Answer, Batch, Configurator, Request, Requester, Setup};
+use davit::model::*;
+use davit::platform::embedded::EmbeddedPlatform;
+use davit::runtime::{Builder, Component, In, Libraries, Library, Prop};
+use davit::time::Clock;
+use std::alloc::{GlobalAlloc, Layout};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+struct Counting;
+
+static COUNT: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::SeqCst);
+        // SAFETY: the caller's obligations are the system allocator's.
+        unsafe { std::alloc::System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { std::alloc::System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A controller with a gain of three and a reference.
+#[allow(dead_code)]
+struct Node {
+    gain: Prop<[f64; 3]>,
+    mode: In<bool>,
+}
+
+impl Component for Node {
+    fn new(b: &mut Builder<Self>) -> Self {
+        let gain = b.range(0.0..=10.0).tunable(Tunable::Stopped).property("gain", [0.0; 3]);
+        Self { gain, mode: b.input("mode") }
+    }
+}
+
+fn configurations() -> Vec<Configuration> {
+    let change = |kind| Change { kind, origin: Origin::NONE };
+    let component = ComponentName::new("node").unwrap();
+    let entry = |target, state| StateEntry { target, state, origin: Origin::NONE };
+    let mut make = Configuration::new(ConfigId::new("make").unwrap());
+    make.changes.push(change(ChangeKind::Create {
+        component,
+        ty: TypeName::new("test.Node").unwrap(),
+        activity: Some(Ident::new("loop").unwrap()),
+        properties: BTreeMap::new(),
+    }));
+    make.post.push(entry(Target::Default, RunState::Running));
+    let mut switch = Configuration::new(ConfigId::new("switch").unwrap());
+    switch.pre.push(entry(Target::Component(component), RunState::Stopped));
+    let gain = MemberRef::new("node.gain").unwrap();
+    switch.changes.push(change(ChangeKind::PropertySet { property: gain, value: Value::floats(&[0.1, 0.2, 0.3]) }));
+    let mode = MemberRef::new("node.mode").unwrap();
+    switch.changes.push(change(ChangeKind::PortWrite { port: mode, value: Value::Bool(true) }));
+    switch.post.push(entry(Target::Component(component), RunState::Running));
+    vec![make, switch]
+}
+
+#[test]
+fn a_request_for_a_prepared_switch_allocates_nothing() {
+    let clock = Clock::real();
+    let libraries = Libraries::new().with(Library::new("test").with::<Node>("test.Node"));
+    let name = Ident::new("loop").unwrap();
+    let activity = Activity { period: Some(Duration::from_secs(1000)), priority: 0, cpu: None, origin: Origin::NONE };
+    let platform = Arc::new(EmbeddedPlatform::new(&clock, &libraries, &BTreeMap::from([(name, activity)])));
+    let (sink, answers) = clock.channel::<Answer>(16);
+    let steps = Arc::new(AtomicU64::new(0));
+    let told = steps.clone();
+    let handle = Configurator::start(Setup {
+        configurations: configurations(),
+        catalogue: libraries.catalogue(),
+        activities: BTreeSet::from([name]),
+        platform,
+        clock: clock.clone(),
+        limits: DeploymentLimits::default(),
+        workers: 2,
+        answers: Arc::new(move |answer| drop(sink.try_send(answer))),
+        progress: Some(Arc::new(move |_| _ = told.fetch_add(1, Ordering::Relaxed))),
+    });
+    let mut next = 0;
+    let mut ask = |ask: Ask| {
+        next += 1;
+        let request = Request { id: RequestId(next), ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+        handle.submit(Batch::one(request)).expect("room");
+        let answer = answers.recv_deadline(clock.now() + Duration::from_secs(60)).expect("an answer");
+        assert!(answer.verdict.is_success(), "{answer:?}");
+    };
+    let switch = ConfigId::new("switch").unwrap();
+    ask(Ask::Apply(ConfigId::new("make").unwrap()));
+    // The first rounds prepare the switch and make what is used again afterwards.
+    for _ in 0..20 {
+        ask(Ask::Apply(switch));
+        ask(Ask::UndoOf(switch));
+    }
+    let (before, told) = (COUNT.load(Ordering::SeqCst), steps.load(Ordering::Relaxed));
+    for _ in 0..1_000 {
+        ask(Ask::Apply(switch));
+        ask(Ask::UndoOf(switch));
+    }
+    let allocations = COUNT.load(Ordering::SeqCst) - before;
+    assert!(steps.load(Ordering::Relaxed) - told >= 4_000, "its steps are told on the way");
+    assert_eq!(allocations, 0, "in 2,000 requests");
+    handle.stop(clock.now() + Duration::from_secs(10));
+}
