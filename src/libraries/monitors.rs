@@ -120,9 +120,8 @@ impl Component for Monitors {
         let (samples, events) = (&self.samples, &mut self.events);
         self.bank.step(now, &mut |input| samples[input], &mut |_, event| events.raise(event));
         for (i, (verdict, robustness)) in self.verdicts.iter_mut().zip(&mut self.robustness).enumerate() {
-            if let Some(is) = self.bank.is_true(i) {
-                verdict.write(is);
-            }
+            // Who is connected to it must not go on with what was true before it was switched off.
+            verdict.write(self.bank.is_true(i).unwrap_or(false));
             if let Some(margin) = self.bank.robustness(i) {
                 robustness.write(margin);
             }
@@ -147,8 +146,9 @@ impl Monitors {
             let raises = || monitor.raise.map_or_else(|| "Watches.".to_owned(), |event| format!("Raises `{event}`."));
             let doc = monitor.description.clone().unwrap_or_else(raises);
             enabled.push(b.doc(&doc).property(name, monitor.enabled));
-            verdicts.push(b.doc("Whether its condition is true.").output(&format!("is_{name}")));
-            let margin = format!("{name}_robustness");
+            verdicts.push(b.doc("Whether it is enabled and its condition true.").output(&format!("is_{name}")));
+            // By their beginnings: two monitors, whatever they are called, never have ports of one name.
+            let margin = format!("robustness_of_{name}");
             robustness
                 .push(b.doc("How far the condition is from changing: positive while it is true.").output(&margin));
         }

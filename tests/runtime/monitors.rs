@@ -133,6 +133,23 @@ fn enabling_is_a_property_and_forgets() {
 }
 
 #[test]
+fn a_monitor_that_is_switched_off_says_no_and_names_do_not_clash() {
+    let echo = Condition::new(ConditionKind::IsTrue(signal("watch.is_high")));
+    // These two would have a port of one name if it were built the other way round.
+    let odd = ["is_a", "a_robustness"].map(|name| monitor(name, above("s.y", 100.0), true));
+    let list = [vec![monitor("high", above("s.y", 2.0), true), monitor("echo", echo, true)], odd.to_vec()].concat();
+    let b = bed(&list);
+    b.create("s", "Source", "fast", &[("level", Value::Float(3.0))]);
+    b.create("watch", MONITORS_TYPE, "fast", &[]);
+    b.start(&["s", "watch"]);
+    b.clock.sleep(10 * MS);
+    assert_eq!(raised(&b), ["e_high", "e_echo"]);
+    set(&b, "watch.high", Value::Bool(false));
+    b.clock.sleep(10 * MS);
+    assert_eq!(raised(&b), ["e_no_echo"], "the monitor itself says nothing, its port does");
+}
+
+#[test]
 fn what_is_watched_may_go_and_come_back() {
     let gone = Condition::new(ConditionKind::Silent { port: member("s.y"), time: Duration::from_millis(10) });
     let b = bed(&[
