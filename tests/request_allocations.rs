@@ -105,13 +105,21 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         ask(Ask::Apply(switch));
         ask(Ask::UndoOf(switch));
     }
-    let (before, told) = (COUNT.load(Ordering::SeqCst), steps.load(Ordering::Relaxed));
-    for _ in 0..1_000 {
-        ask(Ask::Apply(switch));
-        ask(Ask::UndoOf(switch));
-    }
-    let allocations = COUNT.load(Ordering::SeqCst) - before;
+    // A channel makes its list of sleepers when a thread first sleeps in it, which on a busy machine may be late. What
+    // is made once ends; what a request makes shows in every round.
+    let told = steps.load(Ordering::Relaxed);
+    let rounds: Vec<u64> = std::iter::repeat_with(|| {
+        let before = COUNT.load(Ordering::SeqCst);
+        for _ in 0..1_000 {
+            ask(Ask::Apply(switch));
+            ask(Ask::UndoOf(switch));
+        }
+        COUNT.load(Ordering::SeqCst) - before
+    })
+    .take(20)
+    .scan(false, |ended, count| (!std::mem::replace(ended, count == 0)).then_some(count))
+    .collect();
     assert!(steps.load(Ordering::Relaxed) - told >= 4_000, "its steps are told on the way");
-    assert_eq!(allocations, 0, "in 2,000 requests");
+    assert_eq!(rounds.last(), Some(&0), "allocations in each round of 2,000 requests: {rounds:?}");
     handle.stop(clock.now() + Duration::from_secs(10));
 }
