@@ -3,7 +3,7 @@
 use super::PLATFORMS;
 use crate::check::{self, Report};
 use crate::diagnostics::SourceMap;
-use crate::lang::{self, LoadOptions};
+use crate::lang::{self, LoadOptions, Loaded};
 use crate::libraries::monitors;
 use crate::model::codes::{DEPLOY_UNKNOWN_LIBRARY, DEPLOY_UNKNOWN_PLATFORM};
 use crate::model::finding::did_you_mean;
@@ -22,7 +22,7 @@ pub struct Read {
     pub libraries: Libraries,
     /// Its texts.
     pub sources: SourceMap,
-    /// What reading found; no errors among them.
+    /// What reading found; no errors among them, or (of [`read_but_for`]) only such as are about single configurations.
     pub findings: Findings,
 }
 
@@ -57,7 +57,22 @@ pub struct Refused {
 /// # Errors
 /// [`Refused`] with what is wrong in its texts, or a library or platform that this program does not have.
 pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result<Read, Refused> {
-    let loaded = lang::load(path, options);
+    read_loaded(lang::load(path, options), libraries)
+}
+
+/// Reads a deployment for those who work with some of its configurations: what is wrong in the texts of single ones does
+/// not refuse it. The errors among [`Read::findings`] say which these are ([`crate::model::finding::configuration`]); what
+/// could not be read of them is missing in the deployment.
+///
+/// # Errors
+/// [`Refused`] with what else is wrong in its texts, or a library or platform that this program does not have.
+pub fn read_but_for(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result<Read, Refused> {
+    let mut loaded = lang::load(path, options);
+    loaded.deployment = loaded.deployment.or(loaded.but_for.take());
+    read_loaded(loaded, libraries)
+}
+
+fn read_loaded(loaded: Loaded, libraries: &Libraries) -> Result<Read, Refused> {
     let mut findings = loaded.findings;
     let Some(deployment) = loaded.deployment else {
         return Err(Refused { findings, sources: loaded.sources, unreadable: loaded.unreadable });

@@ -5,5 +5,5 @@ mod load;
 pub mod script;
 mod start;
 
-pub use load::{Checked, Read, Refused, check, read};
+pub use load::{Checked, Read, Refused, check, read, read_but_for};
 pub use start::{PLATFORMS, StartError, start, start_on};

@@ -2,13 +2,14 @@
 
 use super::exit::Exit;
 use super::input::{Coordinator, Input, Parameters, coordinator, is_deployment};
-use super::plan::{asked, drive, driven};
+use super::plan::{asked, drive, driven, of_others};
 use super::remote::{ASK, ask};
 use super::{Answer, Context, Failure, Run, write_output};
 use crate::check::Until;
 use crate::diagnostics::Language;
 use crate::draw;
 use crate::lang;
+use crate::model::Findings;
 use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
 use serde_json::json;
 use std::path::PathBuf;
@@ -90,12 +91,18 @@ impl Run for Args {
             write_output(context, self.output.as_deref(), &text)?;
             return Ok(Exit::Done);
         } else {
-            let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read(context)?;
+            let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read_but_for(context)?;
             let refused = |findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() };
             let name = read.deployment.name;
+            // What is wrong with configurations that are not drawn refuses nothing.
+            let tell_others = |told: Option<&Findings>| {
+                let told = told.map_or(&[][..], Vec::as_slice);
+                context.out.findings(&of_others(&read, told), &read.sources);
+            };
             match what {
                 What::Plan => {
                     let plans = if self.ids.is_empty() { driven(&read, Until::Up) } else { asked(&read, &self.ids) };
+                    tell_others(plans.as_ref().err());
                     let plans: Vec<_> = plans
                         .map_err(refused)?
                         .into_iter()
@@ -106,13 +113,16 @@ impl Run for Args {
                 _ => {
                     let system = if self.ids.is_empty() {
                         let (drive, arrived) = drive(&read, Until::Up).map_err(refused)?;
+                        tell_others(arrived.as_ref().err());
                         if let Err(findings) = arrived {
                             // The picture shows how far it comes, which helps to see why.
                             context.out.findings(&findings, &read.sources);
                         }
                         drive.system
                     } else {
-                        let planned = asked(&read, &self.ids).map_err(refused)?;
+                        let planned = asked(&read, &self.ids);
+                        tell_others(planned.as_ref().err());
+                        let planned = planned.map_err(refused)?;
                         planned.into_iter().last().map(|p| p.result).unwrap_or_default()
                     };
                     draw::components(&format!("{name}: components"), &system, &read.catalogue)

@@ -61,6 +61,14 @@ impl Input {
         Ok(app::read(&self.file, &self.parameters.options()?, &context.libraries)?)
     }
 
+    /// Reads the deployment to work with some of its configurations: a mistake in the text of another does not refuse it.
+    ///
+    /// # Errors
+    /// What else is wrong with its texts, or a library that this program does not have.
+    pub fn read_but_for(&self, context: &Context) -> Result<Read, Failure> {
+        Ok(app::read_but_for(&self.file, &self.parameters.options()?, &context.libraries)?)
+    }
+
     /// Reads the deployment and checks it.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::{Answer, Context, Failure, Run};
 use crate::app::Read;
 use crate::check::{self, Drive, Happening, Until};
 use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
-use crate::model::finding::{did_you_mean, has_errors};
+use crate::model::finding::{configuration, did_you_mean, has_errors};
 use crate::model::{Ask, ConfigId, Finding, Findings, Snapshot};
 use crate::plan::PlannedStep;
 use crate::stack::{Request, Requester, Stack, transaction};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// Show what configurations mean: their steps, in which order, what runs in parallel, what can be undone and how.
 ///
 /// The configurations are planned one after the other, beginning with nothing deployed; without names, all of them in
-/// the order they are written. `--bringup` and `--shutdown` drive the coordinator instead, with every request answered
+/// the order they are written. A mistake in a configuration that is not asked for is told and refuses nothing. `--bringup` and `--shutdown` drive the coordinator instead, with every request answered
 /// `ok`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -62,12 +62,14 @@ impl Run for Args {
 
 impl Args {
     fn show(self, context: &Context) -> Answer {
-        let read = self.input.read(context)?;
+        let read = self.input.read_but_for(context)?;
         let planned = if self.bringup || self.shutdown {
             driven(&read, if self.bringup { Until::Up } else { Until::Down })
         } else {
             asked(&read, &self.ids)
         };
+        let told = planned.as_ref().err().map_or(&[][..], Vec::as_slice);
+        context.out.findings(&of_others(&read, told), &read.sources);
         let planned =
             planned.map_err(|findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() })?;
         if self.json {
@@ -82,6 +84,26 @@ impl Args {
         }
         Ok(Exit::Done)
     }
+}
+
+/// What is wrong in the texts of these configurations.
+fn of_texts(read: &Read, ids: &[ConfigId]) -> Findings {
+    let about = |f: &&Finding| configuration(f).is_some_and(|name| ids.iter().any(|id| id.as_str() == name));
+    read.findings.iter().filter(|f| f.is_error()).filter(about).cloned().collect()
+}
+
+/// What is wrong with configurations that were not asked for, which refuses nothing: everything but what is `told` already.
+///
+/// Where a text could not be read, only that is said: what a configuration lacks then makes wrong names of others.
+pub fn of_others(read: &Read, told: &[Finding]) -> Findings {
+    let mut wrong: Findings = read.findings.iter().filter(|f| f.is_error()).cloned().collect();
+    if wrong.is_empty() {
+        let all: Vec<ConfigId> = read.deployment.configurations.iter().map(|c| c.id).collect();
+        wrong = check::configurations(&read.deployment, &read.catalogue, &all);
+        wrong.retain(Finding::is_error);
+    }
+    wrong.retain(|f| !told.contains(f));
+    wrong
 }
 
 /// The configurations of these names, one after the other.
@@ -109,6 +131,10 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     }
     if names.is_empty() {
         ids = deployment.configurations.iter().map(|c| c.id).collect();
+    }
+    let unread = of_texts(read, &ids);
+    if !unread.is_empty() {
+        return Err(unread);
     }
     let wrong = check::configurations(deployment, &read.catalogue, &ids);
     if has_errors(&wrong) {
@@ -181,7 +207,16 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
         Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.deploy.up),
         Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &deployment.shutdown.down),
     };
-    let arrived = if let Some((ask, findings)) = &drive.refused {
+    let on_the_way = drive.happenings.iter().flat_map(|happening| match happening {
+        Happening::Applied { asks, .. } => asks.as_slice(),
+        Happening::Event { .. } => &[],
+    });
+    let on_the_way = on_the_way.chain(drive.refused.iter().map(|(ask, _)| ask));
+    let applied = on_the_way.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None });
+    let unread = of_texts(read, &applied.collect::<Vec<_>>());
+    let arrived = if !unread.is_empty() {
+        Err(unread)
+    } else if let Some((ask, findings)) = &drive.refused {
         let mut all = vec![
             Finding::error(code, format!("{what} stops at `{}`: `{ask}` is refused", drive.state))
                 .at(deployment.key_origin(key))

@@ -193,6 +193,12 @@ impl SourceMap {
         }
     }
 
+    /// The bytes of the whole element at `origin`, as far as they are known: of a call in Lua up to its closing bracket.
+    pub fn extent(&self, origin: Origin) -> Option<(FileId, Range<usize>)> {
+        let (file, span) = self.base(origin)?;
+        Some((file, self.reach(origin, file, &span)))
+    }
+
     /// Where an origin stands; none for [`Origin::NONE`].
     pub fn locate(&self, origin: Origin) -> Option<Location> {
         let mut words = Vec::new();

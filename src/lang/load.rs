@@ -1,5 +1,6 @@
 //! The entrances: a deployment with all its files, or one file alone.
 
+use super::concern;
 use super::files::{self, Sources};
 use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
@@ -33,6 +34,9 @@ pub struct LoadOptions {
 pub struct Loaded {
     /// The deployment; none when something in its texts refuses it.
     pub deployment: Option<Deployment>,
+    /// The deployment when nothing refuses it but what is wrong in the texts of some configurations: each such finding has
+    /// a path that begins with `configurations.ID`. What could not be read of these is missing in it.
+    pub but_for: Option<Deployment>,
     /// What was found.
     pub findings: Findings,
     /// The texts, and where everything stands.
@@ -91,8 +95,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Loaded {
 pub fn load_from(from: &Sources, path: &Path, options: &LoadOptions) -> Loaded {
     let mut cx = Cx::default();
     let deployment = load_deployment(&mut cx, from, path, options);
-    let deployment = deployment.filter(|_| !crate::model::finding::has_errors(&cx.findings));
-    Loaded { deployment, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
+    let (deployment, but_for) = match deployment {
+        Some(deployment) if !crate::model::finding::has_errors(&cx.findings) => (Some(deployment), None),
+        other => (None, other.filter(|_| !cx.unreadable && concern::only_configurations(&cx.findings))),
+    };
+    Loaded { deployment, but_for, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
 }
 
 /// Loads one file of configurations, Lua or YAML.
@@ -240,9 +247,13 @@ fn stem(path: &Path) -> String {
 /// The map of configurations of a file.
 fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Node> {
     let (reading, language) = open(cx, from, path, named_at)?;
+    let before = cx.findings.len();
     match language {
         Language::Lua => {
             let made = lua::read(cx, reading, params, &stem(path), None)?;
+            if let Some(configurations) = &made.configurations {
+                concern::by_place(cx, before, configurations);
+            }
             if made.configurations.is_none() {
                 nothing(cx, reading, "configuration", "`ConfiguratorConf { name = Configuration { … } }`");
             }
@@ -251,7 +262,13 @@ fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin
         Language::Scxml => only_charts(cx, reading, "configurations"),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
-            only_key(cx, node, reading, "configurations", "a file of configurations")
+            let after = cx.findings.len();
+            let configurations = only_key(cx, node, reading, "configurations", "a file of configurations")?;
+            // Of the file as a whole is what was found after it was read.
+            let of_file = cx.findings.split_off(after);
+            concern::by_place(cx, before, &configurations);
+            cx.findings.extend(of_file);
+            Some(configurations)
         }
     }
 }
@@ -315,6 +332,7 @@ fn unique(cx: &mut Cx, configurations: &mut Vec<Configuration>) {
                     .at(c.origin)
                     .labelled("again here")
                     .also(*first, "first here")
+                    .path(concern::path(c.id.as_str()))
                     .help("a request names one configuration: give one of them another name"),
             );
             false

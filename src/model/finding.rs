@@ -153,6 +153,12 @@ pub fn has_errors(findings: &[Finding]) -> bool {
     findings.iter().any(Finding::is_error)
 }
 
+/// The name of the configuration that a finding is about, if it is about one and nothing else.
+pub fn configuration(finding: &Finding) -> Option<&str> {
+    let rest = finding.path.strip_prefix("configurations.")?;
+    Some(rest.split('.').next().unwrap_or(rest))
+}
+
 /// The known name nearest to `name`, if one is near enough to be what was meant.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known

@@ -170,7 +170,9 @@ fn plan_refuses_what_was_asked_for_and_nothing_else() {
     assert_eq!(ran.json()["findings"][0]["help"], "did you mean `create_all`?");
     // A mistake in another configuration.
     demo.replace("configurations.lua", "property_set(\"source.name\"", "property_set(\"sorce.name\"");
-    assert_eq!(demo.run(&["plan", "deployment.yaml", "create_all"]).code, 0);
+    let told = demo.run(&["plan", "deployment.yaml", "create_all"]);
+    assert_eq!(told.code, 0);
+    assert!(told.err.contains("conf::unknown_component"), "{}", told.err);
     assert_eq!(demo.run(&["plan", "deployment.yaml", "create_all", "rename"]).code, 1);
 }
 

@@ -5,3 +5,4 @@ mod breakages;
 mod commands;
 mod demo;
 mod monitor;
+mod unasked;

@@ -1,6 +1,7 @@
 //! Configurations: what both spellings mean.
 
 use super::{Unit, choice, name, text, time, truth, value, whole};
+use crate::lang::concern;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{
@@ -24,6 +25,7 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
     let mut all = Vec::with_capacity(entries.len());
     for entry in entries {
         let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
+        let (before, written) = (cx.findings.len(), entry.key.clone());
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
         let id = name::<ConfigId>(cx, &key, "a configuration's name", "enable_copying");
         // Without a name its inside is still looked at, so that all findings come at once.
@@ -31,6 +33,7 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
         if let (Some(_), Some(configuration)) = (id, inside) {
             all.push(configuration);
         }
+        concern::all(cx, before, &written);
     }
     all
 }
