@@ -113,12 +113,20 @@ pub const WORKERS: usize = 8;
 /// Blocking platform calls made at the same time at most, whatever the deployment says: each takes a thread.
 pub const WORKERS_MOST: usize = 64;
 
+/// Brief steps handed to a platform in one call: the way to the worker and back is then a small part of them.
+pub const BRIEF_STEPS: usize = 256;
+
+/// How long after the first of several brief steps the last of one call may begin: what waits for the call is not kept
+/// waiting by their number.
+pub const BRIEF_TURN: Duration = Duration::from_millis(10);
+
 /// Workers that may be stuck in calls a platform never answered, beside those at work.
 pub const WORKERS_GIVEN_UP: usize = 64;
 
 /// How long after its deadline a platform call may answer before its worker is given up: a platform promises "a little
 /// later at most".
 pub const PLATFORM_GRACE: Duration = Duration::from_millis(100);
+
 /// Events that may wait in the queue of a connection of event ports whose policy is `data`.
 pub const EVENT_FIFO: u32 = 64;
 

@@ -5,7 +5,7 @@ use super::control::{Busy, Command, View};
 use super::fast::Fast;
 use super::inbox::{Counts, Mail};
 use super::pool::{Pool, Reply, Ticket};
-use super::progress::{Progress, ProgressSink, StepName};
+use super::progress::{Progress, ProgressSink};
 use super::request::{Answer, Batch, Reason, Request, Residual};
 use super::transaction::{Interruption, Left};
 use crate::model::{
@@ -62,8 +62,6 @@ pub(super) struct Engine {
     pub commands: VecDeque<Command>,
     pub replies: Vec<(Ticket, Reply)>,
     pub given_up: FxHashSet<Ticket>,
-    /// Steps that are out, for the log.
-    pub names: Vec<(Ticket, StepName, bool)>,
     pub broken: Option<Broken>,
     /// The picture as it should be, when a panic came in the middle of an application.
     pub expected: Option<System>,
@@ -126,7 +124,6 @@ impl Engine {
             commands: VecDeque::new(),
             replies: Vec::new(),
             given_up: FxHashSet::default(),
-            names: Vec::new(),
             broken: None,
             expected: None,
             quarantined: Vec::new(),

@@ -2,7 +2,8 @@
 //! outcome settled before it is believed.
 
 use super::engine::Engine;
-use super::pool::{self, Call, Reply, Ticket};
+use super::flights::Flight;
+use super::pool::{self, Call, Reply};
 use super::progress::{Progress, StepEnd, StepName};
 use super::request::Reason;
 use super::work::{Item, Order};
@@ -13,14 +14,6 @@ use crate::system::{View as _, Violation, step};
 use crate::time::Time;
 use smallvec::SmallVec;
 use std::time::Duration;
-
-/// A call that is out.
-pub(super) struct Flight {
-    ticket: Ticket,
-    item: u32,
-    started: Time,
-    deadline: Time,
-}
 
 /// How a carrying out stands.
 pub(super) struct Run {
@@ -43,7 +36,7 @@ pub(super) struct Run {
     pub unsettled: Vec<u32>,
     /// Any outcome was unknown at first.
     pub doubted: bool,
-    flights: Vec<Flight>,
+    pub flights: Vec<Flight>,
     /// Unknown outcomes that wait to be settled.
     unread: Vec<(u32, Cause)>,
 }
@@ -91,10 +84,9 @@ impl Engine {
         if run.stops() {
             return End::Failed;
         }
-        let items = work;
-        // As long as every step is immediate the list's own order serves, and nothing needs to be counted.
+        // As long as no step is blocking the list's own order serves, and nothing needs to be counted.
         let mut at = 0;
-        while at < items.len() {
+        while at < work.len() {
             if run.over[at] {
                 at += 1;
                 continue;
@@ -102,32 +94,37 @@ impl Engine {
             if run.gives_way && self.urgent() {
                 return End::GaveWay;
             }
-            if self.platform.execution(&items[at].step) != Execution::Immediate {
-                break;
+            match self.platform.execution(&work[at].step) {
+                Execution::Immediate => {
+                    self.inline(work, at as u32, run);
+                    at += 1;
+                    if at % 64 == 0 {
+                        self.glance();
+                    }
+                }
+                // Those that were not begun are met again.
+                Execution::Brief => {
+                    if !self.brief_from(work, at, run) {
+                        return End::GaveWay;
+                    }
+                }
+                Execution::Blocking => return self.side_by_side(work, run, at),
             }
-            self.inline(work, at as u32, run);
             if !run.unread.is_empty() && !self.settle_unread(work, run) {
                 return End::GaveWay;
             }
             if run.stops() {
                 return End::Failed;
             }
-            at += 1;
-            if at % 64 == 0 {
-                self.glance();
-            }
         }
-        if at == items.len() {
-            return End::All;
-        }
-        self.side_by_side(work, run, at)
+        End::All
     }
 
     /// Carries out `items[from..]` with blocking steps among them.
     fn side_by_side(&mut self, work: &[Item], run: &mut Run, from: usize) -> End {
         let platform = self.platform.clone();
-        let immediate = |step: &Step| platform.execution(step) == Execution::Immediate;
-        let mut order = Order::new(work, from, &immediate);
+        let execution = |step: &Step| platform.execution(step);
+        let mut order = Order::new(work, from, &execution);
         loop {
             if run.gives_way && self.urgent() {
                 return End::GaveWay;
@@ -135,7 +132,7 @@ impl Engine {
             if run.stops() {
                 return if self.collect(work, run) { End::Failed } else { End::GaveWay };
             }
-            if let Some(i) = order.next_immediate() {
+            if let Some(i) = order.next(Execution::Immediate) {
                 self.inline(work, i, run);
                 if !run.unread.is_empty() && !self.settle_unread(work, run) {
                     return End::GaveWay;
@@ -143,31 +140,42 @@ impl Engine {
                 order.ended(i);
                 continue;
             }
-            if self.pool.has_room()
-                && let Some(i) = order.next_blocking()
-            {
-                if let Some(reason) = self.forbidden(&work[i as usize].step, run, self.clock.now()) {
-                    run.over[i as usize] = true;
-                    run.failures.push((i, reason));
-                    order.ended(i);
+            if self.pool.has_room() {
+                let mut ready = SmallVec::<[u32; 1]>::new();
+                if let Some(i) = order.next(Execution::Blocking) {
+                    ready.push(i);
                 } else {
-                    self.launch(work, i, run);
+                    let brief = std::iter::from_fn(|| order.next(Execution::Brief));
+                    ready.extend(brief.take(limits::BRIEF_STEPS));
                 }
-                continue;
+                ready.retain(|i| {
+                    let forbidden = self.forbidden(&work[*i as usize].step, run, self.clock.now());
+                    let Some(reason) = forbidden else { return true };
+                    run.over[*i as usize] = true;
+                    run.failures.push((*i, reason));
+                    order.ended(*i);
+                    false
+                });
+                if !ready.is_empty() {
+                    self.launch(work, ready, run);
+                    continue;
+                }
             }
             if run.flights.is_empty() {
                 return if order.is_over() { End::All } else { End::Failed };
             }
             self.await_flight(run);
-            let landed = self.landed(run);
-            let over: SmallVec<[u32; 8]> = landed.iter().map(|(i, _)| *i).collect();
-            for (i, outcome) in landed {
-                self.conclude(work, i, outcome, run);
+            let landed = self.landed(work, run);
+            for (i, outcome) in &landed {
+                match outcome {
+                    Some(outcome) => self.conclude(work, *i, outcome.clone(), run),
+                    None => order.again(*i),
+                }
             }
             if !self.settle_unread(work, run) {
                 return End::GaveWay;
             }
-            over.into_iter().for_each(|i| order.ended(i));
+            landed.iter().filter(|(_, outcome)| outcome.is_some()).for_each(|(i, _)| order.ended(*i));
         }
     }
 
@@ -184,14 +192,16 @@ impl Engine {
                 return false;
             }
             self.await_flight(run);
-            for (i, outcome) in self.landed(run) {
-                self.conclude(work, i, outcome, run);
+            for (i, outcome) in self.landed(work, run) {
+                if let Some(outcome) = outcome {
+                    self.conclude(work, i, outcome, run);
+                }
             }
         }
     }
 
     /// Why `step` must not be given to the platform now, if so: its precondition on the live model, and the time.
-    fn forbidden(&mut self, step: &Step, run: &Run, now: Time) -> Option<Reason> {
+    pub(super) fn forbidden(&mut self, step: &Step, run: &Run, now: Time) -> Option<Reason> {
         if now >= run.until {
             return Some(Reason::Timeout(self.allowed));
         }
@@ -234,61 +244,6 @@ impl Engine {
         }
     }
 
-    fn launch(&mut self, work: &[Item], i: u32, run: &mut Run) {
-        let step = &work[i as usize].step;
-        let started = self.clock.now();
-        self.tell_started(step);
-        let deadline = (started + self.patience).min(run.until);
-        let ticket = self.pool.start(Call::Execute(step.clone()), deadline);
-        run.flights.push(Flight { ticket, item: i, started, deadline });
-        self.names.push((ticket, StepName::of(step), run.undoing));
-    }
-
-    /// Waits until a call is back or given up, or something urgent came.
-    fn await_flight(&mut self, run: &Run) {
-        while !run.flights.iter().any(|flight| self.has_reply(flight.ticket)) {
-            if run.gives_way && self.urgent() {
-                return;
-            }
-            let until = run.flights.iter().map(|flight| flight.deadline).min().unwrap_or(Time::NEVER);
-            let until = until + limits::PLATFORM_GRACE;
-            if self.clock.now() >= until {
-                return;
-            }
-            self.pump(until);
-        }
-    }
-
-    /// Takes the calls that are back, and those given up, off the list.
-    fn landed(&mut self, run: &mut Run) -> Vec<(u32, Outcome)> {
-        let mut landed = Vec::new();
-        let now = self.clock.now();
-        let mut at = 0;
-        while at < run.flights.len() {
-            let flight = &run.flights[at];
-            let outcome = match self.take_reply(flight.ticket) {
-                Some(Reply::Executed(outcome)) => outcome,
-                Some(_) => Outcome::Unknown(Cause::Lost("the answer was to another question".to_owned())),
-                None if now >= flight.deadline + limits::PLATFORM_GRACE => {
-                    self.give_up(flight.ticket);
-                    Outcome::Unknown(Cause::Timeout)
-                }
-                None => {
-                    at += 1;
-                    continue;
-                }
-            };
-            let flight = run.flights.remove(at);
-            if let Some(place) = self.names.iter().position(|(ticket, ..)| *ticket == flight.ticket) {
-                let (_, step, undoing) = self.names.swap_remove(place);
-                let took = now.since(flight.started);
-                self.tell(step, StepEnd::from(&outcome), took, undoing);
-            }
-            landed.push((flight.item, outcome));
-        }
-        landed
-    }
-
     /// Draws the conclusion from an outcome; an unknown one waits to be settled.
     pub(super) fn conclude(&mut self, work: &[Item], i: u32, outcome: Outcome, run: &mut Run) {
         let step = &work[i as usize].step;
@@ -314,7 +269,7 @@ impl Engine {
         self.took_effect(step, i, run);
     }
 
-    fn took_effect(&mut self, step: &Step, i: u32, run: &mut Run) {
+    pub(super) fn took_effect(&mut self, step: &Step, i: u32, run: &mut Run) {
         run.over[i as usize] = true;
         step::effect(step, &mut self.system);
         run.done.push(i);
@@ -435,7 +390,7 @@ impl Engine {
         }
     }
 
-    fn tell_started(&self, step: &Step) {
+    pub(super) fn tell_started(&self, step: &Step) {
         if let Some(progress) = &self.progress {
             progress(&Progress::Started(StepName::of(step)));
         }

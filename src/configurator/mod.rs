@@ -16,6 +16,7 @@ pub mod control;
 mod engine;
 mod exec;
 mod fast;
+mod flights;
 mod frames;
 mod inbox;
 mod pool;

@@ -8,10 +8,11 @@
 use super::inbox::{Mail, Post};
 use crate::limits;
 use crate::model::{ComponentName, ComponentSnapshot, Snapshot, Step};
-use crate::platform::{Cause, ObserveError, Outcome, Platform};
+use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
 use crate::time::{Clock, Receiver, Sender, Time};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A call of the platform, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,6 +21,8 @@ pub(super) struct Ticket(pub u64);
 /// What a worker is to call.
 pub(super) enum Call {
     Execute(Step),
+    /// Several brief steps, each with so much time.
+    Several(Vec<Step>, Duration),
     Observe,
     ObserveComponent(ComponentName),
 }
@@ -27,6 +30,7 @@ pub(super) enum Call {
 /// What came of it.
 pub(super) enum Reply {
     Executed(Outcome),
+    Several(Vec<Ended>),
     Observed(Result<Snapshot, ObserveError>),
     ObservedComponent(Result<Option<ComponentSnapshot>, ObserveError>),
 }
@@ -60,6 +64,14 @@ fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
     let lost = || ObserveError::Lost("the platform panicked".to_owned());
     match call {
         Call::Execute(step) => Reply::Executed(execute(platform, &step, deadline)),
+        Call::Several(steps, each) => {
+            let count = steps.len();
+            let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline)));
+            Reply::Several(several.unwrap_or_else(|_| {
+                let outcome = Outcome::Unknown(Cause::Lost("the platform panicked".to_owned()));
+                vec![Ended { outcome, took: None }; count]
+            }))
+        }
         Call::Observe => Reply::Observed(
             catch_unwind(AssertUnwindSafe(|| platform.observe(deadline))).unwrap_or_else(|_| Err(lost())),
         ),

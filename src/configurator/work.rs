@@ -2,6 +2,7 @@
 
 use crate::model::{Origin, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
+use crate::platform::Execution;
 use crate::system::{Reversibility, Undo};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
@@ -33,6 +34,15 @@ pub(super) fn chain(steps: impl IntoIterator<Item = Step>) -> Vec<Item> {
     work
 }
 
+/// The place of a kind of execution in a list.
+fn kind(execution: Execution) -> usize {
+    match execution {
+        Execution::Immediate => 0,
+        Execution::Brief => 1,
+        Execution::Blocking => 2,
+    }
+}
+
 /// Which items may begin, kept up to date as items end.
 pub(super) struct Order<'a> {
     items: &'a [Item],
@@ -44,15 +54,15 @@ pub(super) struct Order<'a> {
     /// Items of each wave that are not over.
     left: Vec<usize>,
     wave: u32,
-    /// May begin but for their wave, in the order of the list; immediate ones and blocking ones apart.
-    ready: [BTreeSet<(u32, u32)>; 2],
-    immediate: &'a dyn Fn(&Step) -> bool,
+    /// May begin but for their wave, in the order of the list; immediate, brief and blocking ones apart.
+    ready: [BTreeSet<(u32, u32)>; 3],
+    execution: &'a dyn Fn(&Step) -> Execution,
     over: usize,
 }
 
 impl<'a> Order<'a> {
     /// The order of `items[from..]`; those before are over.
-    pub fn new(items: &'a [Item], from: usize, immediate: &'a dyn Fn(&Step) -> bool) -> Self {
+    pub fn new(items: &'a [Item], from: usize, execution: &'a dyn Fn(&Step) -> Execution) -> Self {
         let n = items.len();
         let mut waits = vec![0u32; n];
         let mut starts = vec![0u32; n + 2];
@@ -77,8 +87,8 @@ impl<'a> Order<'a> {
             }
             left[item.wave as usize] += 1;
         }
-        let ready = [BTreeSet::new(), BTreeSet::new()];
-        let mut order = Self { items, waits, starts, followers, left, wave: 0, ready, immediate, over: from };
+        let ready = [BTreeSet::new(), BTreeSet::new(), BTreeSet::new()];
+        let mut order = Self { items, waits, starts, followers, left, wave: 0, ready, execution, over: from };
         for (index, _) in (0..).zip(items).skip(from) {
             if order.waits[index as usize] == 0 {
                 order.offer(index);
@@ -90,8 +100,7 @@ impl<'a> Order<'a> {
 
     fn offer(&mut self, i: u32) {
         let item = &self.items[i as usize];
-        let kind = usize::from(!(self.immediate)(&item.step));
-        self.ready[kind].insert((item.wave, i));
+        self.ready[kind((self.execution)(&item.step))].insert((item.wave, i));
     }
 
     fn advance(&mut self) {
@@ -100,23 +109,19 @@ impl<'a> Order<'a> {
         }
     }
 
-    fn next(&mut self, kind: usize) -> Option<u32> {
-        let (wave, i) = *self.ready[kind].first()?;
+    /// The first item of that kind that may begin; it is no longer offered.
+    pub fn next(&mut self, execution: Execution) -> Option<u32> {
+        let ready = &mut self.ready[kind(execution)];
+        let (wave, _) = *ready.first()?;
         if wave > self.wave {
             return None;
         }
-        self.ready[kind].pop_first();
-        Some(i)
+        ready.pop_first().map(|(_, i)| i)
     }
 
-    /// The first immediate item that may begin; it is no longer offered.
-    pub fn next_immediate(&mut self) -> Option<u32> {
-        self.next(0)
-    }
-
-    /// The first blocking item that may begin; it is no longer offered.
-    pub fn next_blocking(&mut self) -> Option<u32> {
-        self.next(1)
+    /// Item `i` was taken, but did not begin: it is offered again.
+    pub fn again(&mut self, i: u32) {
+        self.offer(i);
     }
 
     /// Item `i` is over.
@@ -155,26 +160,28 @@ mod tests {
     fn edges_and_waves_are_kept() {
         // 0 → 2, 1 → 2, 3 in a later wave, 4 after 3.
         let items = [item(&[], 0), item(&[], 0), item(&[0, 1], 0), item(&[], 1), item(&[3], 1)];
-        let blocking = |_: &Step| false;
+        let blocking = |_: &Step| Execution::Blocking;
         let mut order = Order::new(&items, 0, &blocking);
-        assert_eq!(order.next_immediate(), None);
-        assert_eq!(order.next_blocking(), Some(0));
-        assert_eq!(order.next_blocking(), Some(1));
-        assert_eq!(order.next_blocking(), None);
+        assert_eq!(order.next(Execution::Immediate), None);
+        assert_eq!(order.next(Execution::Blocking), Some(0));
+        assert_eq!(order.next(Execution::Blocking), Some(1));
+        assert_eq!(order.next(Execution::Blocking), None);
         order.ended(1);
-        assert_eq!(order.next_blocking(), None);
+        assert_eq!(order.next(Execution::Blocking), None);
         order.ended(0);
-        assert_eq!(order.next_blocking(), Some(2));
-        assert_eq!(order.next_blocking(), None, "the wave is a barrier");
+        assert_eq!(order.next(Execution::Blocking), Some(2));
+        assert_eq!(order.next(Execution::Blocking), None, "the wave is a barrier");
         order.ended(2);
-        assert_eq!(order.next_blocking(), Some(3));
+        assert_eq!(order.next(Execution::Blocking), Some(3));
         order.ended(3);
-        assert_eq!(order.next_blocking(), Some(4));
+        assert_eq!(order.next(Execution::Blocking), Some(4));
+        order.again(4);
+        assert_eq!(order.next(Execution::Blocking), Some(4), "it had not begun");
         assert!(!order.is_over());
         order.ended(4);
         assert!(order.is_over());
-        let immediate = |_: &Step| true;
+        let immediate = |_: &Step| Execution::Immediate;
         let mut rest = Order::new(&items, 2, &immediate);
-        assert_eq!(rest.next_immediate(), Some(2), "those before are over");
+        assert_eq!(rest.next(Execution::Immediate), Some(2), "those before are over");
     }
 }

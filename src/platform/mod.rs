@@ -9,6 +9,7 @@ pub mod simulated;
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
 use crate::time::Time;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// How a step ended, as far as the platform knows.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,8 +50,20 @@ pub enum Cause {
 pub enum Execution {
     /// Wait-free and bounded: may run in the configurator's own thread.
     Immediate,
+    /// Hardly takes time, but runs code that is not the platform's: on a worker, several in one call
+    /// ([`Platform::execute_brief`]), since the way to the worker would cost more than they do.
+    Brief,
     /// May take until its deadline: runs on a worker.
     Blocking,
+}
+
+/// How one of several steps ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ended {
+    /// How.
+    pub outcome: Outcome,
+    /// How long it took, where the platform has measured it.
+    pub took: Option<Duration>,
 }
 
 /// What a platform reports by itself.
@@ -108,6 +121,16 @@ pub trait Platform: Send + Sync {
     /// Carries out one step. Returns by `deadline` (a little later at most), whatever the component does.
     /// Checks its own precondition: a step that does not fit what is there is refused and changes nothing.
     fn execute(&self, step: &Step, deadline: Time) -> Outcome;
+
+    /// Carries out brief steps, none of which needs another one, in their order: each has `each` from its beginning, and
+    /// `until` at most. Begins no further one after one that is not done, nor after [`BRIEF_TURN`](crate::limits::BRIEF_TURN). Answers for
+    /// those that were begun, at least one; the others did not happen.
+    ///
+    /// A platform that calls steps brief carries out several; by itself this carries out the first.
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+        let _ = each;
+        steps.iter().take(1).map(|step| Ended { outcome: self.execute(step, until), took: None }).collect()
+    }
 
     /// The whole system as it is.
     ///

@@ -55,6 +55,8 @@ pub struct Kind {
     pub ty: Arc<ComponentType>,
     /// Which transitions call the component's own code; the others are immediate.
     hooks: [bool; 4],
+    /// Whether making and dropping one is promised to be immediate.
+    immediate: bool,
     /// Ports and properties by name, in the order of the ends.
     pub(crate) ports: Vec<Ident>,
     pub(crate) properties: Vec<Ident>,
@@ -93,7 +95,20 @@ impl Kind {
             let (component, ends, values) = Builder::make(&table, beat, values, &new)?;
             Ok(Made { body: Box::new(Typed { component, table: table.clone() }), ends, values })
         });
-        Self { ty: Arc::new(ty), hooks, ports, properties, operations, make }
+        Self { ty: Arc::new(ty), hooks, immediate: false, ports, properties, operations, make }
+    }
+
+    /// Promises that making a component of this type, and dropping one, is wait-free and bounded: its `new` does nothing
+    /// but declare, and no `Drop` of its own or of what it holds waits for anything. It is then done in the configurator's
+    /// own thread; without the promise on a worker under a deadline, which costs the more the more components there are.
+    #[must_use]
+    pub fn immediate(self) -> Self {
+        Self { immediate: true, ..self }
+    }
+
+    /// Whether [`Kind::immediate`] was promised.
+    pub fn is_immediate(&self) -> bool {
+        self.immediate
     }
 
     /// Whether the transition calls the component's own code.
@@ -135,6 +150,15 @@ impl Library {
     pub fn with<C: Component>(mut self, type_name: &str) -> Self {
         self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
         self
+    }
+
+    /// As [`Library::with`], with the promise of [`Kind::immediate`].
+    ///
+    /// # Panics
+    /// When the declaration is wrong; see [`Kind::of`].
+    #[must_use]
+    pub fn with_immediate<C: Component>(self, type_name: &str) -> Self {
+        self.with_kind(Kind::of::<C>(type_name).immediate())
     }
 
     /// With a component type that was made before.

@@ -36,8 +36,8 @@ pub struct Made {
 /// How a platform is made for a test.
 pub trait Bed {
     /// A platform with nothing on it, on a simulated clock that the calling thread has entered, with the test types;
-    /// in every component of type `Misbehaving`, the given hooks (`configure`, `start`, `stop`, `cleanup`) are in
-    /// trouble.
+    /// in every component of type `Misbehaving`, the given hooks (`configure`, `start`, `stop`, `cleanup`), or its making
+    /// and its end (`create`, `destroy`: they only hang), are in trouble.
     fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made;
 }
 

@@ -5,7 +5,7 @@ use davit::model::{EventName, Transition, Tunable};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::record;
 use davit::runtime::{
-    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Libraries, Library, Out, Prop,
+    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Kind, Libraries, Library, Out, Prop,
 };
 use davit::time::Clock;
 use std::collections::BTreeMap;
@@ -84,17 +84,18 @@ impl Component for Plant {
     }
 }
 
-struct Misbehaving;
+/// It has no clock of its own when it is made and dropped.
+struct Misbehaving(Option<Clock>);
 
-fn misbehave(cx: &Context, hook: &str) -> HookResult {
-    let trouble = with_wish(cx.clock(), |w| w.trouble.iter().find(|(h, _)| *h == hook).map(|(_, t)| *t)).flatten();
+fn misbehave(clock: &Clock, hook: &str) -> HookResult {
+    let trouble = with_wish(clock, |w| w.trouble.iter().find(|(h, _)| *h == hook).map(|(_, t)| *t)).flatten();
     match trouble {
         None => Ok(()),
         Some(Trouble::Fail) => Err(Failure::from("on purpose")),
         Some(Trouble::Panic) => panic!("on purpose"),
-        Some(Trouble::Hang(None)) => cx.clock().hang(),
+        Some(Trouble::Hang(None)) => clock.hang(),
         Some(Trouble::Hang(Some(time))) => {
-            cx.clock().sleep(time);
+            clock.sleep(time);
             Ok(())
         }
     }
@@ -103,16 +104,31 @@ fn misbehave(cx: &Context, hook: &str) -> HookResult {
 impl Component for Misbehaving {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe("Does in its hooks what the test asks for.");
-        b.on_configure(|_, cx| misbehave(cx, Transition::Configure.as_str()));
-        b.on_start(|_, cx| misbehave(cx, Transition::Start.as_str()));
-        b.on_stop(|_, cx| misbehave(cx, Transition::Stop.as_str()));
-        b.on_cleanup(|_, cx| misbehave(cx, Transition::Cleanup.as_str()));
-        Self
+        b.on_configure(|_, cx| misbehave(cx.clock(), Transition::Configure.as_str()));
+        b.on_start(|_, cx| misbehave(cx.clock(), Transition::Start.as_str()));
+        b.on_stop(|_, cx| misbehave(cx.clock(), Transition::Stop.as_str()));
+        b.on_cleanup(|_, cx| misbehave(cx.clock(), Transition::Cleanup.as_str()));
+        Self(None)
     }
 }
 
-pub fn libraries() -> Libraries {
-    Libraries::new().with(Library::new("bed").with::<Plant>("Plant").with::<Misbehaving>("Misbehaving"))
+impl Drop for Misbehaving {
+    fn drop(&mut self) {
+        if let Some(clock) = &self.0 {
+            let _ = misbehave(clock, "destroy");
+        }
+    }
+}
+
+pub fn libraries(clock: &Clock) -> Libraries {
+    let clock = clock.clone();
+    let misbehaving = Kind::made_by("Misbehaving", move |b| {
+        let mut made = Misbehaving::new(b);
+        let _ = misbehave(&clock, "create");
+        made.0 = Some(clock.clone());
+        made
+    });
+    Libraries::new().with(Library::new("bed").with::<Plant>("Plant").with_kind(misbehaving))
 }
 
 /// At the end of a test: those who hang are released, so that no thread outlives it.
@@ -129,8 +145,10 @@ impl Bed for EmbeddedBed {
     fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
         let clock = Clock::simulated();
         let guard = clock.enter();
+        // A type is made once to be described, before anything is asked of it.
+        let libraries = libraries(&clock);
         WISHES.lock().unwrap().push(Wish { clock: clock.clone(), trouble: trouble.to_vec(), raise: Vec::new() });
-        let platform = EmbeddedPlatform::new(&clock, &libraries(), &BTreeMap::new());
+        let platform = EmbeddedPlatform::new(&clock, &libraries, &BTreeMap::new());
         let asked = clock.clone();
         Made {
             platform: Arc::new(platform),
@@ -146,7 +164,7 @@ impl Bed for EmbeddedBed {
 /// The suite's types are the same on every platform.
 #[test]
 fn the_types_are_those_of_the_suite() {
-    let here = libraries().catalogue();
+    let here = libraries(&Clock::simulated()).catalogue();
     for ty in crate::bed::types() {
         assert_eq!(**here.get(ty.name).unwrap(), ty);
     }

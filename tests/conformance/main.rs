@@ -1,7 +1,7 @@
 //! One contract for every platform (design §11): each test is a rule of the `Platform` trait, run on every platform.
 //!
 //! A platform joins by a [`bed::Bed`]: how to make one with the test types of [`bed::types`], how to make a component of it
-//! fail, panic or hang in a hook, and how to make one raise an event.
+//! fail, panic or hang in a hook, hang while it is made or dropped, and how to make one raise an event.
 
 mod bed;
 mod embedded;
@@ -44,6 +44,7 @@ macro_rules! every_rule {
             a_hung_call_is_unknown_at_its_deadline_and_quarantined,
             a_quarantined_component_can_be_disconnected,
             a_call_that_returns_late_is_cleaned_up,
+            brief_steps_are_carried_out_as_far_as_they_are_done,
             unknown_is_settled_by_reading_back,
             events_of_components_reach_the_sink,
             prepared_steps_do_what_executed_ones_do,

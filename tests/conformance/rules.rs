@@ -2,7 +2,7 @@
 
 use crate::bed::*;
 use davit::model::*;
-use davit::platform::{Cause, Outcome, PlatformEvent};
+use davit::platform::{Cause, Ended, Outcome, PlatformEvent};
 use std::time::Duration;
 use {Policy::Buffer, Policy::Data, Transition::Cleanup, Transition::Configure, Transition::Start, Transition::Stop};
 
@@ -228,16 +228,26 @@ fn up_to(hook: &str) -> (RunState, Vec<Step>) {
         "configure" => (RunState::Unconfigured, all[..1].to_vec()),
         "start" | "cleanup" => (RunState::Stopped, all[..2].to_vec()),
         "stop" => (RunState::Running, all.to_vec()),
+        "create" => (RunState::Unconfigured, Vec::new()),
+        "destroy" => (RunState::Unconfigured, all[..1].to_vec()),
         other => panic!("no hook {other}"),
     }
 }
 
 fn step_of(hook: &str) -> Step {
+    match hook {
+        "create" => return create_misbehaving("bad"),
+        "destroy" => return destroy("bad"),
+        _ => {}
+    }
     let transition = [Configure, Start, Stop, Cleanup].into_iter().find(|t| t.as_str() == hook).expect("a hook");
     state("bad", transition)
 }
 
 const HOOKS: [&str; 4] = ["configure", "start", "stop", "cleanup"];
+
+/// Everything that may run a component's own code but its operations.
+const CALLS: [&str; 6] = ["create", "configure", "start", "stop", "cleanup", "destroy"];
 
 pub fn a_failed_step_leaves_the_component_as_it_was(bed: &dyn Bed) {
     for hook in ["configure", "start"] {
@@ -289,7 +299,7 @@ pub fn faulted_components_can_be_cleaned_up_and_destroyed(bed: &dyn Bed) {
 }
 
 pub fn a_hung_call_is_unknown_at_its_deadline_and_quarantined(bed: &dyn Bed) {
-    for hook in HOOKS {
+    for hook in CALLS {
         let made = bed.make(&[(hook, Trouble::Hang(None))]);
         made.all(up_to(hook).1);
         made.does(create("other"));
@@ -320,7 +330,7 @@ pub fn a_quarantined_component_can_be_disconnected(bed: &dyn Bed) {
 }
 
 pub fn a_call_that_returns_late_is_cleaned_up(bed: &dyn Bed) {
-    for hook in HOOKS {
+    for hook in CALLS {
         let made = bed.make(&[(hook, Trouble::Hang(Some(LIMIT + Duration::from_secs(2))))]);
         let heard = made.listen();
         let (before, steps) = up_to(hook);
@@ -337,6 +347,44 @@ pub fn a_call_that_returns_late_is_cleaned_up(bed: &dyn Bed) {
         let now = made.state_of("bad");
         assert!(now.is_none() || now == Some(before), "{hook}: gone or as before the call, but {now:?}");
     }
+}
+
+pub fn brief_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) {
+    let made = bed.make(&[("create", Trouble::Hang(Some(LIMIT + Duration::from_secs(2))))]);
+    let until = || made.clock.now() + Duration::from_secs(60);
+    let names = ["a", "b", "c"];
+    let mut steps: Vec<Step> = names.iter().map(|n| create(n)).collect();
+    while !steps.is_empty() {
+        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until());
+        assert!(!ended.is_empty() && ended.len() <= steps.len());
+        assert!(ended.iter().all(|e| e.outcome == Outcome::Done(None)), "{ended:?}");
+        steps.drain(..ended.len());
+    }
+    assert_eq!(made.see().components.keys().copied().collect::<Vec<_>>(), names.map(name));
+    // One that hangs ends the turn: what comes before it is done, what comes after it is not begun.
+    let mut steps = vec![destroy("a"), create_misbehaving("bad"), create("d"), destroy("b")];
+    while steps[0].component() != name("bad") {
+        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until());
+        let done = ended.iter().take_while(|e| e.outcome == Outcome::Done(None)).count();
+        assert!(done > 0, "{ended:?}");
+        steps.drain(..done);
+        if let Some(last) = ended.get(done) {
+            assert_eq!(last.outcome, Outcome::Unknown(Cause::Timeout));
+            assert_eq!(ended.len(), done + 1);
+            break;
+        }
+    }
+    if made.platform.quarantined().is_empty() {
+        let ended = made.platform.execute_brief(steps, LIMIT, made.deadline());
+        assert_eq!(ended[0].outcome, Outcome::Unknown(Cause::Timeout));
+    }
+    assert_eq!(made.platform.quarantined(), [name("bad")]);
+    assert_eq!(made.see().components.keys().copied().collect::<Vec<_>>(), [name("b"), name("c")]);
+    made.wait(Duration::from_secs(5));
+    assert!(made.platform.quarantined().is_empty());
+    assert_eq!(made.see().components.keys().copied().collect::<Vec<_>>(), [name("b"), name("c")], "nothing else began");
+    let wrong = made.platform.execute_brief(vec![create("b"), create("e")], LIMIT, until());
+    assert!(matches!(wrong[..], [Ended { outcome: Outcome::NotDone(Cause::Refused(_)), .. }]), "{wrong:?}");
 }
 
 pub fn unknown_is_settled_by_reading_back(bed: &dyn Bed) {

@@ -2,5 +2,6 @@
 
 mod beside;
 mod bringup;
+mod hangs;
 mod life;
 mod socket;

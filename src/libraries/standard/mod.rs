@@ -17,16 +17,16 @@ pub use pid::Pid;
 pub use sources::{Constant, Ramp, Sine};
 pub use threshold::Threshold;
 
-/// The library.
+/// The library. What only calculates is made and dropped at once; a logger has a file to close.
 pub fn library() -> Library {
     Library::new("standard")
-        .with::<Constant>("standard.Constant")
+        .with_immediate::<Constant>("standard.Constant")
         .with::<CsvLogger>("standard.CsvLogger")
-        .with::<Gain>("standard.Gain")
-        .with::<Pid>("standard.Pid")
-        .with::<Ramp>("standard.Ramp")
-        .with::<Saturation>("standard.Saturation")
-        .with::<Sine>("standard.Sine")
-        .with::<Sum>("standard.Sum")
-        .with::<Threshold>("standard.Threshold")
+        .with_immediate::<Gain>("standard.Gain")
+        .with_immediate::<Pid>("standard.Pid")
+        .with_immediate::<Ramp>("standard.Ramp")
+        .with_immediate::<Saturation>("standard.Saturation")
+        .with_immediate::<Sine>("standard.Sine")
+        .with_immediate::<Sum>("standard.Sum")
+        .with_immediate::<Threshold>("standard.Threshold")
 }

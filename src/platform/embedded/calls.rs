@@ -4,13 +4,12 @@
 use super::steps::closed;
 use super::workers::Job;
 use super::{Inner, Outcome};
-use crate::model::{Call as Step, ComponentName, RunState, Transition, Value};
+use crate::model::{Call as Step, RunState, Transition, Value};
 use crate::platform::{Cause, PlatformEvent};
 use crate::runtime::activity::{Request, Stage};
 use crate::runtime::cell::{Cell, Inside};
 use crate::runtime::component::{Call, Reply};
-use crate::runtime::library::Body;
-use crate::runtime::{Notice, guard};
+use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Time, lock};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -255,50 +254,15 @@ impl Inner {
         }
         let body = inside.take();
         inside.hand_over();
-        let _ = guard::call(|| drop(body));
-        {
+        let entry = {
             let mut registry = lock(&self.registry);
             registry.sever(cell.name);
-            if let Ok(slot) = registry.find(cell.name) {
-                drop(registry.remove(slot));
-            }
-            registry.quarantined.remove(&cell.name);
-        }
+            registry.find(cell.name).ok().map(|slot| registry.remove(slot))
+        };
+        // Its own code, outside the lock; until it is through, the name is not free.
+        let _ = guard::call(|| drop((body, entry)));
+        lock(&self.registry).quarantined.remove(&cell.name);
         self.tell(PlatformEvent::Returned { component: cell.name, at: self.clock.now() });
-    }
-
-    /// Drops a destroyed component on a worker: it may close devices.
-    pub(super) fn bury(&self, name: ComponentName, body: Box<dyn Body>, deadline: Time) -> Outcome {
-        let settled = Arc::new(Settled::default());
-        let (answer, answered) = self.clock.channel(1);
-        let (inner, by_worker, clock) = (self.own.clone(), settled.clone(), self.clock.clone());
-        let notices = self.notices.clone();
-        let job: Job = Box::new(move || {
-            if let Err(reason) = guard::call(|| drop(body)) {
-                // It is gone all the same.
-                notices.send(Notice::Faulted { component: name, reason, at: clock.now() });
-            }
-            if by_worker.first() {
-                let _ = answer.try_send(());
-            } else if let Some(inner) = inner.upgrade() {
-                lock(&inner.registry).quarantined.remove(&name);
-                inner.tell(PlatformEvent::Returned { component: name, at: clock.now() });
-            }
-        });
-        if self.workers.run(job).is_err() {
-            // The job, and the component in it, was dropped here and now.
-            return Outcome::Done(None);
-        }
-        if answered.recv_deadline(deadline).is_ok() {
-            return Outcome::Done(None);
-        }
-        let mut registry = lock(&self.registry);
-        if settled.first() {
-            registry.quarantined.insert(name);
-            Outcome::Unknown(Cause::Timeout)
-        } else {
-            Outcome::Done(None)
-        }
     }
 }
 

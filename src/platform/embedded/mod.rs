@@ -2,11 +2,14 @@
 //!
 //! * [`registry`]: what is there, behind one lock that no activity ever takes; [`crews`] its activities, [`wiring`] its
 //!   ports and properties.
-//! * [`steps`]: the steps that are immediate. [`calls`]: those that run a component's own code, on workers under a deadline.
-//! * [`watchers`]: the probes by which monitors look at components. [`prepared`]: fixed lists of immediate steps. [`order`]: the data-flow order. [`workers`]: the threads of `calls`.
+//! * [`steps`]: the steps that are immediate. [`turn`], [`calls`]: those that run a component's own code, on workers under
+//!   a deadline; [`workers`]: their threads.
+//! * [`watchers`]: the probes by which monitors look at components. [`prepared`]: fixed lists of immediate steps.
+//!   [`order`]: the data-flow order.
 //!
-//! What is immediate: everything but operations, and the state changes (and `destroy`) of types that declare a hook for
-//! them. A `stop` waits until an update under way has ended, at most until its deadline.
+//! What is immediate: everything but operations, the state changes of types that declare a hook for them, and `create` and
+//! `destroy` of types that do not promise to be made and dropped at once. These two are brief; but `destroy` of a type with
+//! hooks is blocking: it may close devices. A `stop` waits until an update under way has ended, at most until its deadline.
 //!
 //! A call of a component that has not returned by its deadline is *unknown*, the component in quarantine: it is not updated
 //! any more and every step on it is refused, but disconnecting its neighbours. When the call does return, the component is
@@ -18,11 +21,12 @@ mod order;
 mod prepared;
 mod registry;
 mod steps;
+mod turn;
 mod watchers;
 mod wiring;
 mod workers;
 
-use super::{EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
+use super::{Ended, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
 use crate::limits;
 use crate::model::{
     Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot,
@@ -34,6 +38,7 @@ use registry::Registry;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
+use std::time::Duration;
 use workers::Workers;
 
 /// The embedded platform. Dropping it ends its threads and drops its components, without calling their hooks: taking a
@@ -114,22 +119,37 @@ impl Platform for EmbeddedPlatform {
     }
 
     fn execution(&self, step: &Step) -> Execution {
-        let blocking = match step {
-            Step::Operation(_) => true,
+        match step {
+            Step::Operation(_) => Execution::Blocking,
             Step::State { component, transition } => {
                 let registry = lock(&self.inner.registry);
-                registry.find(*component).is_ok_and(|slot| {
+                let waits = registry.find(*component).is_ok_and(|slot| {
                     let cell = &registry.entry(slot).cell;
                     cell.kind.has_hook(*transition) || (*transition == Transition::Stop && cell.is_busy())
-                })
+                });
+                if waits { Execution::Blocking } else { Execution::Immediate }
             }
+            Step::Create { ty, .. } => match self.inner.kinds.get(ty) {
+                Some(kind) if !kind.is_immediate() => Execution::Brief,
+                _ => Execution::Immediate,
+            },
             Step::Destroy { component } => {
                 let registry = lock(&self.inner.registry);
-                registry.find(*component).is_ok_and(|slot| registry.entry(slot).cell.kind.has_hooks())
+                registry.find(*component).map_or(Execution::Immediate, |slot| {
+                    let kind = &registry.entry(slot).cell.kind;
+                    match (kind.has_hooks(), kind.is_immediate()) {
+                        (true, _) => Execution::Blocking,
+                        (false, false) => Execution::Brief,
+                        (false, true) => Execution::Immediate,
+                    }
+                })
             }
-            _ => false,
-        };
-        if blocking { Execution::Blocking } else { Execution::Immediate }
+            _ => Execution::Immediate,
+        }
+    }
+
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+        self.inner.in_turn(steps, each, until)
     }
 
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
@@ -179,8 +199,9 @@ impl Drop for EmbeddedPlatform {
         for thread in threads {
             let _ = thread.join(self.inner.clock.now() + limits::RUNTIME_END);
         }
+        // The components' own code, here too: who hangs in it is left behind with its worker.
+        let drop_them = Box::new(move || _ = guard::call(|| drop(entries)));
+        let _ = guard::call(|| self.inner.workers.run(drop_them));
         self.inner.workers.close();
-        // The components' own code, here too.
-        let _ = guard::call(|| drop(entries));
     }
 }

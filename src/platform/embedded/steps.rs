@@ -1,14 +1,10 @@
-//! Carrying out steps: the immediate ones here, the others by [`calls`](super::calls).
+//! Carrying out steps: the immediate ones here, the others by [`turn`](super::turn) and [`calls`](super::calls).
 
 use super::registry::Registry;
-use super::wiring::check_values;
 use super::{Inner, Outcome};
-use crate::model::{ComponentName, Ident, Policy, RunState, Step, Transition, TypeName, Value};
+use crate::model::{ComponentName, Policy, RunState, Step, Transition};
 use crate::platform::{Cause, PlatformEvent};
-use crate::runtime::activity::Activity;
-use crate::runtime::beat::Beat;
 use crate::runtime::cell::{Cell, Closed};
-use crate::runtime::guard;
 use crate::time::{Time, lock};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -40,10 +36,13 @@ impl Inner {
     pub(super) fn execute(&self, step: &Step, deadline: Time) -> Outcome {
         match step {
             Step::State { component, transition } => self.transition(*component, *transition, deadline),
-            Step::Create { component, ty, activity, properties } => {
-                outcome(self.create(*component, *ty, *activity, properties))
+            Step::Create { ty, .. } if self.kinds.get(ty).is_none_or(|kind| kind.is_immediate()) => self.at_once(step),
+            Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step),
+            Step::Create { .. } | Step::Destroy { .. } => {
+                let each = deadline.since(self.clock.now());
+                let mut ended = self.in_turn(vec![step.clone()], each, deadline);
+                ended.pop().map_or(Outcome::Unknown(Cause::Timeout), |ended| ended.outcome)
             }
-            Step::Destroy { component } => self.destroy(*component, deadline),
             Step::Connect { from, to, policy } => outcome(self.connect(*from, *to, *policy)),
             Step::Disconnect { from, to } => outcome(lock(&self.registry).disconnect(*from, *to)),
             Step::PropertySet { property, value } => {
@@ -66,82 +65,6 @@ impl Inner {
 
     fn connect(&self, from: crate::model::MemberRef, to: crate::model::MemberRef, policy: Policy) -> Result<(), Cause> {
         lock(&self.registry).connect(from, to, policy)
-    }
-
-    fn create(&self, name: ComponentName, ty: TypeName, asked: Option<Ident>, values: &[Value]) -> Result<(), Cause> {
-        let kind = self.kinds.get(&ty).ok_or_else(|| Cause::Refused(format!("no library here makes a `{ty}`")))?;
-        let crew = asked.unwrap_or(self.default_activity);
-        let spec =
-            *self.activities.get(&crew).ok_or_else(|| Cause::Refused(format!("there is no activity `{crew}`")))?;
-        check_values(&kind.ty, values)?;
-        let wake = {
-            let mut registry = lock(&self.registry);
-            registry.is_free(name)?;
-            let make = || {
-                let inner = self.own.clone();
-                let late = move |cell: &Arc<Cell>| {
-                    if let Some(inner) = inner.upgrade() {
-                        inner.come_back(cell.clone());
-                    }
-                };
-                Activity::new(crew, spec, &self.clock, Box::new(late))
-            };
-            let crew = registry.crew(crew, make, &self.clock);
-            crew.expected += 1;
-            let activity = &crew.activity;
-            activity.is_event_driven().then(|| activity.signal.clone())
-        };
-        // The component's own code, outside the lock: whatever it does delays nobody.
-        let beat = Arc::new(Beat::new(name, wake, self.notices.clone()));
-        beat.set_now(self.clock.now());
-        let made = guard::call(|| kind.make(&beat, values.to_vec()));
-        let mut registry = lock(&self.registry);
-        let result = match made {
-            Err(panic) => Err(Cause::Panicked(panic)),
-            Ok(Err(text)) => Err(Cause::Refused(text)),
-            Ok(Ok(made)) => registry.is_free(name).map(|()| made),
-        };
-        let result = result.map(|made| {
-            let cell = Arc::new(Cell::new(kind.clone(), beat, made.body));
-            registry.insert(cell, made.ends, made.values, asked, crew);
-        });
-        registry.arrived(crew);
-        result
-    }
-
-    fn destroy(&self, name: ComponentName, deadline: Time) -> Outcome {
-        let mut registry = lock(&self.registry);
-        let body = registry.find(name).and_then(|slot| {
-            let cell = registry.entry(slot).cell.clone();
-            if cell.is_quarantined() {
-                return Err(Cause::Quarantined);
-            }
-            registry.is_unconnected(slot)?;
-            let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
-            let mut inside = cell.enter_idle(may).map_err(|why| closed(why, name, "destroy"))?;
-            let body = inside.take();
-            // Nobody enters it again, whoever still knows it.
-            inside.hand_over();
-            drop(registry.remove(slot));
-            Ok((cell.kind.has_hooks(), body))
-        });
-        drop(registry);
-        match body {
-            Err(cause) => Outcome::NotDone(cause),
-            Ok((true, Some(body))) => self.bury(name, body, deadline),
-            Ok((_, body)) => match guard::call(|| drop(body)) {
-                Ok(()) => Outcome::Done(None),
-                Err(panic) => {
-                    // It is gone all the same.
-                    self.notices.send(crate::runtime::Notice::Faulted {
-                        component: name,
-                        reason: panic,
-                        at: self.clock.now(),
-                    });
-                    Outcome::Done(None)
-                }
-            },
-        }
     }
 
     fn transition(&self, name: ComponentName, transition: Transition, deadline: Time) -> Outcome {

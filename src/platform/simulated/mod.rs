@@ -199,6 +199,11 @@ impl Simulated {
         Self { shared: Arc::new(Shared { clock, catalogue, state: Mutex::new(state) }) }
     }
 
+    /// The clock it runs on.
+    pub fn clock(&self) -> &Clock {
+        &self.shared.clock
+    }
+
     /// From now on these faults, and no others; steps are counted from 1 again.
     pub fn set_faults(&self, faults: Faults) {
         let mut state = self.shared.lock();

@@ -1,0 +1,278 @@
+//! Brief steps: components are made, and dropped, by their own code. It hardly takes time, but it is theirs and may hang:
+//! a worker runs it, many steps in one go, so that the thread's round trip is paid once for all of them.
+//!
+//! A [`Turn`] says how far the worker is. Whoever waits gives a step up when its time is over: its component is then in
+//! quarantine, what the worker brings back too late is dropped, and nothing more is begun.
+
+use super::wiring::check_values;
+use super::workers::Job;
+use super::{Inner, Outcome};
+use crate::limits;
+use crate::model::{ComponentName, Ident, RunState, Step, TypeName, Value};
+use crate::platform::{Cause, Ended, PlatformEvent};
+use crate::runtime::activity::Activity;
+use crate::runtime::beat::Beat;
+use crate::runtime::cell::Cell;
+use crate::runtime::{Notice, guard};
+use crate::time::{RecvError, Time, lock};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// Steps that a worker carries out one after the other.
+struct Turn {
+    steps: Vec<Step>,
+    /// `2 i`: step `i` is under way; `2 i + 1`: it has come to its end, the next has not begun; [`OVER`]: nobody waits.
+    at: AtomicUsize,
+    /// When the step under way began.
+    began: AtomicU64,
+    ended: Mutex<Vec<Ended>>,
+}
+
+/// Nothing more is begun, and what is under way comes back too late.
+const OVER: usize = usize::MAX;
+
+impl Turn {
+    fn move_on(&self, from: usize, to: usize) -> bool {
+        self.at.compare_exchange(from, to, Ordering::AcqRel, Ordering::Acquire).is_ok()
+    }
+
+    /// Step `i` begins; false: nobody waits any more.
+    fn begin(&self, i: usize, now: Time) -> bool {
+        self.began.store(now.0, Ordering::Release);
+        i == 0 || self.move_on(2 * i - 1, 2 * i)
+    }
+
+    /// Step `i` has come to its end in time. Said before its effect can be seen, so that nobody gives up what is there.
+    fn in_time(&self, i: usize) -> bool {
+        self.move_on(2 * i, 2 * i + 1)
+    }
+}
+
+/// How one of them ended.
+enum Brief {
+    Ended(Outcome),
+    /// After it had been given up; it has been cleaned up.
+    Late,
+}
+
+impl Inner {
+    /// Carries out steps that make or destroy components, one after the other, each within `each` and before `until`: as
+    /// many as are done at once. No further one is begun after one that is not done, nor a while after the first.
+    pub(super) fn in_turn(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+        let first = self.clock.now();
+        let turn =
+            Arc::new(Turn { steps, at: AtomicUsize::new(0), began: AtomicU64::new(first.0), ended: Mutex::default() });
+        let (answer, answered) = self.clock.channel(1);
+        let job: Job = {
+            let (inner, turn) = (self.own.clone(), turn.clone());
+            Box::new(move || {
+                if let Some(inner) = inner.upgrade() {
+                    inner.take_turn(&turn, first);
+                }
+                let _ = answer.try_send(());
+            })
+        };
+        if let Err(text) = self.workers.run(job) {
+            return vec![Ended { outcome: Outcome::NotDone(Cause::Refused(text)), took: None }];
+        }
+        let mut deadline = (first + each).min(until);
+        loop {
+            match answered.recv_deadline(deadline) {
+                Ok(()) | Err(RecvError::Closed) => {
+                    let mut ended = std::mem::take(&mut *lock(&turn.ended));
+                    if ended.is_empty() {
+                        let refused = Cause::Refused("the platform is being taken down".to_owned());
+                        ended.push(Ended { outcome: Outcome::NotDone(refused), took: None });
+                    }
+                    return ended;
+                }
+                Err(RecvError::Timeout) => {}
+            }
+            let at = turn.at.load(Ordering::Acquire);
+            let due = (Time(turn.began.load(Ordering::Acquire)) + each).min(until);
+            if self.clock.now() < due {
+                deadline = due;
+            } else if at.is_multiple_of(2) {
+                if self.leave_behind(&turn, at) {
+                    let mut ended = std::mem::take(&mut *lock(&turn.ended));
+                    ended.push(Ended { outcome: Outcome::Unknown(Cause::Timeout), took: None });
+                    return ended;
+                }
+            } else if turn.move_on(at, OVER) {
+                // Between two steps there is nobody's code but ours: the worker sees it and answers.
+                deadline = Time::NEVER;
+            }
+        }
+    }
+
+    /// Puts the component of the step under way in quarantine, if that is still under way. Whether it was.
+    fn leave_behind(&self, turn: &Turn, at: usize) -> bool {
+        let mut registry = lock(&self.registry);
+        if !turn.move_on(at, OVER) {
+            return false;
+        }
+        let step = &turn.steps[at / 2];
+        registry.quarantined.insert(step.component());
+        if let Step::Create { activity, .. } = step {
+            registry.arrived(activity.unwrap_or(self.default_activity));
+        }
+        true
+    }
+
+    /// The worker's side.
+    fn take_turn(&self, turn: &Turn, first: Time) {
+        for (i, step) in turn.steps.iter().enumerate() {
+            let now = self.clock.now();
+            if i > 0 && now.since(first) >= limits::BRIEF_TURN || !turn.begin(i, now) {
+                return;
+            }
+            let Brief::Ended(outcome) = self.brief(step, &|| turn.in_time(i)) else { return };
+            let done = matches!(outcome, Outcome::Done(_));
+            lock(&turn.ended).push(Ended { outcome, took: Some(self.clock.now().since(now)) });
+            if !done {
+                return;
+            }
+        }
+    }
+
+    /// Carries out a step of a type that promises to be made and dropped at once, in the caller's thread.
+    pub(super) fn at_once(&self, step: &Step) -> Outcome {
+        match self.brief(step, &|| true) {
+            Brief::Ended(outcome) => outcome,
+            Brief::Late => Outcome::Unknown(Cause::Timeout),
+        }
+    }
+
+    pub(super) fn is_dropped_at_once(&self, name: ComponentName) -> bool {
+        let registry = lock(&self.registry);
+        registry.find(name).is_ok_and(|slot| {
+            let kind = &registry.entry(slot).cell.kind;
+            kind.is_immediate() && !kind.has_hooks()
+        })
+    }
+
+    /// `in_time`: whether somebody still waits; asked once, before the effect can be seen.
+    fn brief(&self, step: &Step, in_time: &dyn Fn() -> bool) -> Brief {
+        match step {
+            Step::Create { component, ty, activity, properties } => {
+                self.create(*component, *ty, *activity, properties, in_time)
+            }
+            Step::Destroy { component } => self.destroy(*component, in_time),
+            other => {
+                in_time();
+                Brief::Ended(Outcome::NotDone(Cause::Refused(format!("`{other}` is not brief"))))
+            }
+        }
+    }
+
+    fn create(
+        &self,
+        name: ComponentName,
+        ty: TypeName,
+        asked: Option<Ident>,
+        values: &[Value],
+        in_time: &dyn Fn() -> bool,
+    ) -> Brief {
+        let not_done = |cause| {
+            in_time();
+            Brief::Ended(Outcome::NotDone(cause))
+        };
+        let Some(kind) = self.kinds.get(&ty) else {
+            return not_done(Cause::Refused(format!("no library here makes a `{ty}`")));
+        };
+        let crew = asked.unwrap_or(self.default_activity);
+        let Some(spec) = self.activities.get(&crew).copied() else {
+            return not_done(Cause::Refused(format!("there is no activity `{crew}`")));
+        };
+        if let Err(cause) = check_values(&kind.ty, values) {
+            return not_done(cause);
+        }
+        let wake = {
+            let mut registry = lock(&self.registry);
+            if let Err(cause) = registry.is_free(name) {
+                return not_done(cause);
+            }
+            let make = || {
+                let inner = self.own.clone();
+                let late = move |cell: &Arc<Cell>| {
+                    if let Some(inner) = inner.upgrade() {
+                        inner.come_back(cell.clone());
+                    }
+                };
+                Activity::new(crew, spec, &self.clock, Box::new(late))
+            };
+            let crew = registry.crew(crew, make, &self.clock);
+            crew.expected += 1;
+            let activity = &crew.activity;
+            activity.is_event_driven().then(|| activity.signal.clone())
+        };
+        // The component's own code, outside the lock: whatever it does delays nobody.
+        let beat = Arc::new(Beat::new(name, wake, self.notices.clone()));
+        beat.set_now(self.clock.now());
+        let made = guard::call(|| kind.make(&beat, values.to_vec()));
+        let mut registry = lock(&self.registry);
+        if !in_time() {
+            drop(registry);
+            let _ = guard::call(|| drop(made));
+            self.back_again(name);
+            return Brief::Late;
+        }
+        let result = match made {
+            Err(panic) => Err(Cause::Panicked(panic)),
+            Ok(Err(text)) => Err(Cause::Refused(text)),
+            Ok(Ok(made)) => match registry.is_free(name) {
+                Err(cause) => Err(cause),
+                Ok(()) => {
+                    let cell = Arc::new(Cell::new(kind.clone(), beat, made.body));
+                    registry.insert(cell, made.ends, made.values, asked, crew);
+                    Ok(())
+                }
+            },
+        };
+        registry.arrived(crew);
+        Brief::Ended(super::steps::outcome(result))
+    }
+
+    fn destroy(&self, name: ComponentName, in_time: &dyn Fn() -> bool) -> Brief {
+        let mut registry = lock(&self.registry);
+        let taken = registry.find(name).and_then(|slot| {
+            let cell = registry.entry(slot).cell.clone();
+            if cell.is_quarantined() {
+                return Err(Cause::Quarantined);
+            }
+            registry.is_unconnected(slot)?;
+            let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
+            let mut inside = cell.enter_idle(may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
+            let body = inside.take();
+            // Nobody enters it again, whoever still knows it.
+            inside.hand_over();
+            Ok((body, registry.remove(slot)))
+        });
+        drop(registry);
+        let taken = match taken {
+            Ok(taken) => taken,
+            Err(cause) => {
+                in_time();
+                return Brief::Ended(Outcome::NotDone(cause));
+            }
+        };
+        // The component's own code, here too: it may close devices.
+        let dropped = guard::call(|| drop(taken));
+        if let Err(reason) = dropped {
+            // It is gone all the same.
+            self.notices.send(Notice::Faulted { component: name, reason, at: self.clock.now() });
+        }
+        if in_time() {
+            return Brief::Ended(Outcome::Done(None));
+        }
+        self.back_again(name);
+        Brief::Late
+    }
+
+    /// What was given up has come back, and nothing is left of it.
+    fn back_again(&self, name: ComponentName) {
+        lock(&self.registry).quarantined.remove(&name);
+        self.tell(PlatformEvent::Returned { component: name, at: self.clock.now() });
+    }
+}

@@ -1,0 +1,160 @@
+//! Brief steps: several in one call of the platform, in any manner a platform may carry them out.
+
+use crate::rig::*;
+use davit::model::*;
+use davit::platform::simulated::{Options, Simulated};
+use davit::platform::{Ended, EventSink, Execution, ObserveError, Outcome, Platform};
+use davit::time::Time;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Manner {
+    /// As many as it is given.
+    All,
+    /// The first of them.
+    One,
+    /// As many as it is given, each in so many milliseconds.
+    Slow(u64),
+    /// Says nothing at all, once.
+    Silent,
+    /// Panics once, after the first of them.
+    Panics,
+    /// Does not come back for half a minute, once, after the first of them.
+    Lost,
+}
+
+/// Creating and destroying are brief here; the calls that carry them out are counted.
+struct Hasty {
+    inner: Simulated,
+    manner: Manner,
+    calls: Arc<AtomicUsize>,
+}
+
+impl Hasty {
+    fn each(&self, steps: &[Step], each: Duration, until: Time) -> Vec<Ended> {
+        let mut ended = Vec::new();
+        for step in steps {
+            let deadline = (self.inner.clock().now() + each).min(until);
+            ended.push(Ended { outcome: Platform::execute(&self.inner, step, deadline), took: Some(each / 1000) });
+            if !matches!(ended.last(), Some(Ended { outcome: Outcome::Done(_), .. })) {
+                break;
+            }
+        }
+        ended
+    }
+}
+
+impl Platform for Hasty {
+    fn catalogue(&self) -> &Catalogue {
+        self.inner.catalogue()
+    }
+    fn execution(&self, step: &Step) -> Execution {
+        match step {
+            Step::Create { .. } | Step::Destroy { .. } => Execution::Brief,
+            _ => self.inner.execution(step),
+        }
+    }
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        Platform::execute(&self.inner, step, deadline)
+    }
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+        let first = self.calls.fetch_add(1, Ordering::SeqCst) == 0;
+        match self.manner {
+            Manner::One => self.each(&steps[..1], each, until),
+            Manner::Slow(ms) => {
+                let clock = self.inner.clock();
+                steps
+                    .iter()
+                    .flat_map(|step| {
+                        clock.sleep(Duration::from_millis(ms));
+                        self.each(std::slice::from_ref(step), each, until)
+                    })
+                    .collect()
+            }
+            Manner::Silent if first => Vec::new(),
+            Manner::Panics if first => {
+                self.each(&steps[..1], each, until);
+                panic!("a defect of the platform")
+            }
+            Manner::Lost if first => {
+                let ended = self.each(&steps[..1], each, until);
+                self.inner.clock().sleep(Duration::from_secs(30));
+                ended
+            }
+            _ => self.each(&steps, each, until),
+        }
+    }
+    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
+        self.inner.observe(deadline)
+    }
+    fn observe_component(
+        &self,
+        component: ComponentName,
+        deadline: Time,
+    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
+        self.inner.observe_component(component, deadline)
+    }
+    fn subscribe(&self, sink: EventSink) {
+        self.inner.subscribe(sink);
+    }
+    fn quarantined(&self) -> Vec<ComponentName> {
+        self.inner.quarantined()
+    }
+}
+
+fn rig(manner: Manner, blocking: bool) -> (Rig, Arc<AtomicUsize>) {
+    let calls = Arc::new(AtomicUsize::new(0));
+    let counted = calls.clone();
+    let options = Options { blocking, ..Options::default() };
+    (Rig::with(scenario(), options, move |inner| Arc::new(Hasty { inner, manner, calls: counted })), calls)
+}
+
+#[test]
+fn every_manner_leads_to_the_same() {
+    for blocking in [false, true] {
+        for manner in [Manner::All, Manner::One, Manner::Slow(20)] {
+            let (rig, calls) = rig(manner, blocking);
+            for word in ["make", "wire", "run", "replace"] {
+                assert_eq!(rig.ask(word), [format!("{word}.ok")], "{manner:?}");
+                rig.in_step();
+            }
+            // One that is alone is no list. `replace` destroys B and creates it again: never together, since one needs
+            // the other.
+            let lists = if manner == Manner::One { 2 } else { 1 };
+            assert_eq!(calls.load(Ordering::SeqCst), lists, "{manner:?}, blocking: {blocking}");
+            for _ in 0..4 {
+                assert_eq!(rig.ask("undo"), ["undo.done"], "{manner:?}");
+                rig.in_step();
+            }
+            assert!(rig.see().is_empty());
+            rig.each_answered_once();
+        }
+    }
+}
+
+#[test]
+fn a_platform_that_breaks_its_word_is_read_back() {
+    for manner in [Manner::Silent, Manner::Panics, Manner::Lost] {
+        let (rig, _) = rig(manner, false);
+        assert_eq!(rig.ask("make"), ["make.failed"], "{manner:?}");
+        assert!(rig.see().is_empty(), "{manner:?}: what it had done unseen was taken back");
+        assert_eq!(rig.ask("make"), ["make.ok"], "{manner:?}");
+        rig.in_step();
+        rig.each_answered_once();
+    }
+}
+
+#[test]
+fn a_safe_configuration_comes_before_the_rest_of_many() {
+    let (rig, _) = rig(Manner::Slow(100), false);
+    rig.submit("make");
+    rig.wait(0.15);
+    rig.submit("quiet");
+    rig.wait(0.01);
+    assert_eq!(rig.events(), ["quiet.ok"], "it does not wait for the end of `make`");
+    rig.wait(10.0);
+    rig.in_step();
+    rig.each_answered_once();
+}
