@@ -5,7 +5,7 @@ use davit::functions::Opener;
 use davit::lang::{LoadOptions, Sources, load_coordinator};
 use davit::model::EventName;
 use davit::statechart::{Hook, Machine, compile};
-use davit::time::Time;
+use davit::time::{Clock, Time};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -47,7 +47,7 @@ fn main() {
     let written = loaded.coordinator.unwrap_or_else(|| panic!("{:?}", loaded.findings));
     let chart = compile(&written).0.expect("it compiles");
     let opener = Opener::new(loaded.program.expect("functions"), Arc::new(written));
-    let mut functions = opener.open(None).expect("it opens");
+    let mut functions = opener.open(Some(Clock::real())).expect("it opens");
     let mut machine = Machine::new(&chart);
     machine.run(&chart, Time::default(), &mut functions);
     let event = functions.event(&chart, EventName::new("e").expect("a name"));

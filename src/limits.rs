@@ -171,6 +171,14 @@ pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;
 /// guard): some ten milliseconds, a thousand times more than a reaction should take.
 pub const CALL_INSTRUCTIONS: u64 = 1_000_000;
 
+/// Instructions between two looks at a call's budget.
+pub const CALL_LOOK: u32 = 1_000;
+
+/// Processor time of its thread after which a call on the real clock has its instructions counted (at the latest after
+/// twice this). Longer than a good function takes, whose calls then cost nothing but themselves; shorter than anybody
+/// waits for a reaction.
+pub const CALL_TICK: Duration = Duration::from_millis(10);
+
 /// Bytes that the Lua state of one coordinator with functions may hold.
 pub const FUNCTIONS_BYTES: usize = 64 * 1024 * 1024;
 

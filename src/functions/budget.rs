@@ -1,21 +1,27 @@
 //! What one call may take, and what its errors are called.
 
+#[cfg(target_os = "linux")]
+use super::watch::Watch;
 use crate::limits;
-use mlua::{HookTriggers, Lua, Result, VmState};
+use mlua::{HookTriggers, Lua, Result, Thread, VmState};
 use std::cell::Cell;
+#[cfg(target_os = "linux")]
+use std::cell::OnceCell;
 use std::rc::Rc;
-
-/// Instructions between two looks.
-const TICK: u32 = 1_000;
 
 /// Counts the instructions of the call under way. Once they are used up every look fails, and what protects calls in Lua
 /// passes that on, so that the call ends wherever it is.
-#[derive(Debug, Default)]
+///
+/// Counting costs more than most calls. It is exact, from the first instruction on, until [`Budget::count_late`].
+#[derive(Default)]
 pub struct Budget {
     used: Cell<u64>,
     limit: Cell<u64>,
     depth: Cell<u32>,
     over: Cell<bool>,
+    /// Finds the calls that take long; none: all are counted.
+    #[cfg(target_os = "linux")]
+    watch: OnceCell<Watch>,
 }
 
 impl Budget {
@@ -24,20 +30,46 @@ impl Budget {
         lua.set_memory_limit(limits::FUNCTIONS_BYTES)?;
         let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), ..Self::default() });
         let counted = budget.clone();
-        lua.set_global_hook(HookTriggers::new().every_nth_instruction(TICK), move |_, _| {
-            counted.used.set(counted.used.get() + u64::from(TICK));
-            if counted.used.get() > counted.limit.get() {
-                counted.over.set(true);
-                return Err(counted.error());
-            }
-            Ok(VmState::Continue)
-        })?;
+        let triggers = HookTriggers::new().every_nth_instruction(limits::CALL_LOOK);
+        lua.set_global_hook(
+            triggers,
+            move |_, _| {
+                if counted.look() { Err(counted.error()) } else { Ok(VmState::Continue) }
+            },
+        )?;
         Ok(budget)
+    }
+
+    /// From now on counts the instructions of a call only when it has taken longer than [`limits::CALL_TICK`] on this
+    /// thread. Where the operating system gives no timer for that, every call is counted as before.
+    pub fn count_late(self: &Rc<Self>, lua: &Lua) {
+        #[cfg(target_os = "linux")]
+        {
+            let budget = Rc::downgrade(self);
+            let look = move || budget.upgrade().is_some_and(|budget| budget.look());
+            if let Some(watch) = Watch::start(lua, look)
+                && self.watch.set(watch).is_ok()
+            {
+                lua.remove_global_hook();
+            }
+        }
+        #[cfg(not(target_os = "linux"))]
+        let _ = lua;
     }
 
     /// Whether the budget of the call under way is used up.
     pub fn is_over(&self) -> bool {
         self.over.get()
+    }
+
+    /// So many instructions more; whether they are too many.
+    fn look(&self) -> bool {
+        self.used.set(self.used.get() + u64::from(limits::CALL_LOOK));
+        let over = self.used.get() > self.limit.get();
+        if over {
+            self.over.set(true);
+        }
+        over
     }
 
     fn error(&self) -> mlua::Error {
@@ -47,18 +79,50 @@ impl Budget {
 
     /// Makes a call of at most `limit` instructions. A call inside another shares the outer one's budget.
     pub fn spend<R>(&self, limit: u64, call: impl FnOnce() -> Result<R>) -> Result<R> {
-        let outermost = self.depth.get() == 0;
-        if outermost {
-            self.used.set(0);
-            self.limit.set(limit);
+        struct Leave<'a>(&'a Cell<u32>);
+        impl Drop for Leave<'_> {
+            fn drop(&mut self) {
+                self.0.set(self.0.get() - 1);
+            }
         }
+        let outermost = self.depth.get() == 0;
         self.depth.set(self.depth.get() + 1);
-        let outcome = call();
-        self.depth.set(self.depth.get() - 1);
-        if outermost && self.over.replace(false) {
+        let leave = Leave(&self.depth);
+        if !outermost {
+            return call();
+        }
+        self.used.set(0);
+        self.limit.set(limit);
+        let outcome = self.watched(call);
+        drop(leave);
+        if self.over.replace(false) {
             return Err(self.error());
         }
         outcome
+    }
+
+    #[cfg(target_os = "linux")]
+    fn watched<R>(&self, call: impl FnOnce() -> R) -> R {
+        match self.watch.get() {
+            Some(watch) => watch.during(call),
+            None => call(),
+        }
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn watched<R>(&self, call: impl FnOnce() -> R) -> R {
+        call()
+    }
+}
+
+/// Resumes a coroutine within a call.
+pub fn resuming<R>(thread: &Thread, resume: impl FnOnce() -> R) -> R {
+    #[cfg(target_os = "linux")]
+    return super::watch::resuming(thread, resume);
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = thread;
+        resume()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The hook: how the engine calls a machine's functions, with what rFSM gives them.
 
 use super::bound::Bound;
+use super::budget::resuming;
 use super::host::Host;
 use crate::limits;
 use crate::model::EventName;
@@ -71,8 +72,10 @@ impl Calls {
                 }
             }
         };
-        let value: Value =
-            bound.calling(view, || thread.resume((&bound.fsm, &bound.nodes[state.index()], &bound.words.doo)))?;
+        let value: Value = bound.calling(view, || {
+            let arguments = (&bound.fsm, &bound.nodes[state.index()], &bound.words.doo);
+            resuming(&thread, || thread.resume(arguments))
+        })?;
         Ok(if thread.status() == ThreadStatus::Resumable {
             Doo::Yielded { idle: !matches!(value, Value::Nil | Value::Boolean(false)) }
         } else {

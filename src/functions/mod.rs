@@ -16,6 +16,8 @@ mod lower;
 mod native;
 mod open;
 mod values;
+#[cfg(target_os = "linux")]
+mod watch;
 
 pub use budget::message_of;
 pub use lower::{Problem, Spot};

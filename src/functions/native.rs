@@ -18,6 +18,12 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     let budget = host.budget.clone();
     native.raw_set("over", lua.create_function(move |_, ()| Ok(budget.is_over()))?)?;
     native.raw_set("failure", lua.create_function(|_, ()| Ok("ended: its instructions are used up"))?)?;
+    #[cfg(target_os = "linux")]
+    {
+        let (resume, close) = super::watch::functions(lua)?;
+        native.raw_set("resume", resume)?;
+        native.raw_set("close", close)?;
+    }
     let voice = host.voice.clone();
     native.raw_set(
         "printer",

@@ -126,6 +126,9 @@ impl Opener {
 
     /// Runs the program on this thread and answers its functions. They cannot leave the thread.
     ///
+    /// On a real clock a call's instructions are counted only once it has taken [`limits::CALL_TICK`]; on a simulated one,
+    /// and without a clock, from the first on.
+    ///
     /// # Errors
     /// [`NotOpened`]: it fails, or makes another chart than the one that was checked.
     pub fn open(&self, clock: Option<Clock>) -> Result<Functions, NotOpened> {
@@ -137,6 +140,7 @@ impl Opener {
             None => Err(format!("`{name}` was not loaded before")),
         });
         let (lua, host) = state(program.open, reader).map_err(failed)?;
+        let simulated = clock.as_ref().is_none_or(Clock::is_simulated);
         *host.clock.borrow_mut() = clock;
         let template = template(&lua, &host, program)?;
         let init: Function = host.rfsm(&lua).and_then(|rfsm| rfsm.raw_get("init")).map_err(failed)?;
@@ -158,6 +162,10 @@ impl Opener {
         host.voice.drain(&mut said);
         said.into_iter().filter(|line| line.by == Printer::Err).for_each(|line| host.voice.say(line.by, &line.text));
         bound.driven.set(true);
+        // In simulated time every run is to be like every other, so what decides is what was counted.
+        if !simulated {
+            host.budget.count_late(&lua);
+        }
         bound.machine.borrow_mut().take();
         Ok(Calls { lua, bound, _host: Some(host) })
     }

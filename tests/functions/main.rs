@@ -5,6 +5,7 @@ mod deployed;
 mod faults;
 mod guide;
 mod lab;
+mod late;
 mod loading;
 mod purity;
 mod rfsm;

@@ -4,6 +4,7 @@ use davit::functions::{Functions, Opener};
 use davit::lang::{LoadOptions, LoadedCoordinator, Sources, load_coordinator};
 use davit::model::Finding;
 use davit::statechart::{Chart, Observation, Sim, compile};
+use davit::time::Clock;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -48,8 +49,13 @@ impl Model {
     }
 
     pub fn sim(&self) -> Sim<'_, Functions> {
+        self.sim_on(None)
+    }
+
+    /// With functions that run by that clock.
+    pub fn sim_on(&self, clock: Option<Clock>) -> Sim<'_, Functions> {
         let opener = self.opener.as_ref().expect("a model with functions");
-        Sim::with(&self.chart, opener.open(None).expect("it opens as it was read"))
+        Sim::with(&self.chart, opener.open(clock).expect("it opens as it was read"))
     }
 
     pub fn is_pure(&self) -> bool {

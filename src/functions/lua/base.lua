@@ -4,7 +4,8 @@ local native, rfsm, plugins = ...
 -- ---- what is protected ---------------------------------------------------------------------------------------------
 
 local over, failure = native.over, native.failure
-local raw_pcall, raw_xpcall, raw_resume = pcall, xpcall, coroutine.resume
+local raw_pcall, raw_xpcall, raw_resume, raw_close = pcall, xpcall, coroutine.resume, coroutine.close
+local create, status = coroutine.create, coroutine.status
 
 -- A call whose budget is used up cannot be held by anything in it.
 local function passed(ok, ...)
@@ -13,8 +14,43 @@ local function passed(ok, ...)
 end
 
 function pcall(...) return passed(raw_pcall(...)) end
-function xpcall(...) return passed(raw_xpcall(...)) end
-function coroutine.resume(...) return passed(raw_resume(...)) end
+
+-- A handler runs where the error was raised: inside the look that ended the call, and there nothing ends it.
+function xpcall(f, handler, ...)
+  if type(handler) ~= "function" then error("bad argument #2 to 'xpcall' (function expected)", 2) end
+  local function handle(why)
+    if over() then return why end
+    return handler(why)
+  end
+  return passed(raw_xpcall(f, handle, ...))
+end
+
+-- What runs in another coroutine must be known to those who count (`watch.rs`).
+local resume, close = native.resume or raw_resume, native.close or raw_close
+function coroutine.resume(...) return passed(resume(...)) end
+
+function coroutine.close(thread)
+  local how = status(thread)
+  if how ~= "suspended" and how ~= "dead" then error("cannot close a " .. how .. " coroutine", 2) end
+  if over() then error(failure(), 0) end
+  return passed(close(thread))
+end
+
+local function unwrapped(thread, ok, ...)
+  if ok then return ... end
+  local why = ...
+  if over() then error(failure(), 0) end
+  if status(thread) == "dead" then
+    local _, later = close(thread)
+    if later ~= nil then why = later end
+  end
+  error(why, 2)
+end
+
+function coroutine.wrap(f)
+  local thread = create(f)
+  return function(...) return unwrapped(thread, resume(thread, ...)) end
+end
 
 -- Finalisers run where no budget reaches.
 local raw_setmetatable = setmetatable
