@@ -1,13 +1,13 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
 use crate::model::codes::{
-    COORD_ANSWER_NEVER_COMES, COORD_FAILURE_UNHANDLED, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER,
-    COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
+    COORD_ANSWER_NEVER_COMES, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST,
+    DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Verdict};
-use crate::statechart::{Chart, EdgeId, NodeId, RaiseSite, When};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::statechart::{Chart, EdgeId, NodeId, When};
+use std::collections::BTreeSet;
 
 /// What a raised name asks for; none when it is no request.
 pub fn ask_of(deployment: &Deployment, name: EventName) -> Option<Ask> {
@@ -35,7 +35,7 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     states(deployment, chart, &mut findings);
     raised(deployment, chart, &mut findings);
     heard(deployment, chart, &mut findings);
-    unhandled(deployment, chart, &mut findings);
+    findings.extend(super::unheard::check(deployment, chart));
     findings.extend(super::purity::check(deployment));
     findings
 }
@@ -257,55 +257,6 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
 /// Every transition of the chart.
 pub fn edges(chart: &Chart) -> impl Iterator<Item = EdgeId> + '_ {
     chart.nodes().flat_map(|node| chart.outgoing(node))
-}
-
-/// Requests whose failure no transition waits for that could be there to hear it.
-fn unhandled(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
-    let mut missing: BTreeMap<EventName, (&RaiseSite, BTreeSet<EventName>)> = BTreeMap::new();
-    for site in chart.raises() {
-        let Some(ask) = ask_of(deployment, site.name) else { continue };
-        // Undoing what a state brought with it: nobody waits for that, and the stack keeps the frame.
-        if site.scoped && matches!(site.when, When::Exit(_)) {
-            continue;
-        }
-        // A configuration that must be confirmed is undone behind the coordinator's back if it is not. `cancelled` needs
-        // nobody: it comes only when the request was taken back, by whoever made it or by an operator.
-        let reverted = match ask {
-            Ask::Apply(id) => deployment.configuration(id).is_some_and(|c| c.confirm.is_some()),
-            _ => false,
-        };
-        for answer in bad_answers(ask).into_iter().chain(reverted.then(|| Verdict::Reverted.event(ask))) {
-            let heard = edges(chart).any(|edge| {
-                let hears =
-                    chart.triggers(edge).is_none_or(|t| t.iter().any(|e| chart.event_text(*e) == answer.as_str()));
-                let source = chart.ends(edge).0;
-                hears
-                    && match site.when {
-                        When::Entry(owner) => chart.is_inside(source, owner) || chart.is_inside(owner, source),
-                        When::Exit(_) | When::Effect(_) => true,
-                    }
-            });
-            if !heard {
-                missing.entry(site.name).or_insert_with(|| (site, BTreeSet::new())).1.insert(answer);
-            }
-        }
-    }
-    for (name, (site, answers)) in missing {
-        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed") || a.as_str().ends_with(".reverted"));
-        let list: Vec<String> = answers.iter().map(|a| format!("`{a}`")).collect();
-        let message = format!("no transition hears {} of the request raised here", list.join(" or "));
-        let finding = if failed {
-            Finding::warning(COORD_FAILURE_UNHANDLED, message)
-        } else {
-            Finding::info(COORD_FAILURE_UNHANDLED, message)
-        };
-        findings.push(finding.at(site.origin).labelled(format!("asks for {name}")).path(place(chart, site.when)).help(
-            format!(
-                "add a transition on {} that leaves the state, so that the coordinator does not wait for ever",
-                list.join(", ")
-            ),
-        ));
-    }
 }
 
 /// Where a name is raised, as a path of the model.

@@ -12,6 +12,7 @@ mod monitors;
 mod purity;
 mod reactions;
 mod types;
+mod unheard;
 mod universe;
 mod world;
 

@@ -336,6 +336,12 @@ impl Chart {
         (!row.null).then(|| row.events.of(&self.triggers))
     }
 
+    /// Whether an event may trigger a transition alone: it lists it, takes any, or has a function that may say so.
+    pub fn may_trigger(&self, edge: EdgeId, event: EventId) -> bool {
+        let row = &self.edges[edge.index()];
+        row.predicates.len > 0 || self.triggers(edge).is_none_or(|listed| listed.contains(&event))
+    }
+
     /// The activity of a leaf, when it has one.
     pub fn doo(&self, leaf: NodeId) -> Option<FunctionId> {
         self.nodes[leaf.index()].doo

@@ -6,3 +6,4 @@ mod commands;
 mod demo;
 mod monitor;
 mod unasked;
+mod unheard;

@@ -1,0 +1,113 @@
+//! Requests whose failure nobody hears: the coordinator would wait for an answer that came already.
+//!
+//! A transition hears an answer when that event alone can take it all the way: from a state, through connectors, to a leaf.
+//! So what stands behind a connector counts with what leads to it, and the way into a composite state, which wants no
+//! event, is no ear.
+
+use super::coordinator::{ask_of, bad_answers, edges, place};
+use crate::model::codes::COORD_FAILURE_UNHANDLED;
+use crate::model::{Ask, Deployment, EventName, Finding, Findings, Verdict};
+use crate::statechart::{Chart, EdgeId, EventId, Kind, NodeId, RaiseSite, When};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Requests whose failure no transition waits for that could be there to hear it.
+pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+    let mut findings = Vec::new();
+    let mut missing: BTreeMap<EventName, (&RaiseSite, BTreeSet<EventName>)> = BTreeMap::new();
+    let mut ears: FxHashMap<EventId, Vec<NodeId>> = FxHashMap::default();
+    for site in chart.raises() {
+        let Some(ask) = ask_of(deployment, site.name) else { continue };
+        // Undoing what a state brought with it: nobody waits for that, and the stack keeps the frame.
+        if site.scoped && matches!(site.when, When::Exit(_)) {
+            continue;
+        }
+        // A configuration that must be confirmed is undone behind the coordinator's back if it is not. `cancelled` needs
+        // nobody: it comes only when the request was taken back, by whoever made it or by an operator.
+        let reverted = match ask {
+            Ask::Apply(id) => deployment.configuration(id).is_some_and(|c| c.confirm.is_some()),
+            _ => false,
+        };
+        let owner = owner(chart, site.when);
+        for answer in bad_answers(ask).into_iter().chain(reverted.then(|| Verdict::Reverted.event(ask))) {
+            let event = chart.event(answer);
+            let ears = ears.entry(event).or_insert_with(|| hearing(chart, event));
+            if !ears.iter().any(|state| chart.is_inside(*state, owner) || chart.is_inside(owner, *state)) {
+                missing.entry(site.name).or_insert_with(|| (site, BTreeSet::new())).1.insert(answer);
+            }
+        }
+    }
+    for (name, (site, answers)) in missing {
+        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed") || a.as_str().ends_with(".reverted"));
+        let list: Vec<String> = answers.iter().map(|a| format!("`{a}`")).collect();
+        let message = format!("no transition hears {} of the request raised here", list.join(" or "));
+        let finding = if failed {
+            Finding::warning(COORD_FAILURE_UNHANDLED, message)
+        } else {
+            Finding::info(COORD_FAILURE_UNHANDLED, message)
+        };
+        findings.push(finding.at(site.origin).labelled(format!("asks for {name}")).path(place(chart, site.when)).help(
+            format!(
+                "add a transition on {} that leaves the state, so that the coordinator does not wait for ever",
+                list.join(", ")
+            ),
+        ));
+    }
+    findings
+}
+
+/// The state that is active until an answer comes, or nobody is told: who enters asks for himself; what an exit or an
+/// effect asks for is heard in the outermost state that stays active on the way, here on any way there is.
+fn owner(chart: &Chart, when: When) -> NodeId {
+    let edge = match when {
+        When::Entry(state) => return state,
+        When::Exit(_) => return NodeId::ROOT,
+        When::Effect(edge) => edge,
+    };
+    let mut seen: FxHashSet<EdgeId> = FxHashSet::default();
+    let mut open = vec![edge];
+    let mut owner = chart.least_common_ancestor(edge);
+    while let Some(edge) = open.pop() {
+        if !seen.insert(edge) {
+            continue;
+        }
+        let stays = chart.least_common_ancestor(edge);
+        if chart.depth(stays) < chart.depth(owner) {
+            owner = stays;
+        }
+        let (from, to) = chart.ends(edge);
+        if !chart.is_state(to) {
+            open.extend(chart.outgoing(to));
+        }
+        if !chart.is_state(from) {
+            open.extend(edges(chart).filter(|before| chart.ends(*before).1 == from));
+        }
+    }
+    owner
+}
+
+/// States with a transition that the event alone can take all the way to a leaf. What functions decide counts as a yes.
+fn hearing(chart: &Chart, event: EventId) -> Vec<NodeId> {
+    let mut leads = vec![false; chart.len()];
+    let mut into: FxHashMap<NodeId, Vec<NodeId>> = FxHashMap::default();
+    let mut open: Vec<NodeId> = Vec::new();
+    for edge in edges(chart).filter(|edge| chart.may_trigger(*edge, event)) {
+        let (from, to) = chart.ends(edge);
+        into.entry(to).or_default().push(from);
+        if chart.kind(to) == Kind::Leaf {
+            open.push(from);
+        }
+    }
+    let mut hears = Vec::new();
+    while let Some(node) = open.pop() {
+        if std::mem::replace(&mut leads[node.index()], true) {
+            continue;
+        }
+        if chart.is_state(node) {
+            hears.push(node);
+        } else {
+            open.extend(into.get(&node).into_iter().flatten());
+        }
+    }
+    hears
+}
