@@ -199,15 +199,19 @@ pub const DOO_BUSY: Duration = Duration::from_millis(1);
 /// that steps its machine a hundred times a second.
 pub const DOO_IDLE: Duration = Duration::from_millis(10);
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
-/// twenty milliseconds of work.
-pub const CHECK_TRANSITIONS: usize = 20_000;
+/// a tenth of a second of work.
+pub const CHECK_TRANSITIONS: usize = 100_000;
 
 /// Requests that `check` lets wait at once: while so many wait, it follows no further events from outside. What goes
 /// wrong when requests queue up goes wrong with two of them.
 pub const CHECK_WAITING: usize = 2;
 
-/// Frames of one configuration that `check` follows: a third one means that going round adds one each time.
+/// Frames of one configuration that `check` follows: a fourth one means that going round adds one each time.
 pub const CHECK_FRAMES: usize = 3;
+
+/// The same behind an undoing that failed: there it is the failing that adds one each time, which is no mistake of the
+/// coordinator. What one left frame under another leads to, further ones do too.
+pub const CHECK_LEFT: usize = 2;
 
 /// Forced steps told one by one; more are told by number, so that a line can be read.
 pub const FORCED_SHOWN: usize = 8;

@@ -6,8 +6,8 @@
 use super::universe::{Creation, Universe};
 use crate::model::codes::{
     BAD_ARGUMENTS, BAD_VALUE, BUFFER_SIZE, DEFAULT_TWICE, FAULTED_DEMANDED, MISSING_PROPERTY, NEEDS_BUFFER,
-    NOT_AN_IN_PORT, NOT_AN_OUT_PORT, PORT_NOT_WRITABLE, PORT_TYPES, PORT_UNITS, UNKNOWN_ACTIVITY, UNKNOWN_COMPONENT,
-    UNKNOWN_OPERATION, UNKNOWN_PORT, UNKNOWN_PROPERTY, UNKNOWN_TYPE,
+    NOT_AN_IN_PORT, NOT_AN_OUT_PORT, PORT_NOT_WRITABLE, PORT_TYPES, PORT_UNITS, UNKNOWN_ACTIVITY, UNKNOWN_OPERATION,
+    UNKNOWN_PORT, UNKNOWN_PROPERTY, UNKNOWN_TYPE,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::{
@@ -153,13 +153,7 @@ impl<'a> Check<'a> {
     fn component(&mut self, component: ComponentName, at: Origin) -> &'a [Creation] {
         let creations = self.universe.of(component);
         if creations.is_empty() {
-            let help = did_you_mean(component.as_str(), "components", self.universe.names());
-            self.add(
-                Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
-                    .at(at)
-                    .labelled("no such component")
-                    .help(help),
-            );
+            self.add(self.universe.unknown(component, at));
         }
         creations
     }

@@ -66,13 +66,15 @@ pub struct Product<'a> {
     pub down: Option<NodeId>,
 }
 
-/// A refused or too deep request, found while moving.
+/// A request that is not followed, found while moving.
 #[derive(Debug, Clone)]
 pub enum Trouble {
     /// The request is refused.
     Refused(Ask, std::rc::Rc<Findings>),
     /// Going round adds frames.
     TooDeep(ConfigId),
+    /// Going round adds frames because their undoing fails: nothing to say, and not followed further.
+    Left,
 }
 
 impl Product<'_> {
@@ -247,11 +249,12 @@ impl Search<'_, '_> {
     fn run(&mut self) {
         let Some(start) = self.product.start() else { return };
         self.reach(start, None, Failed::Nothing);
-        while let Some(at) = self.clean.pop_front().or_else(|| self.failed.pop_front()) {
-            if self.edges.len() >= limits::CHECK_TRANSITIONS {
+        loop {
+            if self.edges.len() >= limits::CHECK_TRANSITIONS && (!self.clean.is_empty() || !self.failed.is_empty()) {
                 self.cut = true;
                 return;
             }
+            let Some(at) = self.clean.pop_front().or_else(|| self.failed.pop_front()) else { return };
             self.expand(at);
         }
     }
@@ -280,7 +283,12 @@ impl Search<'_, '_> {
         if let Some(head) = state.waiting.first() {
             let asks = head.asks.clone();
             let (ok, fails) = match self.product.head(&state) {
-                Applied::Done { world, may_fail } => (Some(world), may_fail),
+                // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
+                Applied::Done { left: Some(_), may_fail, .. } if self.with_failure[at as usize] == Failed::Undo => {
+                    self.troubles.push((at, Trouble::Left));
+                    (None, may_fail)
+                }
+                Applied::Done { world, may_fail, .. } => (Some(world), may_fail),
                 Applied::Refused { which, findings } => {
                     self.troubles.push((at, Trouble::Refused(asks[which.min(asks.len() - 1)], findings)));
                     (None, true)
@@ -341,6 +349,7 @@ impl Search<'_, '_> {
                         }
                     }
                 }
+                Trouble::Left => {}
                 Trouble::TooDeep(id) => {
                     if deep.insert(*id) {
                         let origin = self.product.deployment.configuration(*id).map(|c| c.origin).unwrap_or_default();
@@ -355,7 +364,13 @@ impl Search<'_, '_> {
         }
         self.ways_down(&mut findings);
         findings.extend(self.product.worlds.warnings.iter().cloned().map(|f| (f, Vec::new())));
-        let explored = Explored { states: self.states.len(), transitions: self.edges.len(), complete: !self.cut };
+        let explored = Explored {
+            states: self.states.len(),
+            transitions: self.edges.len(),
+            complete: !self.cut,
+            unfollowed: self.followed.iter().filter(|followed| !**followed).count(),
+            without_failure: self.clean.is_empty(),
+        };
         Exploration { findings, explored }
     }
 

@@ -55,6 +55,23 @@ pub struct Explored {
     pub transitions: usize,
     /// Whether that was all there is.
     pub complete: bool,
+    /// States that were met and not followed further, because the budget was used up.
+    pub unfollowed: usize,
+    /// Whether every way was followed to its end on which no request fails.
+    pub without_failure: bool,
+}
+
+impl Explored {
+    /// This and another one, as one.
+    fn and(self, other: Self) -> Self {
+        Self {
+            states: self.states + other.states,
+            transitions: self.transitions + other.transitions,
+            complete: self.complete && other.complete,
+            unfollowed: self.unfollowed + other.unfollowed,
+            without_failure: self.without_failure && other.without_failure,
+        }
+    }
 }
 
 /// What `check` has to say.
@@ -99,6 +116,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         let together = beside::shared(deployment, &looked.charts);
         looked.entangled = !together.is_empty();
         looked.explored.complete = !looked.entangled;
+        looked.explored.without_failure = true;
         looked.findings.extend(together);
         looked.findings.extend(monitors::events(deployment, &looked.charts));
         if all == 1 {
@@ -138,14 +156,13 @@ impl Looked<'_> {
         // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
         if finding::has_errors(findings) {
             self.explored.complete = false;
+            self.explored.without_failure = false;
             return;
         }
         let mut product = drive::product(deployment, chart, self.catalogue);
         let mut traced = ways(deployment, chart, &mut product);
         let exploration = explore::explore(&mut product);
-        self.explored.states += exploration.explored.states;
-        self.explored.transitions += exploration.explored.transitions;
-        self.explored.complete &= exploration.explored.complete;
+        self.explored = self.explored.and(exploration.explored);
         // Said once, of what none of them asks for.
         if number + 1 == self.charts.len() {
             let others = self.charts[..number].iter().flat_map(|other| beside::asked(deployment, other));

@@ -4,7 +4,7 @@ use super::coordinator::{is_internal, looks_like_answer};
 use super::universe::Universe;
 use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD,
-    UNKNOWN_ACTIVITY, UNKNOWN_COMPONENT, UNKNOWN_PORT,
+    UNKNOWN_ACTIVITY, UNKNOWN_PORT,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
@@ -104,13 +104,7 @@ impl Check<'_> {
     fn component(&mut self, component: ComponentName, at: Origin) -> bool {
         let known = !self.universe.of(component).is_empty();
         if !known {
-            let help = did_you_mean(component.as_str(), "components", self.universe.names());
-            self.add(
-                Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
-                    .at(at)
-                    .labelled("no such component")
-                    .help(help),
-            );
+            self.add(self.universe.unknown(component, at));
         }
         known
     }

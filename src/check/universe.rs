@@ -1,6 +1,8 @@
 //! All components that any configuration creates: what names in configurations may mean at all.
 
-use crate::model::{Catalogue, ChangeKind, ComponentName, ComponentType, Deployment, Origin, TypeName};
+use crate::model::codes::UNKNOWN_COMPONENT;
+use crate::model::finding::did_you_mean;
+use crate::model::{Catalogue, ChangeKind, ComponentName, ComponentType, Deployment, Finding, Origin, TypeName};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -42,8 +44,12 @@ impl Universe {
         self.components.get(&component).map_or(&[], Vec::as_slice)
     }
 
-    /// All names.
-    pub fn names(&self) -> impl Iterator<Item = &'static str> + '_ {
-        self.components.keys().map(ComponentName::as_str)
+    /// The finding that nothing creates a component of that name.
+    pub fn unknown(&self, component: ComponentName, at: Origin) -> Finding {
+        let known = self.components.keys().map(ComponentName::as_str);
+        Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
+            .at(at)
+            .labelled("no such component")
+            .help(did_you_mean(component.as_str(), "components", known))
     }
 }

@@ -3,8 +3,11 @@
 //! Two worlds are one when they cannot be told apart by what may be requested in them: the same components in the same
 //! run states with the same connections (no precondition looks at a value), and the same frames that the coordinator may
 //! undo, each blocked by the same kind of frames above it. Frames that nobody ever undoes count only by what they block.
+//! Which of two frames lies above the other counts only where it matters: where one keeps the other from being undone, or
+//! both have one name, of which the newest is undone first. (Where the top is undone, whatever it is, it always matters.)
 //! Each world is planned in with the real planner and the real stack, once per request.
 
+use crate::limits;
 use crate::model::{
     Ask, Catalogue, Code, ComponentName, ConfigId, Configuration, Deployment, Findings, MemberRef, Policy, RunState,
     TypeName,
@@ -42,6 +45,8 @@ pub enum Applied {
         world: WorldId,
         /// Whether there is a step that can fail.
         may_fail: bool,
+        /// A configuration that may be undone, of which there are more than [`limits::CHECK_LEFT`] frames then.
+        left: Option<ConfigId>,
     },
     /// It is refused, and the world stays.
     Refused {
@@ -129,9 +134,13 @@ impl<'a> Worlds<'a> {
                         self.warnings.push(warning);
                     }
                 }
-                match self.too_deep(&world) {
+                match self.more_than(limits::CHECK_FRAMES, &world) {
                     Some(id) => Applied::TooDeep(id),
-                    None => Applied::Done { may_fail: !steps.is_empty(), world: self.intern(world) },
+                    None => Applied::Done {
+                        may_fail: !steps.is_empty(),
+                        left: self.more_than(limits::CHECK_LEFT, &world),
+                        world: self.intern(world),
+                    },
                 }
             }
         };
@@ -158,12 +167,13 @@ impl<'a> Worlds<'a> {
         self.undone.as_ref().is_none_or(|undone| undone.contains(&id))
     }
 
-    fn too_deep(&self, world: &World) -> Option<ConfigId> {
+    /// A configuration of which there are more frames than that.
+    fn more_than(&self, most: usize, world: &World) -> Option<ConfigId> {
         let mut counts: FxHashMap<ConfigId, usize> = FxHashMap::default();
         world.stack.frames().iter().map(|f| f.configuration).find(|id| {
             let count = counts.entry(*id).or_default();
             *count += 1;
-            self.is_undone(*id) && *count > crate::limits::CHECK_FRAMES
+            self.is_undone(*id) && *count > most
         })
     }
 
@@ -174,17 +184,8 @@ impl<'a> Worlds<'a> {
         let mut links = Vec::new();
         world.system.for_each_link(&mut |from, to, _: Policy| links.push((from, to)));
         links.sort_unstable();
-        let frames = world.stack.frames();
-        let mut shape = Vec::new();
-        for (i, frame) in frames.iter().enumerate() {
-            if self.is_undone(frame.configuration) {
-                let blocked = frames[i + 1..]
-                    .iter()
-                    .any(|above| !self.is_undone(above.configuration) && self.blocked(frame, above));
-                shape.push((frame.configuration, blocked));
-            }
-        }
-        let key = Key { components, links, frames: shape };
+        let frames = self.shape(&world);
+        let key = Key { components, links, frames };
         if let Some(id) = self.keys.get(&key) {
             return *id;
         }
@@ -192,6 +193,45 @@ impl<'a> Worlds<'a> {
         self.worlds.push(world);
         self.keys.insert(key, id);
         id
+    }
+
+    /// The frames that may be undone, each with whether one that never is keeps it from that; in a canonical order.
+    fn shape(&mut self, world: &World) -> Vec<(ConfigId, bool)> {
+        let frames = world.stack.frames();
+        let mut kept: Vec<(&Arc<Frame>, bool)> = Vec::new();
+        for (i, frame) in frames.iter().enumerate() {
+            if self.is_undone(frame.configuration) {
+                let blocked = frames[i + 1..]
+                    .iter()
+                    .any(|above| !self.is_undone(above.configuration) && self.blocked(frame, above));
+                kept.push((frame, blocked));
+            }
+        }
+        if self.undone.is_none() {
+            return kept.into_iter().map(|(frame, blocked)| (frame.configuration, blocked)).collect();
+        }
+        let mut shape = Vec::with_capacity(kept.len());
+        while !kept.is_empty() {
+            // Of those that could as well lie at the bottom, that with the least name.
+            let mut least = 0;
+            for at in 1..kept.len() {
+                let (frame, _) = kept[at];
+                if frame.configuration.as_str() < kept[least].0.configuration.as_str()
+                    && kept[..at].iter().all(|(below, _)| self.commute(below, frame))
+                {
+                    least = at;
+                }
+            }
+            let (frame, blocked) = kept.remove(least);
+            shape.push((frame.configuration, blocked));
+        }
+        shape
+    }
+
+    /// Whether it makes no difference which of two frames lies above the other: neither keeps the other from being
+    /// undone, and they are not asked for by one name.
+    fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
+        a.configuration != b.configuration && !self.blocked(a, b) && !self.blocked(b, a)
     }
 
     /// Whether `above` keeps `frame` from being undone (as the stack would say; values that are handed over do not).

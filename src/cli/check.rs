@@ -6,7 +6,7 @@ use super::output::Style;
 use super::{Answer, Context, Run};
 use crate::check::{self, Explored};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::CHECK_WAITING;
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_TRANSITIONS, CHECK_WAITING};
 use crate::model::{Finding, Severity, finding};
 use serde_json::json;
 
@@ -61,15 +61,15 @@ impl Run for Args {
         let explored = report.explored;
         let reach = match (explored.states, explored.complete) {
             (0, _) => String::new(),
-            (n, true) => format!(
-                "; followed through all {n} states and {} transitions (at most {CHECK_WAITING} requests waiting)",
-                explored.transitions
-            ),
+            (n, true) => format!("; followed through all {n} states and {} transitions", explored.transitions),
             (n, false) => {
                 format!("; followed through {n} states and {} transitions, not all there are", explored.transitions)
             }
         };
         out.line(format!("{name}: {verdict}{reach}"));
+        for line in bounds(&explored) {
+            out.line(out.paint(Style::Dim, format!("  {line}")));
+        }
         Ok(exit)
     }
 }
@@ -88,6 +88,26 @@ fn print_json(
         "explored": explored,
         "trace": trace,
     }));
+}
+
+/// How far the coordinators were followed, and what was left out.
+fn bounds(explored: &Explored) -> Vec<String> {
+    let mut lines = Vec::new();
+    if explored.states == 0 {
+        return lines;
+    }
+    lines.push(format!(
+        "at most {CHECK_WAITING} requests wait at once, and {CHECK_FRAMES} frames of one configuration are in force \
+         ({CHECK_LEFT} where undoing failed)"
+    ));
+    if explored.unfollowed > 0 {
+        let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
+        lines.push(format!(
+            "{} states were met and not followed further{rest}: the budget is {CHECK_TRANSITIONS} transitions",
+            explored.unfollowed
+        ));
+    }
+    lines
 }
 
 /// A line that counts the findings.

@@ -4,6 +4,7 @@ mod background;
 mod breakages;
 mod commands;
 mod demo;
+mod explored;
 mod monitor;
 mod unasked;
 mod unheard;

@@ -93,6 +93,19 @@ fn every_series_goes_up_and_comes_down_to_nothing() {
     }
 }
 
+/// `davit check` has nothing to warn of, and follows each coordinator to the end.
+#[test]
+fn every_deployment_is_followed_to_the_end() {
+    for name in DEPLOYMENTS {
+        let (deployment, catalogue) = deployment(name);
+        let report = davit::check::run(deployment, &catalogue);
+        let told: Vec<_> = report.findings.iter().filter(|f| f.severity > davit::model::Severity::Info).collect();
+        assert!(told.is_empty(), "{name}: {told:#?}");
+        assert!(report.explored.complete && report.explored.unfollowed == 0, "{name}: {:?}", report.explored);
+        assert!(report.explored.states > 300, "{name}: {:?}", report.explored);
+    }
+}
+
 /// The hypothesis of the paper: one coordinator, unchanged, over two platforms.
 #[test]
 fn the_same_coordinator_over_another_platform() {
