@@ -243,11 +243,12 @@ fn switch() {
     let mut prepared = platform.prepare(&steps).expect("all immediate");
     let time = |indices: &[usize], prepared: &mut dyn Prepared| {
         let rounds = 200_000;
-        let deadline = clock.now() + Duration::from_secs(100);
+        let began = clock.now();
+        let deadline = began + Duration::from_secs(100);
         let start = Instant::now();
         for _ in 0..rounds {
             for index in indices {
-                assert!(matches!(prepared.execute(*index, None, deadline), Outcome::Done(None)));
+                assert!(matches!(prepared.execute(*index, None, began, deadline), Outcome::Done(None)));
             }
         }
         start.elapsed().as_nanos() as f64 / f64::from(rounds)

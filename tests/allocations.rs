@@ -96,7 +96,7 @@ fn updates_and_prepared_switches_allocate_nothing() {
         for _ in 0..n {
             for index in 0..steps.len() {
                 let value = (index == 0).then_some(&other);
-                let outcome = prepared.execute(index, value, clock.now() + Duration::from_secs(1));
+                let outcome = prepared.execute(index, value, clock.now(), clock.now() + Duration::from_secs(1));
                 assert_eq!(outcome, Outcome::Done(None));
             }
             clock.sleep(Duration::from_millis(5));

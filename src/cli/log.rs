@@ -61,7 +61,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             }
             if steps {
                 for step in entry["steps"].as_array().into_iter().flatten() {
-                    let took = duration(step["took_us"].as_f64().unwrap_or_default());
+                    let took = step["took_us"].as_f64().map_or_else(String::new, duration);
                     let outcome = match text(&step["outcome"]) {
                         "done" => String::new(),
                         other => format!("  {}", out.paint(Style::Bad, other)),

@@ -86,6 +86,7 @@ impl Engine {
         }
         // As long as no step is blocking the list's own order serves, and nothing needs to be counted.
         let mut at = 0;
+        let mut now = self.clock.now();
         while at < work.len() {
             if run.over[at] {
                 at += 1;
@@ -96,7 +97,7 @@ impl Engine {
             }
             match self.platform.execution(&work[at].step) {
                 Execution::Immediate => {
-                    self.inline(work, at as u32, run);
+                    self.inline(work, at as u32, run, &mut now);
                     at += 1;
                     if at % 64 == 0 {
                         self.glance();
@@ -107,11 +108,15 @@ impl Engine {
                     if !self.brief_from(work, at, run) {
                         return End::GaveWay;
                     }
+                    now = self.clock.now();
                 }
                 Execution::Blocking => return self.side_by_side(work, run, at),
             }
-            if !run.unread.is_empty() && !self.settle_unread(work, run) {
-                return End::GaveWay;
+            if !run.unread.is_empty() {
+                if !self.settle_unread(work, run) {
+                    return End::GaveWay;
+                }
+                now = self.clock.now();
             }
             if run.stops() {
                 return End::Failed;
@@ -133,7 +138,7 @@ impl Engine {
                 return if self.collect(work, run) { End::Failed } else { End::GaveWay };
             }
             if let Some(i) = order.next(Execution::Immediate) {
-                self.inline(work, i, run);
+                self.inline(work, i, run, &mut self.clock.now());
                 if !run.unread.is_empty() && !self.settle_unread(work, run) {
                     return End::GaveWay;
                 }
@@ -223,9 +228,11 @@ impl Engine {
         Some(Reason::Refused(violations.iter().map(finding).collect()))
     }
 
-    fn inline(&mut self, work: &[Item], i: u32, run: &mut Run) {
+    /// Carries out an immediate step, from `at` on, which becomes the time of its end: of steps that follow each other one
+    /// begins where the one before has ended, since a look at the clock costs as much as half a step.
+    fn inline(&mut self, work: &[Item], i: u32, run: &mut Run, at: &mut Time) {
         let step = &work[i as usize].step;
-        let started = self.clock.now();
+        let started = *at;
         if let Some(reason) = self.forbidden(step, run, started) {
             run.over[i as usize] = true;
             run.failures.push((i, reason));
@@ -234,8 +241,8 @@ impl Engine {
         self.tell_started(step);
         let deadline = (started + self.patience).min(run.until);
         let outcome = pool::execute(&*self.platform, step, deadline);
-        let took = self.clock.now().since(started);
-        self.tell_ended(step, &outcome, took, run.undoing);
+        *at = self.clock.now();
+        self.tell(StepName::of(step), StepEnd::from(&outcome), Some(at.since(started)), run.undoing);
         if let Outcome::Done(_) = outcome {
             // In this thread, so nothing can have come between the look at the precondition and now.
             self.took_effect(step, i, run);
@@ -396,11 +403,7 @@ impl Engine {
         }
     }
 
-    fn tell_ended(&self, step: &Step, outcome: &Outcome, took: Duration, undoing: bool) {
-        self.tell(StepName::of(step), StepEnd::from(outcome), took, undoing);
-    }
-
-    pub(super) fn tell(&self, step: StepName, end: StepEnd, took: Duration, undoing: bool) {
+    pub(super) fn tell(&self, step: StepName, end: StepEnd, took: Option<Duration>, undoing: bool) {
         if let Some(progress) = &self.progress {
             progress(&Progress::Ended { step, end, took, undoing });
         }

@@ -102,8 +102,8 @@ impl Engine {
         true
     }
 
-    /// Carries out the acts that are ready, from `at` on, which becomes the time at which the last one ended (as far as
-    /// anybody wants to know: a look at the clock costs as much as an act). What goes wrong is taken over by an ordinary
+    /// Carries out the acts that are ready, from `at` on, which becomes the time of the last look at the clock: a look costs
+    /// as much as an act, so only those that may take time are measured. What goes wrong is taken over by an ordinary
     /// transaction in the middle.
     fn switch_over(&mut self, fast: &mut Fast, op: Op, undoing: bool, at: &mut Time) -> Ended {
         let deadline = *at + self.limits.step_timeout;
@@ -116,13 +116,15 @@ impl Engine {
                     progress(&Progress::Started(step));
                 }
                 // After a panic in the middle nobody knows, as after any answer that did not come.
-                let call = AssertUnwindSafe(|| fast.platform.execute(index, value, deadline));
+                let call = AssertUnwindSafe(|| fast.platform.execute(index, value, *at, deadline));
                 let outcome =
                     catch_unwind(call).unwrap_or_else(|_| Outcome::Unknown(Cause::Lost("a panic".to_owned())));
-                if self.progress.is_some() {
+                // Only who stops may have to wait, for its update to end.
+                let took = fast.switch.stops(act).then(|| {
                     let begun = std::mem::replace(at, self.clock.now());
-                    self.tell(step, StepEnd::from(&outcome), at.since(begun), undoing);
-                }
+                    at.since(begun)
+                });
+                self.tell(step, StepEnd::from(&outcome), took, undoing);
                 if !matches!(outcome, Outcome::Done(_)) {
                     let steps = fast.switch.steps(fast.switch.acts());
                     let spec = self.spec([op]);

@@ -132,7 +132,7 @@ impl Engine {
                 };
                 let took = took.unwrap_or_else(|| now.since(flight.started));
                 let step = &work[i as usize].step;
-                self.tell(StepName::of(step), StepEnd::from(&outcome), took, run.undoing);
+                self.tell(StepName::of(step), StepEnd::from(&outcome), Some(took), run.undoing);
                 landed.push((i, Some(outcome)));
             }
         }

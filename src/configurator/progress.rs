@@ -92,8 +92,9 @@ pub enum Progress {
         step: StepName,
         /// How.
         end: StepEnd,
-        /// How long it took.
-        took: Duration,
+        /// How long it took. None: too short to be worth a look at the clock of its own (an immediate step of a prepared
+        /// switch); the answer tells how long all of them took.
+        took: Option<Duration>,
         /// Whether it took something back.
         undoing: bool,
     },

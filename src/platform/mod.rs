@@ -171,6 +171,7 @@ pub trait Platform: Send + Sync {
 /// A fixed list of immediate steps, resolved.
 pub trait Prepared: Send {
     /// Carries out step `index` of the list with the value it was prepared with, or with `value` where given (an
-    /// inverse: the value captured). Allocates nothing, takes no lock shared with an activity.
-    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome;
+    /// inverse: the value captured). `now`: the time, as its caller last knew it; what is written bears it. Allocates
+    /// nothing, takes no lock shared with an activity.
+    fn execute(&mut self, index: usize, value: Option<&Value>, now: Time, deadline: Time) -> Outcome;
 }

@@ -118,11 +118,11 @@ pub struct StepTime {
     pub undoing: bool,
     /// How it ended.
     pub end: StepEnd,
-    /// How long it took.
-    pub took: Duration,
+    /// How long it took; none: it was not measured by itself.
+    pub took: Option<Duration>,
 }
 
-/// `{"step": "undo: start A", "outcome": "not done", "took_us": 1.5}`
+/// `{"step": "undo: start A", "outcome": "not done", "took_us": 1.5}`; without `took_us` where it was not measured.
 impl Serialize for StepTime {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         let outcome = match self.end {
@@ -131,10 +131,13 @@ impl Serialize for StepTime {
             StepEnd::Unknown => "unknown",
         };
         let undo = if self.undoing { "undo: " } else { "" };
-        let mut fields = s.serialize_struct("StepTime", 3)?;
+        let mut fields = s.serialize_struct("StepTime", 2 + usize::from(self.took.is_some()))?;
         fields.serialize_field("step", &format_args!("{undo}{}", self.step))?;
         fields.serialize_field("outcome", outcome)?;
-        fields.serialize_field("took_us", &(self.took.as_secs_f64() * 1e6))?;
+        match self.took {
+            Some(took) => fields.serialize_field("took_us", &(took.as_secs_f64() * 1e6))?,
+            None => fields.skip_field("took_us")?,
+        }
         fields.end()
     }
 }

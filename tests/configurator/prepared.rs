@@ -21,9 +21,9 @@ struct Counted {
 }
 
 impl Prepared for Counted {
-    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome {
+    fn execute(&mut self, index: usize, value: Option<&Value>, now: Time, deadline: Time) -> Outcome {
         self.prepared.fetch_add(1, Ordering::SeqCst);
-        self.inner.execute(index, value, deadline)
+        self.inner.execute(index, value, now, deadline)
     }
 }
 

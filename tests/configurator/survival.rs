@@ -247,7 +247,7 @@ fn the_progress_tells_what_happened_and_how_long_it_took() {
     rig.ask("switch");
     let log = rig.progress.lock().unwrap().clone();
     let took = log.iter().find_map(|told| match told {
-        Progress::Ended { step, took, .. } if step.to_string() == "property_set B.k" => Some(*took),
+        Progress::Ended { step, took, .. } if step.to_string() == "property_set B.k" => *took,
         _ => None,
     });
     assert_eq!(took, Some(Duration::from_millis(30)));

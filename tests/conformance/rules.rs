@@ -424,21 +424,21 @@ pub fn prepared_steps_do_what_executed_ones_do(bed: &dyn Bed) {
         return; // A platform need not support it.
     };
     for (index, step) in steps.iter().enumerate().take(3) {
-        let outcome = prepared.execute(index, None, made.deadline());
+        let outcome = prepared.execute(index, None, made.clock.now(), made.deadline());
         assert!(matches!(outcome, Outcome::Done(_)), "{step}: {outcome:?}");
     }
     let seen = made.see();
     assert_eq!(seen.components[&name("a")].properties[&ident("gains")], Value::floats(&[0.1, 0.2, 0.3]));
     assert_eq!(seen.components[&name("a")].state, RunState::Stopped);
     assert_eq!(seen.ports, written(&[("a.n", Value::Int(7))]));
-    let again = prepared.execute(2, None, made.deadline());
+    let again = prepared.execute(2, None, made.clock.now(), made.deadline());
     assert!(matches!(again, Outcome::NotDone(_)), "a prepared step is checked as well: {again:?}");
     let back = Value::floats(&[1.0; 3]);
-    assert!(matches!(prepared.execute(0, Some(&back), made.deadline()), Outcome::Done(_)));
-    assert!(matches!(prepared.execute(1, Some(&Value::Int(8)), made.deadline()), Outcome::Done(_)));
+    assert!(matches!(prepared.execute(0, Some(&back), made.clock.now(), made.deadline()), Outcome::Done(_)));
+    assert!(matches!(prepared.execute(1, Some(&Value::Int(8)), made.clock.now(), made.deadline()), Outcome::Done(_)));
     assert_eq!(made.see().ports, written(&[("a.n", Value::Int(8))]));
-    assert!(matches!(prepared.execute(4, None, made.deadline()), Outcome::Done(_)));
-    assert!(matches!(prepared.execute(3, None, made.deadline()), Outcome::Done(_)));
+    assert!(matches!(prepared.execute(4, None, made.clock.now(), made.deadline()), Outcome::Done(_)));
+    assert!(matches!(prepared.execute(3, None, made.clock.now(), made.deadline()), Outcome::Done(_)));
     let seen = made.see();
     assert!(seen.ports.is_empty());
     assert_eq!(seen.components[&name("a")].properties[&ident("gains")], back);

@@ -57,7 +57,7 @@ pub(super) fn prepare(inner: &Arc<Inner>, steps: &[Step]) -> Option<Box<dyn Prep
 }
 
 impl Prepared for Resolved {
-    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome {
+    fn execute(&mut self, index: usize, value: Option<&Value>, now: Time, deadline: Time) -> Outcome {
         let Some(Handle { slot, number, act }) = self.steps.get(index) else {
             return Outcome::NotDone(Cause::Refused("there is no such prepared step".to_owned()));
         };
@@ -68,9 +68,7 @@ impl Prepared for Resolved {
         }
         match act {
             Act::Property(index, prepared) => outcome(registry.set_property(*slot, *index, value.unwrap_or(prepared))),
-            Act::Port(index, prepared) => {
-                outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), inner.clock.now()))
-            }
+            Act::Port(index, prepared) => outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), now)),
             Act::Shift(transition) => {
                 if let Err(cause) = inner.shift(&mut registry, *slot, *transition) {
                     return Outcome::NotDone(cause);

@@ -462,7 +462,7 @@ struct Resolved {
 }
 
 impl Prepared for Resolved {
-    fn execute(&mut self, index: usize, value: Option<&Value>, deadline: Time) -> Outcome {
+    fn execute(&mut self, index: usize, value: Option<&Value>, _: Time, deadline: Time) -> Outcome {
         match self.steps.get(index) {
             Some(step) => self.platform.execute(step, value, deadline),
             None => Outcome::NotDone(Cause::Refused(format!("there is no step {index}"))),
