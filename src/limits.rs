@@ -209,6 +209,12 @@ pub const CHECK_WAITING: usize = 2;
 /// Frames of one configuration that `check` follows: a fourth one means that going round adds one each time.
 pub const CHECK_FRAMES: usize = 3;
 
+/// Coordinators side by side that `check` follows together: the states of their product are soon past any budget.
+pub const CHECK_TOGETHER: usize = 3;
+
+/// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
+pub const CHECK_INBOX: usize = 6;
+
 /// The same behind an undoing that failed: there it is the failing that adds one each time, which is no mistake of the
 /// coordinator. What one left frame under another leads to, further ones do too.
 pub const CHECK_LEFT: usize = 2;

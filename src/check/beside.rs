@@ -4,11 +4,13 @@
 //! (which is more than can happen). As long as the configurations of one touch no component that those of another touch,
 //! no request of the one is ever answered otherwise because of the other: their frames share nothing, and steps on
 //! different components commute. So what holds of each alone holds of them together. Where they do touch the same
-//! component, that is said.
+//! component, that is said; a few coordinators are then followed together as well (`joint`).
 
 use super::coordinator::ask_of;
 use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
-use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Target};
+use crate::model::{
+    Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Severity, Target,
+};
 use crate::statechart::{Chart, EventId};
 use std::collections::BTreeSet;
 
@@ -68,8 +70,9 @@ pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
     .collect()
 }
 
-/// What the configurations of different coordinators touch together: one finding for each pair of coordinators.
-pub fn shared(deployment: &Deployment, charts: &[&Chart]) -> Findings {
+/// What the configurations of different coordinators touch together: one finding for each pair of coordinators. `verified`:
+/// they were followed together, so that what comes of it is told by findings of its own.
+pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Findings {
     if charts.len() < 2 {
         return Vec::new();
     }
@@ -97,7 +100,8 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart]) -> Findings {
                 theirs.iter().find_map(|(other, touches, all)| {
                     let what = match components.intersection(touches).next() {
                         Some(component) => format!("`{component}`"),
-                        None if one.id == other.id || *everything || *all => {
+                        None if one.id == other.id => "the same, being one configuration".to_owned(),
+                        None if *everything || *all => {
                             "every component, by `_default`".to_owned()
                         }
                         None if one.group.is_some() && one.group == other.group => {
@@ -109,12 +113,16 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart]) -> Findings {
                 })
             });
             if let Some((one, other, what)) = found {
+                let (severity, rest) = match verified {
+                    true => (Severity::Info, "they were followed together"),
+                    false => (Severity::Warning, "what they do together is not verified"),
+                };
                 let message = format!(
-                    "`{}` of the coordinator `{}` and `{}` of `{}` touch {what}: what they do together is not verified",
+                    "`{}` of the coordinator `{}` and `{}` of `{}` touch {what}: {rest}",
                     one.id, names[a], other.id, names[b]
                 );
                 findings.push(
-                    Finding::warning(COORD_SHARED, message)
+                    Finding::new(severity, COORD_SHARED, message)
                         .at(one.origin)
                         .also(other.origin, "the other one")
                         .help("give each coordinator components of its own, or let one ask the other by an event"),

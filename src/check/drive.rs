@@ -5,7 +5,7 @@
 //! to the goal.
 
 use super::coordinator;
-use super::explore::{Move, Product, State};
+use super::product::{Move, Product, State};
 use super::reactions::Reactions;
 use super::world::{self, Applied, World, Worlds};
 use crate::limits;

@@ -1,188 +1,19 @@
-//! The product of coordinator, system, stack and waiting requests, followed through every order of events and answers.
+//! The product, followed through every order of events and answers.
 //!
-//! A state is the coordinator's leaf, a world and the requests that wait. From each, the first waiting request is
-//! answered *ok* and *failed*, and every event that is heard comes. What can be reached with every request answered *ok*
-//! is followed first, the shortest way first; then what failures lead to. So a finding's trace is short, and has a failure
-//! in it only where it needs one.
+//! What can be reached with every request answered *ok* is followed first, the shortest way first; then what failures lead
+//! to. So a finding's trace is short, and has a failure in it only where it needs one.
 
 use super::Explored;
-use super::coordinator::{bad_answers, place};
-use super::reactions::{Asked, Reaction, Reactions};
-use super::world::{Applied, EMPTY, WorldId, Worlds};
+use super::coordinator::place;
+use super::product::{Move, Product, State, Trouble};
+use super::world::Applied;
 use crate::limits;
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK};
-use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
-use crate::statechart::{Chart, EventId, NodeId, RaiseSite, When};
+use crate::model::{Ask, ComponentName, ConfigId, Finding, Findings};
+use crate::statechart::{NodeId, RaiseSite, When};
 use crate::system::View;
 use rustc_hash::{FxHashMap, FxHashSet};
-use smallvec::SmallVec;
 use std::collections::VecDeque;
-
-/// Requests that are answered together, and who hears the answers (none: left since).
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Unit {
-    /// What is asked.
-    pub asks: SmallVec<[Ask; 2]>,
-    /// Who hears each answer.
-    pub owners: SmallVec<[Option<NodeId>; 2]>,
-}
-
-/// A state of the product.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct State {
-    /// The coordinator's leaf.
-    pub leaf: NodeId,
-    /// System and stack.
-    pub world: WorldId,
-    /// Requests that wait, the oldest first.
-    pub waiting: SmallVec<[Unit; 2]>,
-}
-
-/// What leads from one state to the next.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Move {
-    /// An event comes.
-    Event(EventId),
-    /// The first waiting requests are answered.
-    Answer {
-        /// What was asked.
-        asks: SmallVec<[Ask; 2]>,
-        /// How it ended.
-        ok: bool,
-    },
-}
-
-/// The moves of the product.
-pub struct Product<'a> {
-    /// The deployment.
-    pub deployment: &'a Deployment,
-    /// Its coordinator.
-    pub chart: &'a Chart,
-    /// What the coordinator does.
-    pub reactions: Reactions<'a>,
-    /// What the configurator does.
-    pub worlds: Worlds<'a>,
-    /// The state that means down; none when there is no such state.
-    pub down: Option<NodeId>,
-}
-
-/// A request that is not followed, found while moving.
-#[derive(Debug, Clone)]
-pub enum Trouble {
-    /// The request is refused.
-    Refused(Ask, std::rc::Rc<Findings>),
-    /// Going round adds frames.
-    TooDeep(ConfigId),
-    /// Going round adds frames because their undoing fails: nothing to say, and not followed further.
-    Left,
-}
-
-impl Product<'_> {
-    /// The state after the first entry; none when the coordinator cannot be entered.
-    pub fn start(&mut self) -> Option<State> {
-        let entered = self.reactions.enter()?;
-        let mut state = State { leaf: entered.leaf, world: 0, waiting: SmallVec::new() };
-        self.follow(&mut state, &entered);
-        Some(state)
-    }
-
-    /// Brings a reaction into a state: answers that nobody hears any more, and new requests.
-    fn follow(&self, state: &mut State, reaction: &Reaction) {
-        state.leaf = reaction.leaf;
-        for unit in &mut state.waiting {
-            for owner in &mut unit.owners {
-                if owner.is_some_and(|o| reaction.left.contains(&o)) {
-                    *owner = None;
-                }
-            }
-        }
-        for unit in self.units(&reaction.asked) {
-            let safe = unit.asks.iter().any(|ask| match ask {
-                Ask::Apply(id) => self.deployment.configuration(*id).is_some_and(|c| c.safe),
-                _ => false,
-            });
-            if safe { state.waiting.insert(0, unit) } else { state.waiting.push(unit) }
-        }
-    }
-
-    /// Requests of one step as the configurator takes them: an undo and a push together are one transaction, else each
-    /// stands by itself.
-    fn units(&self, asked: &[Asked]) -> Vec<Unit> {
-        let pushes = asked.iter().any(|a| matches!(a.ask, Ask::Apply(_)));
-        let undoes = asked.iter().any(|a| !matches!(a.ask, Ask::Apply(_)));
-        let unit = |asked: &[Asked]| Unit {
-            asks: asked.iter().map(|a| a.ask).collect(),
-            owners: asked.iter().map(|a| a.owner).collect(),
-        };
-        if pushes && undoes { vec![unit(asked)] } else { asked.iter().map(|a| unit(std::slice::from_ref(a))).collect() }
-    }
-
-    /// The state after an event.
-    pub fn event(&mut self, state: &State, event: EventId) -> State {
-        let mut next = state.clone();
-        let reaction = self.reactions.react(state.leaf, event);
-        self.follow(&mut next, &reaction);
-        self.settle(&mut next);
-        next
-    }
-
-    /// Down with an empty system, the stack is discarded (design §6).
-    fn settle(&self, state: &mut State) {
-        if self.is_down(state) && self.worlds.get(state.world).system.is_empty() {
-            state.world = EMPTY;
-        }
-    }
-
-    /// Whether a state is down, with nothing left to be answered.
-    pub fn is_down(&self, state: &State) -> bool {
-        state.waiting.is_empty() && self.down.is_some_and(|down| self.chart.is_inside(state.leaf, down))
-    }
-
-    /// What the first waiting requests do in the state's world.
-    pub fn head(&mut self, state: &State) -> Applied {
-        self.worlds.apply(state.world, &state.waiting[0].asks)
-    }
-
-    /// The state after the first waiting requests were answered and the world has become `world`.
-    pub fn answer(&mut self, state: &State, ok: bool, world: WorldId) -> State {
-        let mut next = State { world, ..state.clone() };
-        let mut unit = next.waiting.remove(0);
-        for i in 0..unit.asks.len() {
-            let Some(_) = unit.owners[i] else { continue };
-            let answer = self.chart.event(answer(unit.asks[i], ok));
-            let reaction = self.reactions.react(next.leaf, answer);
-            for owner in &mut unit.owners {
-                if owner.is_some_and(|o| reaction.left.contains(&o)) {
-                    *owner = None;
-                }
-            }
-            self.follow(&mut next, &reaction);
-        }
-        self.settle(&mut next);
-        next
-    }
-
-    /// A move in words.
-    pub fn tell(&self, by: &Move, to: &State) -> String {
-        let what = match by {
-            Move::Event(event) => self.chart.event_text(*event),
-            Move::Answer { asks, ok } => {
-                let events: Vec<String> = asks.iter().map(|a| answer(*a, *ok).to_string()).collect();
-                events.join(", ")
-            }
-        };
-        format!("{what} → {}", self.chart.fqn(to.leaf))
-    }
-}
-
-/// The event that answers `ask`.
-pub fn answer(ask: Ask, ok: bool) -> EventName {
-    match (ask, ok) {
-        (Ask::Apply(_), true) => Verdict::Ok.event(ask),
-        (_, true) => Verdict::Undone.event(ask),
-        (_, false) => bad_answers(ask)[0],
-    }
-}
 
 /// What was found, with the way there.
 pub struct Exploration {
@@ -190,11 +21,16 @@ pub struct Exploration {
     pub findings: Vec<(Finding, Vec<String>)>,
     /// How far it went.
     pub explored: Explored,
+    /// Requests that were refused, with the first reason.
+    pub refused: FxHashSet<(Ask, String)>,
+    /// With nothing waiting: where the coordinator was, and which frames that it may undo were in force.
+    pub rest: FxHashSet<(NodeId, Vec<ConfigId>)>,
 }
 
 /// The worst that failed on a way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Failed {
+pub enum Failed {
+    /// Nothing did.
     Nothing,
     /// A configuration was not applied: to be expected, and the coordinator's to deal with.
     Apply,
@@ -204,7 +40,8 @@ enum Failed {
 }
 
 impl Failed {
-    fn of(asks: &[Ask]) -> Self {
+    /// What the failure of these is.
+    pub fn of(asks: &[Ask]) -> Self {
         if asks.iter().all(|ask| matches!(ask, Ask::Apply(_))) { Self::Apply } else { Self::Undo }
     }
 }
@@ -370,8 +207,14 @@ impl Search<'_, '_> {
             complete: !self.cut,
             unfollowed: self.followed.iter().filter(|followed| !**followed).count(),
             without_failure: self.clean.is_empty(),
+            together: None,
         };
-        Exploration { findings, explored }
+        let by = super::world::requester(self.product.deployment);
+        let mut rest = FxHashSet::default();
+        for state in self.states.iter().filter(|state| state.waiting.is_empty()) {
+            rest.insert((state.leaf, self.product.worlds.frames_of(by, state.world, None)));
+        }
+        Exploration { findings, explored, refused: said, rest }
     }
 
     fn refused(&self, at: u32, ask: Ask, reasons: &Findings) -> Finding {

@@ -8,9 +8,12 @@ mod configurations;
 mod coordinator;
 mod drive;
 mod explore;
+mod joint;
 mod monitors;
+mod product;
 mod purity;
 mod reactions;
+mod together;
 mod types;
 mod unheard;
 mod universe;
@@ -59,6 +62,8 @@ pub struct Explored {
     pub unfollowed: usize,
     /// Whether every way was followed to its end on which no request fails.
     pub without_failure: bool,
+    /// Of several coordinators: whether they were followed together, to the end. Else each was followed alone.
+    pub together: Option<bool>,
 }
 
 impl Explored {
@@ -70,6 +75,7 @@ impl Explored {
             complete: self.complete && other.complete,
             unfollowed: self.unfollowed + other.unfollowed,
             without_failure: self.without_failure && other.without_failure,
+            together: self.together.or(other.together),
         }
     }
 }
@@ -111,22 +117,22 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         findings,
         explored: Explored::default(),
         trace: Vec::new(),
+        alone: Vec::new(),
     };
     if charts.len() == all {
-        let together = beside::shared(deployment, &looked.charts);
-        looked.entangled = !together.is_empty();
-        looked.explored.complete = !looked.entangled;
+        looked.entangled = !beside::shared(deployment, &looked.charts, false).is_empty();
+        looked.explored.complete = true;
         looked.explored.without_failure = true;
-        looked.findings.extend(together);
         looked.findings.extend(monitors::events(deployment, &looked.charts));
         if all == 1 {
             looked.at(deployment, 0, "");
         } else {
-            for (number, name) in deployment.coordinators().into_iter().enumerate() {
-                if let Some(seen) = beside::view(deployment, &looked.charts, number) {
-                    looked.at(&seen, number, &format!("{name}: "));
-                }
+            let of = |number| beside::view(deployment, &looked.charts, number);
+            let views: Vec<Deployment> = (0..all).filter_map(of).collect();
+            for (number, (seen, name)) in views.iter().zip(deployment.coordinators()).enumerate() {
+                looked.at(seen, number, &format!("{name}: "));
             }
+            looked.together(deployment, &views);
         }
     }
     let Looked { explored, trace, mut findings, .. } = looked;
@@ -144,9 +150,46 @@ struct Looked<'a> {
     findings: Findings,
     explored: Explored,
     trace: Vec<String>,
+    /// What following each of several alone gave.
+    alone: Vec<explore::Exploration>,
 }
 
 impl Looked<'_> {
+    /// Follows several together, if they are few; `views` are the deployment as each sees it.
+    fn together(&mut self, deployment: &Deployment, views: &[Deployment]) {
+        let possible = self.alone.len() == views.len() && joint::few(deployment, &self.charts);
+        let followed = possible.then(|| {
+            let mut joint = together::Together::new(deployment, views, &self.charts, self.catalogue);
+            joint::follow(&mut joint, &self.alone)
+        });
+        let verified = followed.as_ref().is_some_and(|followed| followed.explored.complete);
+        self.explored.together = Some(verified);
+        // Alone is all there is to know of those that touch nothing in common.
+        self.explored.complete &= verified || !self.entangled;
+        self.findings.extend(beside::shared(deployment, &self.charts, verified));
+        let Some(followed) = followed else { return };
+        self.explored.states += followed.explored.states;
+        self.explored.transitions += followed.explored.transitions;
+        self.explored.unfollowed += followed.explored.unfollowed;
+        // What they do to each other is harder to see than what one does alone: the way to it goes before that to a warning.
+        if !finding::has_errors(&self.findings) && followed.findings.iter().any(|(_, way)| !way.is_empty()) {
+            self.trace.clear();
+        }
+        for (finding, way) in followed.findings {
+            self.tell(finding, way, "");
+        }
+    }
+
+    fn tell(&mut self, finding: Finding, way: Vec<String>, name: &str) {
+        if self.findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
+            return;
+        }
+        if self.trace.is_empty() {
+            self.trace = way.into_iter().map(|line| format!("{name}{line}")).collect();
+        }
+        self.findings.push(finding);
+    }
+
     /// Looks at one coordinator and follows it. `name` is written before the lines of its trace.
     fn at(&mut self, deployment: &Deployment, number: usize, name: &str) {
         let (chart, findings) = (self.charts[number], &mut self.findings);
@@ -168,27 +211,23 @@ impl Looked<'_> {
             let others = self.charts[..number].iter().flat_map(|other| beside::asked(deployment, other));
             findings.extend(unasked(deployment, &product, others.collect()));
         }
-        traced.extend(exploration.findings);
+        let mut exploration = exploration;
+        traced.append(&mut exploration.findings);
+        self.alone.push(exploration);
         traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
         for (mut finding, way) in traced {
             // What functions decide, or what the components of another coordinator would change, is not known here.
             if (!chart.is_pure() || self.entangled) && finding.severity == Severity::Error {
                 finding.severity = Severity::Warning;
             }
-            if findings.iter().any(|f| f.code == finding.code && f.message == finding.message) {
-                continue;
-            }
-            if self.trace.is_empty() {
-                self.trace = way.into_iter().map(|line| format!("{name}{line}")).collect();
-            }
-            findings.push(finding);
+            self.tell(finding, way, name);
         }
     }
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system
 /// then is not known; what is wrong with them in any system is.
-fn unasked(deployment: &Deployment, product: &explore::Product<'_>, mut asked: FxHashSet<ConfigId>) -> Findings {
+fn unasked(deployment: &Deployment, product: &product::Product<'_>, mut asked: FxHashSet<ConfigId>) -> Findings {
     const ANYWHERE: [Code; 4] = [CLASH, PRE_ON_CREATED, POST_ON_DESTROYED, TOUCHES_DESTROYED];
     let mut findings = Vec::new();
     asked.extend(product.worlds.asked());
@@ -207,10 +246,10 @@ pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[Con
 }
 
 /// Bring-up and shutdown must work when everything goes well.
-fn ways(deployment: &Deployment, chart: &Chart, product: &mut explore::Product<'_>) -> Vec<(Finding, Vec<String>)> {
+fn ways(deployment: &Deployment, chart: &Chart, product: &mut product::Product<'_>) -> Vec<(Finding, Vec<String>)> {
     let Some((rise, fall)) = drive::ways(product) else { return Vec::new() };
     let mut found = Vec::new();
-    let tell = |product: &explore::Product<'_>, way: &drive::Way| -> Vec<String> {
+    let tell = |product: &product::Product<'_>, way: &drive::Way| -> Vec<String> {
         std::iter::once(format!("start → {}", chart.fqn(way.from.leaf)))
             .chain(way.moves.iter().map(|(by, to)| product.tell(by, to)))
             .collect()

@@ -32,6 +32,8 @@ pub struct Reaction {
     pub asked: Vec<Asked>,
     /// States that were left, at least once.
     pub left: Vec<NodeId>,
+    /// Names that were raised and ask for nothing, in order.
+    pub emitted: Vec<EventName>,
 }
 
 /// The table.
@@ -120,15 +122,16 @@ struct Watch<'a> {
     taken: bool,
     asked: Vec<Asked>,
     left: Vec<NodeId>,
+    emitted: Vec<EventName>,
 }
 
 impl<'a> Watch<'a> {
     fn new(deployment: &'a Deployment) -> Self {
-        Self { deployment, taken: false, asked: Vec::new(), left: Vec::new() }
+        Self { deployment, taken: false, asked: Vec::new(), left: Vec::new(), emitted: Vec::new() }
     }
 
     fn reaction(self, leaf: NodeId) -> Reaction {
-        Reaction { leaf, taken: self.taken, asked: self.asked, left: self.left }
+        Reaction { leaf, taken: self.taken, asked: self.asked, left: self.left, emitted: self.emitted }
     }
 }
 
@@ -162,6 +165,8 @@ impl Hook for Watch<'_> {
     fn raised(&mut self, _: &Chart, raised: Raised) {
         if let Some(ask) = ask_of(self.deployment, raised.name) {
             self.asked.push(Asked { ask, name: raised.name, owner: Some(raised.owner) });
+        } else {
+            self.emitted.push(raised.name);
         }
     }
 }

@@ -63,8 +63,11 @@ pub enum Applied {
 struct Key {
     components: Vec<(ComponentName, TypeName, RunState)>,
     links: Vec<(MemberRef, MemberRef)>,
-    frames: Vec<(ConfigId, bool)>,
+    frames: Vec<Kept>,
 }
+
+/// A frame that may be undone: of which configuration, by whom, and whether one that never is keeps it from that.
+type Kept = (ConfigId, Requester, bool);
 
 /// All worlds that were met.
 pub struct Worlds<'a> {
@@ -75,7 +78,7 @@ pub struct Worlds<'a> {
     undone: Option<FxHashSet<ConfigId>>,
     worlds: Vec<World>,
     keys: FxHashMap<Key, WorldId>,
-    done: FxHashMap<(WorldId, Vec<Ask>), Applied>,
+    done: FxHashMap<(WorldId, Requester, Vec<Ask>), Applied>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
     warned: FxHashSet<(Code, String)>,
@@ -121,12 +124,17 @@ impl<'a> Worlds<'a> {
         &self.worlds[id as usize]
     }
 
-    /// What `asks`, made together, do in a world.
+    /// What `asks`, made together by the deployment's coordinator, do in a world.
     pub fn apply(&mut self, id: WorldId, asks: &[Ask]) -> Applied {
-        if let Some(known) = self.done.get(&(id, asks.to_vec())) {
+        self.apply_by(self.requester, id, asks)
+    }
+
+    /// What `asks`, made together by that coordinator, do in a world.
+    pub fn apply_by(&mut self, by: Requester, id: WorldId, asks: &[Ask]) -> Applied {
+        if let Some(known) = self.done.get(&(id, by, asks.to_vec())) {
             return known.clone();
         }
-        let applied = match apply(self.deployment, &self.context, self.requester, self.get(id), asks) {
+        let applied = match apply(self.deployment, &self.context, by, self.get(id), asks) {
             Err(refusal) => Applied::Refused { which: refusal.request, findings: Rc::new(refusal.findings) },
             Ok(Change { world, steps, warnings }) => {
                 for warning in warnings {
@@ -144,13 +152,23 @@ impl<'a> Worlds<'a> {
                 }
             }
         };
-        self.done.insert((id, asks.to_vec()), applied.clone());
+        self.done.insert((id, by, asks.to_vec()), applied.clone());
         applied
+    }
+
+    /// The configurations of a coordinator's frames that may be undone, in no order.
+    pub fn frames_of(&self, by: Requester, id: WorldId, undone: Option<&FxHashSet<ConfigId>>) -> Vec<ConfigId> {
+        let frames = self.get(id).stack.frames().iter();
+        let counted = |id: &ConfigId| self.is_undone(*id) && undone.is_none_or(|undone| undone.contains(id));
+        let mut ids: Vec<ConfigId> =
+            frames.filter(|f| f.requester == by).map(|f| f.configuration).filter(counted).collect();
+        ids.sort_unstable_by_key(|id| id.as_str());
+        ids
     }
 
     /// Configurations that were asked for in some world.
     pub fn asked(&self) -> FxHashSet<ConfigId> {
-        let asks = self.done.keys().flat_map(|(_, asks)| asks);
+        let asks = self.done.keys().flat_map(|(_, _, asks)| asks);
         asks.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None }).collect()
     }
 
@@ -196,7 +214,7 @@ impl<'a> Worlds<'a> {
     }
 
     /// The frames that may be undone, each with whether one that never is keeps it from that; in a canonical order.
-    fn shape(&mut self, world: &World) -> Vec<(ConfigId, bool)> {
+    fn shape(&mut self, world: &World) -> Vec<Kept> {
         let frames = world.stack.frames();
         let mut kept: Vec<(&Arc<Frame>, bool)> = Vec::new();
         for (i, frame) in frames.iter().enumerate() {
@@ -208,7 +226,7 @@ impl<'a> Worlds<'a> {
             }
         }
         if self.undone.is_none() {
-            return kept.into_iter().map(|(frame, blocked)| (frame.configuration, blocked)).collect();
+            return kept.into_iter().map(|(frame, blocked)| (frame.configuration, frame.requester, blocked)).collect();
         }
         let mut shape = Vec::with_capacity(kept.len());
         while !kept.is_empty() {
@@ -223,7 +241,7 @@ impl<'a> Worlds<'a> {
                 }
             }
             let (frame, blocked) = kept.remove(least);
-            shape.push((frame.configuration, blocked));
+            shape.push((frame.configuration, frame.requester, blocked));
         }
         shape
     }

@@ -6,7 +6,7 @@ use super::output::Style;
 use super::{Answer, Context, Run};
 use crate::check::{self, Explored};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_TRANSITIONS, CHECK_WAITING};
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_TOGETHER, CHECK_TRANSITIONS, CHECK_WAITING};
 use crate::model::{Finding, Severity, finding};
 use serde_json::json;
 
@@ -100,6 +100,14 @@ fn bounds(explored: &Explored) -> Vec<String> {
         "at most {CHECK_WAITING} requests wait at once, and {CHECK_FRAMES} frames of one configuration are in force \
          ({CHECK_LEFT} where undoing failed)"
     ));
+    match explored.together {
+        Some(true) => lines.push("the coordinators were followed one by one and together".to_owned()),
+        Some(false) => lines.push(format!(
+            "the coordinators were followed one by one: only up to {CHECK_TOGETHER} without functions are followed \
+             together, and within the budget"
+        )),
+        None => {}
+    }
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
         lines.push(format!(

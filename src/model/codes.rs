@@ -449,7 +449,17 @@ codes! {
          would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \
          applied on the way up.";
     COORD_SHARED = "coord::shared", "two coordinators touch the same component",
-        "Coordinators side by side are verified one by one, each as if the others were not there. That is all there is to know as long as the configurations of one touch no component that those of another touch. Here they do: at run time one of them may be refused where alone it was not (nothing is broken by that: a conflict is refused and named), and what follows from it, looked at alone, is a warning at most. Give each coordinator components of its own, or let one coordinator ask the other by an event.";
+        "Each coordinator is verified alone, as if the others were not there. That is all there is to know as long as the \
+         configurations of one touch no component that those of another touch. Here they do: at run time one of them may be \
+         refused where alone it was not (nothing is broken by that: a conflict is refused and named). A few coordinators are \
+         followed together as well, as far as the budget goes; then this is a note, and what comes of it is told by findings \
+         of its own. Else what follows from it is a warning at most. Give each coordinator components of its own, or let one \
+         coordinator ask the other by an event.";
+    COORD_REFUSED_BY_OTHER = "coord::refused_by_other", "one coordinator is refused something because of another's frames",
+        "Coordinators side by side were followed together, and one of them is refused what it is never refused alone: frames \
+         of another are in the way. Nothing is broken by that, the request is answered as failed; but whether it happens \
+         depends on which of the two was first. The trace shows a shortest way. Give each coordinator components of its own, \
+         or let one ask the other by an event.";
     COORD_STACK_GROWS = "coord::stack_grows", "going round makes the stack grow",
         "The coordinator can go round a circle of states that applies a configuration each time and never undoes it, \
          though elsewhere it undoes that configuration by name. Each round leaves a frame; past the limit the oldest are \

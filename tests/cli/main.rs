@@ -6,5 +6,6 @@ mod commands;
 mod demo;
 mod explored;
 mod monitor;
+mod together;
 mod unasked;
 mod unheard;

@@ -1,0 +1,251 @@
+//! Coordinators side by side, followed together by `check`.
+
+use crate::demo::Demo;
+use serde_json::Value;
+
+const DEPLOYMENT: &str = "davit: 1
+name: two
+platform: simulated
+types:
+  Drive:
+    ports: { out: { direction: out, type: float } }
+    properties: { gain: { type: float, default: 1.0 } }
+configurations: [conf.lua]
+";
+
+/// A state holds a configuration as long as it is active.
+fn holder(name: &str) -> String {
+    format!(
+        "return state {{
+          idle = state {{}}, fault = state {{}},
+          on = state {{ config = \"{name}_base\", low = state {{}}, high = state {{ config = \"{name}_high\" }},
+            trans {{ src = \"initial\", tgt = \"low\" }},
+            trans {{ src = \"low\", tgt = \"high\", events = {{ \"e_{name}_up\" }} }},
+            trans {{ src = \"high\", tgt = \"low\", events = {{ \"e_{name}_down\", \"{name}_high.failed\", \"{name}_high.broken\" }} }},
+          }},
+          trans {{ src = \"initial\", tgt = \"idle\" }},
+          trans {{ src = \"idle\", tgt = \"on\", events = {{ \"e_start\" }} }},
+          trans {{ src = \"on\", tgt = \"fault\", events = {{ \"{name}_base.failed\", \"{name}_base.broken\" }} }},
+          trans {{ src = \"fault\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},
+          trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\", \"e_{name}_off\" }} }},
+        }}"
+    )
+}
+
+/// `check` of holders with these names; `gain` is whose drive the `high` of each sets.
+fn holders(names: &[&str], gain: impl Fn(&str) -> String) -> (Value, String) {
+    let demo = Demo::new();
+    let listed: Vec<String> = names.iter().map(|name| format!("{name}: {name}.lua")).collect();
+    let down: Vec<String> = names.iter().map(|name| format!("{name}:idle")).collect();
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ {} }}
+deploy: {{ event: e_start, up: on, failed: [fault], within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n",
+            listed.join(", "),
+            down.join(", ")
+        ),
+    );
+    let mut conf = String::new();
+    for name in names {
+        demo.write(&format!("{name}.lua"), &holder(name));
+        conf += &format!(
+            "{name}_base = Configuration {{ create(\"{name}Drive\", \"Drive\"), post_conf_state = {{ \"{name}Drive:running\" }} }},
+             {name}_high = Configuration {{ property_set(\"{}Drive.gain\", 5.0) }},\n",
+            gain(name)
+        );
+    }
+    demo.write("conf.lua", &format!("ConfiguratorConf {{ {conf} }}"));
+    let text = demo.run(&["check", "two.yaml"]);
+    (demo.run(&["check", "two.yaml", "--json"]).json(), text.out)
+}
+
+fn of_code<'a>(json: &'a Value, code: &str) -> Vec<&'a Value> {
+    json["findings"].as_array().unwrap().iter().filter(|f| f["code"] == code).collect()
+}
+
+#[test]
+fn who_touches_nothing_in_common_is_sound_together() {
+    let (json, text) = holders(&["arm", "gripper"], str::to_owned);
+    assert_eq!((&json["ok"], &json["explored"]["complete"]), (&true.into(), &true.into()), "{json:#}");
+    assert_eq!(json["explored"]["together"], true, "{json:#}");
+    for code in ["coord::refused_by_other", "coord::shared", "coord::no_way_down", "deploy::never_up"] {
+        assert!(of_code(&json, code).is_empty(), "{json:#}");
+    }
+    assert!(text.contains("one by one and together"), "{text}");
+    // The product is larger than what each does alone.
+    let (one, _) = holders(&["arm"], str::to_owned);
+    assert!(one["explored"]["together"].is_null(), "{one:#}");
+    let states = |json: &Value| json["explored"]["states"].as_u64().unwrap();
+    assert!(states(&json) > 4 * states(&one), "{} {}", states(&json), states(&one));
+}
+
+/// The gripper's `high` sets the gain of the arm's drive: the arm cannot take its drive away then.
+#[test]
+fn a_refusal_because_of_the_other_names_both_and_comes_with_a_way() {
+    let (json, _) = holders(&["arm", "gripper"], |_| "arm".to_owned());
+    let found = of_code(&json, "coord::refused_by_other");
+    let message = "`arm_base.undo` of `arm` is refused because of the frames of `gripper`";
+    let one = found.iter().find(|f| f["message"].as_str().unwrap().starts_with(message));
+    let one = one.unwrap_or_else(|| panic!("{json:#}"));
+    assert_eq!(one["severity"], "warning");
+    assert_eq!(one["file"], "arm.lua");
+    let trace: Vec<&str> = json["trace"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert_eq!(trace.first(), Some(&"start → arm:root.idle, gripper:root.idle"), "{json:#}");
+    assert!(trace.iter().any(|line| line.starts_with("gripper_high.ok")), "{trace:?}");
+    assert!(trace.len() <= 9, "{trace:?}");
+    // That they touch the same is a note now: what comes of it was followed.
+    let shared = of_code(&json, "coord::shared");
+    assert!(shared.len() == 1 && shared[0]["severity"] == "info", "{json:#}");
+    assert_eq!(json["explored"]["together"], true);
+    assert_eq!(json["explored"]["complete"], true);
+}
+
+#[test]
+fn more_than_a_few_are_followed_one_by_one() {
+    let (json, text) = holders(&["a", "b", "c", "d"], str::to_owned);
+    assert_eq!(json["explored"]["together"], false, "{json:#}");
+    assert_eq!(json["explored"]["complete"], true, "each alone is all there is to know: {json:#}");
+    assert!(text.contains("were followed one by one:"), "{text}");
+    let (json, _) = holders(&["a", "b", "c", "d"], |_| "a".to_owned());
+    assert_eq!(json["explored"]["complete"], false, "{json:#}");
+    assert!(of_code(&json, "coord::shared").iter().all(|f| f["severity"] == "warning"), "{json:#}");
+}
+
+/// One commands another by events: alone each could always come up, for the other might emit anything at any time.
+fn boss_and_hand(holds: &str, free: &str) -> Value {
+    let boss = "return state {
+      idle = state {}, closing = state { entry = \"e_close\" }, held = state {}, opening = state { entry = \"e_open\" },
+      trans { src = \"initial\", tgt = \"idle\" },
+      trans { src = \"idle\", tgt = \"closing\", events = { \"e_start\" } },
+      trans { src = \"closing\", tgt = \"held\", events = { \"e_holds\" } },
+      trans { src = \"held\", tgt = \"opening\", events = { \"e_shutdown\" } },
+      trans { src = \"opening\", tgt = \"idle\", events = { \"e_free\" } },
+    }";
+    let hand = format!(
+        "return state {{
+      open = state {{}}, shut = state {{ entry = \"grip\" }}, sure = state {{ entry = \"{holds}\" }},
+      loose = state {{ entry = \"grip.undo\" }}, never = state {{ entry = {{ \"e_holds\", \"e_free\" }} }},
+      trans {{ src = \"initial\", tgt = \"open\" }},
+      trans {{ src = \"open\", tgt = \"shut\", events = {{ \"e_close\" }} }},
+      trans {{ src = \"shut\", tgt = \"shut\", events = {{ \"grip.failed\", \"grip.broken\" }} }},
+      trans {{ src = \"shut\", tgt = \"sure\", events = {{ \"grip.ok\" }} }},
+      trans {{ src = \"sure\", tgt = \"loose\", events = {{ \"e_open\" }} }},
+      trans {{ src = \"never\", tgt = \"open\", events = {{ \"e_shutdown\" }} }},
+      trans {{ src = \"loose\", tgt = \"open\", events = {{ \"grip.undone\", \"grip.undo.failed\", \"grip.undo.broken\" }}, effect = \"{free}\" }},
+    }}"
+    );
+    let demo = Demo::new();
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinator: boss.lua\ncoordinators: {{ hand: hand.lua }}\nemits: [e_else]
+deploy: {{ event: e_start, up: [held, hand:sure], within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: [idle, hand:open], within_s: 5 }}\n"
+        ),
+    );
+    demo.write("boss.lua", boss);
+    demo.write("hand.lua", &hand);
+    demo.write("conf.lua", "ConfiguratorConf { grip = Configuration { create(\"g\", \"Drive\") } }");
+    demo.run(&["check", "two.yaml", "--json"]).json()
+}
+
+#[test]
+fn who_waits_for_the_other_for_ever_is_found() {
+    let sound = boss_and_hand("e_holds", "e_free");
+    assert_eq!(sound["explored"]["together"], true, "{sound:#}");
+    for code in ["deploy::never_up", "coord::no_way_down", "coord::refused_by_other"] {
+        assert!(of_code(&sound, code).is_empty(), "{sound:#}");
+    }
+    let silent = boss_and_hand("e_else", "e_free");
+    let found = of_code(&silent, "deploy::never_up");
+    assert!(
+        found.len() == 1 && found[0]["message"].as_str().unwrap().contains("two:root.closing, hand:root.sure"),
+        "{silent:#}"
+    );
+    let trace: Vec<&str> = silent["trace"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert_eq!(trace.first(), Some(&"start → two:root.idle, hand:root.open"), "{silent:#}");
+    assert!(trace.contains(&"grip.ok → two:root.closing, hand:root.sure"), "{silent:#}");
+    let stays = boss_and_hand("e_holds", "e_else");
+    let found = of_code(&stays, "coord::no_way_down");
+    assert!(
+        found.iter().any(|f| f["message"].as_str().unwrap().contains("two:root.opening, hand:root.open")),
+        "{stays:#}"
+    );
+}
+
+/// Each pops the top of the stack, and both have configurations of one group.
+#[test]
+fn nobody_takes_the_others_frames() {
+    let greedy = |name: &str| {
+        format!(
+            "return state {{
+              idle = state {{}}, on = state {{}},
+              trans {{ src = \"initial\", tgt = \"idle\" }},
+              trans {{ src = \"idle\", tgt = \"on\", events = {{ \"e_start\" }}, effect = \"{name}_base\" }},
+              trans {{ src = \"on\", tgt = \"on\", events = {{ \"e_{name}_mode\" }}, effect = \"{name}_mode\" }},
+              trans {{ src = \"on\", tgt = \"on\", events = {{ \"e_{name}_pop\" }}, effect = \"{name}_mode.undo\" }},
+              trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"{name}_base.undo\" }},
+            }}"
+        )
+    };
+    let demo = Demo::new();
+    demo.write("arm.lua", &greedy("arm"));
+    demo.write("gripper.lua", &greedy("gripper"));
+    demo.write(
+        "conf.lua",
+        "ConfiguratorConf {
+          arm_base = Configuration { create(\"a\", \"Drive\") }, gripper_base = Configuration { create(\"g\", \"Drive\") },
+          arm_mode = Configuration { group = \"mode\", property_set(\"a.gain\", 2.0) },
+          gripper_mode = Configuration { group = \"mode\", property_set(\"g.gain\", 2.0) },
+        }",
+    );
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ arm: arm.lua, gripper: gripper.lua }}
+deploy: {{ event: e_start, up: on, within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: [arm:idle, gripper:idle], within_s: 5 }}\n"
+        ),
+    );
+    let json = demo.run(&["check", "two.yaml", "--json"]).json();
+    let told: Vec<&str> =
+        of_code(&json, "coord::refused_by_other").iter().map(|f| f["message"].as_str().unwrap()).collect();
+    let refused = |what: &str| told.iter().any(|m| m.starts_with(what) && m.contains("of the group `mode`"));
+    assert!(refused("`gripper_mode` of `gripper` is refused"), "{json:#}");
+    assert!(refused("`arm_mode` of `arm` is refused"), "{json:#}");
+}
+
+/// Both hold the same configuration, each with a frame of its own. A frame that one takes from the other would be found in
+/// what the other has in force: it never comes to that alone.
+#[test]
+fn each_undoes_its_own_frame_of_a_common_configuration() {
+    let holds = |name: &str| {
+        format!(
+            "return state {{
+              idle = state {{}}, fault = state {{}}, on = state {{ config = \"common\" }},
+              trans {{ src = \"initial\", tgt = \"idle\" }},
+              trans {{ src = \"idle\", tgt = \"on\", events = {{ \"e_start\", \"e_{name}_on\" }} }},
+              trans {{ src = \"on\", tgt = \"fault\", events = {{ \"common.failed\", \"common.broken\" }} }},
+              trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\", \"e_{name}_off\" }} }},
+              trans {{ src = \"fault\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},
+            }}"
+        )
+    };
+    let demo = Demo::new();
+    demo.write("arm.lua", &holds("arm"));
+    demo.write("gripper.lua", &holds("gripper"));
+    demo.write("conf.lua", "ConfiguratorConf { common = Configuration { description = \"what both need\" } }");
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ arm: arm.lua, gripper: gripper.lua }}
+deploy: {{ event: e_start, up: on, within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: [arm:idle, gripper:idle], within_s: 5 }}\n"
+        ),
+    );
+    let json = demo.run(&["check", "two.yaml", "--json"]).json();
+    assert_eq!(json["explored"]["together"], true, "{json:#}");
+    assert!(of_code(&json, "coord::refused_by_other").is_empty(), "{json:#}");
+}
