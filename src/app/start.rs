@@ -3,10 +3,10 @@
 use super::Checked;
 use crate::functions::Opener;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ident, Statechart};
+use crate::model::{Deployment, Ident, SimulatedReaction, Statechart};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
-use crate::platform::simulated::{self, Simulated};
+use crate::platform::simulated::{self, Simulated, StepPattern};
 use crate::session::{Session, Setup};
 use crate::statechart;
 use crate::time::Clock;
@@ -34,6 +34,17 @@ pub enum StartError {
 /// The platforms of this program.
 pub const PLATFORMS: &[&str] = &["embedded", "simulated"];
 
+/// What the deployment says that its components raise by themselves, for a simulated platform of one's own making.
+pub fn reactions(deployment: &Deployment) -> Vec<simulated::Reaction> {
+    let one = |reaction: &SimulatedReaction| simulated::Reaction {
+        on: StepPattern::new(&reaction.after),
+        after: reaction.delay,
+        raise: reaction.raise,
+        component: reaction.component,
+    };
+    deployment.reactions.iter().map(one).collect()
+}
+
 /// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
 ///
 /// # Errors
@@ -47,7 +58,8 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
     let platform: Arc<dyn Platform> = match deployment.platform.as_str() {
         "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
         "simulated" => {
-            Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), simulated::Options::default()))
+            let options = simulated::Options { reactions: reactions(deployment), ..simulated::Options::default() };
+            Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), options))
         }
         other => {
             return Err(StartError::UnknownPlatform {

@@ -101,9 +101,7 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Fin
                     let what = match components.intersection(touches).next() {
                         Some(component) => format!("`{component}`"),
                         None if one.id == other.id => "the same, being one configuration".to_owned(),
-                        None if *everything || *all => {
-                            "every component, by `_default`".to_owned()
-                        }
+                        None if *everything || *all => "every component, by `_default`".to_owned(),
                         None if one.group.is_some() && one.group == other.group => {
                             format!("the group `{}`", one.group.map_or("", |g| g.as_str()))
                         }

@@ -41,15 +41,19 @@ struct Check<'a> {
 }
 
 /// Which of a component's members is meant.
-#[derive(Clone, Copy)]
-enum Member {
+#[derive(Debug, Clone, Copy)]
+pub enum Member {
+    /// A port.
     Port,
+    /// A property.
     Property,
+    /// An operation.
     Operation,
 }
 
 impl Member {
-    fn words(self) -> (&'static str, &'static str, Code) {
+    /// What it is called, one and several, and the code of one that is not there.
+    pub fn words(self) -> (&'static str, &'static str, Code) {
         match self {
             Self::Port => ("port", "ports", UNKNOWN_PORT),
             Self::Property => ("property", "properties", UNKNOWN_PROPERTY),
@@ -57,7 +61,8 @@ impl Member {
         }
     }
 
-    fn of(self, ty: &ComponentType) -> Vec<&'static str> {
+    /// The names of those that a type has.
+    pub fn of(self, ty: &ComponentType) -> Vec<&'static str> {
         match self {
             Self::Port => ty.ports.keys().map(Ident::as_str).collect(),
             Self::Property => ty.properties.keys().map(Ident::as_str).collect(),

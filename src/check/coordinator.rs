@@ -188,6 +188,7 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let mut known: BTreeSet<&str> =
         deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
+    known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
     known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {

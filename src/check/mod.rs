@@ -13,6 +13,7 @@ mod monitors;
 mod product;
 mod purity;
 mod reactions;
+mod simulated;
 mod together;
 mod types;
 mod unheard;
@@ -101,6 +102,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let mut findings = types::check(deployment, catalogue);
     findings.extend(configurations::check(deployment, catalogue, &universe));
     findings.extend(monitors::check(deployment, &universe));
+    findings.extend(simulated::check(deployment, &universe));
     let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
     let mut charts = Vec::new();
     let mut all = 0;
@@ -124,6 +126,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         looked.explored.complete = true;
         looked.explored.without_failure = true;
         looked.findings.extend(monitors::events(deployment, &looked.charts));
+        looked.findings.extend(simulated::events(deployment, &looked.charts));
         if all == 1 {
             looked.at(deployment, 0, "");
         } else {

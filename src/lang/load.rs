@@ -447,6 +447,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         shutdown: joined.shutdown,
         limits: draft.limits,
         durability: draft.durability,
+        reactions: draft.reactions,
         origin,
         key_origins: draft.key_origins,
     })

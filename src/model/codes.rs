@@ -614,6 +614,18 @@ codes! {
     MONITOR_UNHEARD = "monitor::unheard", "nobody listens to an event of a monitor",
         "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
          watches in vain. The name may be misspelt in one of the two places.";
+    // ---- the simulated platform ------------------------------------------------------------------------------------
+    SIMULATED_UNKNOWN_STEP = "simulated::unknown_step", "a reaction of a simulated component names no step",
+        "`simulated: { reactions: [...] }` says what components raise by themselves after a step was done. The step is \
+         written as `davit plan` prints it, or with its beginning: `start radio`, `property_set radio.channel`, \
+         `operation_call arm.home`, or a verb alone for all of its steps. Here the first word is no step's, or what follows \
+         is no component or member.";
+    SIMULATED_UNHEARD = "simulated::unheard", "nobody listens to what a simulated component raises",
+        "A simulated component raises an event that no transition of a coordinator waits for, and no configuration is \
+         confirmed by it. It is probably misspelt; if not, it can be left out.";
+    SIMULATED_NOT_USED = "simulated::not_used", "`simulated` is said of another platform",
+        "What `simulated` says stands for the behaviour of components that the simulated platform does not run. On another \
+         platform the components behave by themselves, and it is not used.";
     // ---- recorded samples ------------------------------------------------------------------------------------------
     SAMPLES_UNREADABLE = "samples::unreadable", "a file of samples cannot be read",
         "The file does not exist, may not be read, or is no text in UTF-8. Samples are comma-separated values: a first \

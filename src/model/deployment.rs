@@ -4,7 +4,7 @@ use super::component_type::ComponentType;
 use super::configuration::Configuration;
 use super::finding::Origin;
 use super::monitor::Monitor;
-use super::names::{ConfigId, EventName, Ident};
+use super::names::{ComponentName, ConfigId, EventName, Ident};
 use super::program::Program;
 use super::statechart::Statechart;
 use serde::Serialize;
@@ -47,6 +47,8 @@ pub struct Deployment {
     pub limits: DeploymentLimits,
     /// How safely the journal is kept.
     pub durability: Durability,
+    /// What simulated components raise by themselves; nothing on other platforms.
+    pub reactions: Vec<SimulatedReaction>,
     /// Where it was written.
     pub origin: Origin,
     /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
@@ -69,6 +71,22 @@ pub struct Beside {
     /// Its state that means *down*.
     pub down: String,
     /// Where it was named.
+    pub origin: Origin,
+}
+
+/// What a component of the simulated platform raises by itself after a step was done: this stands for its behaviour, so
+/// that a coordinator meets the events it waits for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedReaction {
+    /// After each step whose text begins so, at a word's end: `start radio`, `operation_call arm.home`.
+    pub after: String,
+    /// So much later.
+    pub delay: Duration,
+    /// This event is raised.
+    pub raise: EventName,
+    /// By this component.
+    pub component: ComponentName,
+    /// Where it was written.
     pub origin: Origin,
 }
 

@@ -20,7 +20,9 @@ pub use component_type::{
     Catalogue, ComponentType, Direction, Effect, Irreversible, OperationType, PortType, PropertyType, Tunable,
 };
 pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy, StateEntry, Target};
-pub use deployment::{Activity, Beside, BringUp, Deployment, DeploymentLimits, Durability, TakeDown};
+pub use deployment::{
+    Activity, Beside, BringUp, Deployment, DeploymentLimits, Durability, SimulatedReaction, TakeDown,
+};
 pub use event::{Ask, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
 pub use monitor::Monitor;

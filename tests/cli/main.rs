@@ -6,6 +6,7 @@ mod commands;
 mod demo;
 mod explored;
 mod monitor;
+mod simulated;
 mod together;
 mod unasked;
 mod unheard;

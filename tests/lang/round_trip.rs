@@ -377,8 +377,14 @@ fn deployment() -> impl Strategy<Value = Deployment> {
         types.retain(|ty| seen.insert(ty.name));
         types
     });
+    let reaction =
+        ("(start|stop|create) [a-z]{1,4}", time(), event(), ident()).prop_map(|(after, delay, raise, name)| {
+            let component = ComponentName::new(name.as_str()).unwrap();
+            SimulatedReaction { after, delay, raise, component, origin: Origin::NONE }
+        });
     let limits = (1_usize..100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
-    let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, any::<bool>());
+    let ends = (any::<bool>(), vec(reaction, 0..3));
+    let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, ends);
     let beside = vec((ident(), chart(), path(), vec(path(), 0..2), path()), 0..2);
     let charts = (chart(), proptest::option::of(ident()), beside);
     (vec(ident(), 2..5), configurations(), charts, monitors(), parts).prop_map(
@@ -387,7 +393,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             configurations,
             (coordinator, first, beside),
             monitors,
-            (types, activities, emits, deploy, shutdown, limits, full),
+            (types, activities, emits, deploy, shutdown, limits, (full, reactions)),
         )| Deployment {
             name: names[0],
             platform: names[1],
@@ -410,6 +416,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             deploy,
             shutdown,
             limits,
+            reactions,
             durability: if full { Durability::Full } else { Durability::Relaxed },
             origin: Origin::NONE,
             key_origins: BTreeMap::new(),

@@ -1,11 +1,12 @@
 //! Deployment files: the keys of design §16. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
-use super::{Unit, choice, name, one_or_more, text, time, types, whole};
+use super::{Unit, choice, name, one_or_more, simulated, text, time, types, whole};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Openings, Origin, codes,
+    Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Openings, Origin,
+    SimulatedReaction, codes,
 };
 use std::collections::BTreeMap;
 
@@ -43,6 +44,8 @@ pub struct Draft {
     pub limits: DeploymentLimits,
     /// `durability`
     pub durability: Durability,
+    /// `simulated`
+    pub reactions: Vec<SimulatedReaction>,
     /// Where keys stand, by path.
     pub key_origins: BTreeMap<String, Origin>,
 }
@@ -129,6 +132,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     let durability = fields.take("durability").and_then(|node| {
         choice(cx, &node, "`durability`", &[("full", Durability::Full), ("relaxed", Durability::Relaxed)])
     });
+    let reactions = fields.take("simulated").map(|node| simulated::reactions(cx, node)).unwrap_or_default();
     fields.finish(cx);
     Some(Draft {
         name: deployment,
@@ -147,6 +151,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         shutdown,
         limits,
         durability: durability.unwrap_or_default(),
+        reactions,
         key_origins,
     })
 }

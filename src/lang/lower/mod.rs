@@ -6,6 +6,7 @@ pub mod condition;
 pub mod configuration;
 pub mod deployment;
 pub mod monitor;
+mod simulated;
 pub mod types;
 
 use super::tree::{Cx, Kind, Node};

@@ -379,6 +379,20 @@ pub fn deployment_yaml(
     _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within} }}");
     let (stack, timeout) = (d.limits.stack, seconds(d.limits.step_timeout));
     _ = writeln!(out, "limits: {{ stack: {stack}, step_timeout_s: {timeout} }}");
+    if !d.reactions.is_empty() {
+        out.push_str("simulated:\n  reactions:\n");
+    }
+    for reaction in &d.reactions {
+        let delay =
+            if reaction.delay.is_zero() { String::new() } else { format!("delay_s: {}, ", seconds(reaction.delay)) };
+        _ = writeln!(
+            out,
+            "    - {{ after: {}, {delay}raise: {}, component: {} }}",
+            text(&reaction.after),
+            t(&reaction.raise),
+            t(&reaction.component)
+        );
+    }
     let durability = match d.durability {
         Durability::Full => "full",
         Durability::Relaxed => "relaxed",
