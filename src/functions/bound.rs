@@ -58,6 +58,10 @@ pub struct Bound {
     pub events: RefCell<Option<Table>>,
     /// Words that functions are called with.
     pub words: Words,
+    /// The model has a `dbg` printer of its own.
+    pub traces: Cell<bool>,
+    /// The printer of those that have none.
+    quiet: Value,
     /// What a step hook raised: ends a step of an inner machine.
     pub failed: RefCell<Option<mlua::Error>>,
     /// Stepped by Davit, not by Lua.
@@ -75,6 +79,8 @@ pub struct Words {
     pub exit: LuaString,
     pub effect: LuaString,
     pub doo: LuaString,
+    pub pre_step: LuaString,
+    pub post_step: LuaString,
 }
 
 /// Why a machine could not be made of its tables.
@@ -171,7 +177,16 @@ impl Bound {
             status: RefCell::new(Status { room: limits::CHART_QUEUE, ..Status::default() }),
             thread: RefCell::default(),
             events: RefCell::default(),
-            words: Words { entry: word("entry")?, exit: word("exit")?, effect: word("effect")?, doo: word("doo")? },
+            words: Words {
+                entry: word("entry")?,
+                exit: word("exit")?,
+                effect: word("effect")?,
+                doo: word("doo")?,
+                pre_step: word("pre_step_hook")?,
+                post_step: word("post_step_hook")?,
+            },
+            traces: Cell::new(false),
+            quiet: host.native.raw_get("quiet")?,
             failed: RefCell::default(),
             driven: Cell::new(false),
             machine: RefCell::new(Some(machine)),
@@ -179,6 +194,12 @@ impl Bound {
             idle_hook: given("idle_hook")?,
             chart: Rc::new(chart),
         })
+    }
+
+    /// Looks whether there is a `dbg` printer that wants to hear of what happens; it may come and go between steps.
+    pub fn look_for_dbg(&self) {
+        let dbg = self.fsm.raw_get::<Value>("dbg");
+        self.traces.set(dbg.is_ok_and(|dbg| matches!(dbg, Value::Function(_)) && dbg != self.quiet));
     }
 
     /// What an event is in Lua.

@@ -3,12 +3,13 @@
 use super::bound::Bound;
 use super::budget::resuming;
 use super::host::Host;
+use super::tracing;
 use crate::limits;
 use crate::model::EventName;
 use crate::model::statechart::FunctionId;
-use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printer, Queue, Said, View};
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printer, Queue, Said, Trace, View};
 use mlua::thread::ThreadStatus;
-use mlua::{Lua, Result, Table, Value};
+use mlua::{Lua, LuaString, Result, Table, Value};
 use std::rc::Rc;
 
 /// Calls the functions of one machine.
@@ -27,7 +28,7 @@ impl std::fmt::Debug for Calls {
 
 impl Calls {
     /// Calls a step hook with the step's events; answers the events it appended.
-    fn step_hook(&self, field: &str, view: &mut View<'_>, added: Option<&mut Vec<EventId>>) {
+    fn step_hook(&self, field: &LuaString, view: &mut View<'_>, added: Option<&mut Vec<EventId>>) {
         let bound = &self.bound;
         let Ok(Value::Function(hook)) = bound.fsm.raw_get(field) else { return };
         let before = view.events.len();
@@ -46,7 +47,9 @@ impl Calls {
                 }
             }
             // rFSM lets it end the step; who steps by himself is told, who is stepped reads of it.
-            Err(error) if bound.driven.get() => bound.complain("HOOK", &format!("error executing {field}: "), &error),
+            Err(error) if bound.driven.get() => {
+                bound.complain("HOOK", &format!("error executing {}: ", field.to_string_lossy()), &error);
+            }
             Err(error) => {
                 bound.failed.borrow_mut().get_or_insert(error);
             }
@@ -61,6 +64,9 @@ impl Calls {
 
     fn resumed(&self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Result<Doo> {
         let bound = &self.bound;
+        if bound.traces.get() && bound.thread.borrow().is_none() {
+            tracing::tell_doo(&self.lua, bound, "begins:", state, view);
+        }
         let thread = {
             let mut kept = bound.thread.borrow_mut();
             match &*kept {
@@ -122,6 +128,14 @@ impl Hook for Calls {
 
     fn said(&mut self, said: &mut Vec<Said>) {
         self.bound.voice.drain(said);
+    }
+
+    fn traces(&self) -> bool {
+        self.bound.traces.get()
+    }
+
+    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+        tracing::tell(&self.lua, &self.bound, what, view);
     }
 
     fn polls(&self) -> bool {
@@ -188,11 +202,11 @@ impl Hook for Calls {
 
     fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
         *self.bound.events.borrow_mut() = None;
-        self.step_hook("pre_step_hook", view, Some(added));
+        self.step_hook(&self.bound.words.pre_step, view, Some(added));
     }
 
     fn after_step(&mut self, view: &mut View<'_>) {
-        self.step_hook("post_step_hook", view, None);
+        self.step_hook(&self.bound.words.post_step, view, None);
         let mut status = self.bound.status.borrow_mut();
         status.leaf = view.leaf;
     }
@@ -257,6 +271,9 @@ impl Hook for Calls {
             Ok(Doo::Finished) => {
                 self.bound.status.borrow_mut().through = true;
                 *self.bound.thread.borrow_mut() = None;
+                if self.bound.traces.get() {
+                    tracing::tell_doo(&self.lua, &self.bound, "is through:", state, view);
+                }
                 Doo::Finished
             }
             Ok(doo) => doo,
@@ -273,6 +290,9 @@ impl Hook for Calls {
     fn go_on(&mut self) -> bool {
         let bound = &self.bound;
         if !bound.idle_hook || bound.driven.get() {
+            if bound.traces.get() {
+                tracing::tell_idle(&self.lua, bound);
+            }
             return false;
         }
         let Ok(Value::Function(hook)) = bound.fsm.raw_get("idle_hook") else { return false };

@@ -15,6 +15,7 @@ mod host;
 mod lower;
 mod native;
 mod open;
+mod tracing;
 mod values;
 #[cfg(target_os = "linux")]
 mod watch;

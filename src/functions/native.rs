@@ -276,6 +276,7 @@ fn flush(bound: &Bound) {
 /// rFSM's step: turns until `steps` of them counted or nothing is left to do.
 fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps: f64) -> Result<bool> {
     let mut calls = Calls { lua: lua.clone(), bound: bound.clone(), _host: None };
+    bound.look_for_dbg();
     let mut left = steps;
     for _ in 0..limits::CHART_RUN {
         let now = now(host)?;

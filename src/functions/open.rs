@@ -162,6 +162,7 @@ impl Opener {
         host.voice.drain(&mut said);
         said.into_iter().filter(|line| line.by == Printer::Err).for_each(|line| host.voice.say(line.by, &line.text));
         bound.driven.set(true);
+        bound.look_for_dbg();
         // In simulated time every run is to be like every other, so what decides is what was counted.
         if !simulated {
             host.budget.count_late(&lua);

@@ -2,13 +2,13 @@
 //! rFSM's names of today and of old.
 //!
 //! A file is read as a pure one first: where that succeeds it is one, with the stricter reading that catches typing
-//! errors. Only where it does not is it run as a trusted one.
+//! errors (unless its host functions feed it: `getevents`, `idle_hook`). Only where it does not is it run as a trusted one.
 
 use super::files::Sources;
 use super::lower::chart;
 use super::lua;
 use super::params::Params;
-use super::tree::{Cx, Kind, Node, Reading};
+use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::diagnostics::{FileId, Language};
 use crate::functions::{self, NotOpened, Spot};
 use crate::model::finding::nearest;
@@ -60,10 +60,11 @@ pub fn read(
     let before = cx.findings.len();
     let loads = lua::Loads { from: from.clone(), folder: folder(path) };
     let strict = lua::read(cx, reading, params, stem, Some(loads)).and_then(|made| made.chart);
+    let asks_its_host = strict.as_ref().is_some_and(asks_its_host);
     let strict = strict.and_then(|node| chart::statechart(cx, node));
     let strict_findings: Findings = cx.findings.split_off(before);
     let errors = || strict_findings.iter().filter(|f| f.severity == crate::model::Severity::Error);
-    if errors().next().is_none() && strict.is_some() && trust.host.is_empty() {
+    if errors().next().is_none() && strict.is_some() && trust.host.is_empty() && !asks_its_host {
         cx.findings.extend(strict_findings);
         return strict.map(|chart| (chart, None));
     }
@@ -72,6 +73,15 @@ pub fn read(
         return None;
     }
     open(cx, from, path, reading, params, trust)
+}
+
+/// Whether a chart has functions that say what happens to it, though none of its own. Printers only tell, so a chart with
+/// them stays pure.
+fn asks_its_host(root: &Node) -> bool {
+    let Kind::Made(_, fields, _) = &root.kind else { return false };
+    let says =
+        |entry: &Entry| matches!(&*entry.key, "getevents" | "idle_hook") && matches!(entry.value.kind, Kind::Function);
+    fields.iter().any(says)
 }
 
 fn folder(path: &Path) -> PathBuf {

@@ -42,6 +42,8 @@ impl EventId {
     pub const OTHER: Self = Self(u32::MAX);
     /// The event of the first entry, when no transition lists it.
     pub(super) const INIT: Self = Self(u32::MAX - 1);
+    /// No event: the completion of a leaf that no chart has room for.
+    pub(super) const NEVER: Self = Self(u32::MAX - 2);
     const DONE: u32 = 1 << 31;
     const STRANGE: u32 = 1 << 30;
 

@@ -2,6 +2,7 @@
 
 use super::chart::{Chart, NodeId};
 use super::queue::Queue;
+use super::trace::Trace;
 use super::{EdgeId, EventId};
 use crate::model::names::EventName;
 use crate::model::statechart::FunctionId;
@@ -94,6 +95,16 @@ pub trait Hook {
     /// Whether turns are to be taken now and then even when no event waits: the model asks outside for events.
     fn polls(&self) -> bool {
         false
+    }
+
+    /// Whether [`trace`](Self::trace) is wanted just now.
+    fn traces(&self) -> bool {
+        false
+    }
+
+    /// What happens, told to a model's own `dbg` printer.
+    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+        let _ = (what, view);
     }
 
     /// A state is active now; its entry actions follow.
@@ -233,6 +244,14 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
 
     fn polls(&self) -> bool {
         self.functions.polls()
+    }
+
+    fn traces(&self) -> bool {
+        self.functions.traces()
+    }
+
+    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+        self.functions.trace(what, view);
     }
 
     fn entered(&mut self, chart: &Chart, state: NodeId) {

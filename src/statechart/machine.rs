@@ -6,6 +6,8 @@ use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
 use super::outcome::{Ended, Mode, Step, Stepped};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
+use super::timers::Armed;
+use super::trace::Trace;
 use crate::limits;
 use crate::time::Time;
 
@@ -23,20 +25,9 @@ pub struct Machine {
     /// By node: how often it was entered.
     pub(super) visits: Vec<u32>,
     /// By time event.
-    timers: Vec<Armed>,
+    pub(super) timers: Vec<Armed>,
     pub(super) search: Search,
     chain: Vec<NodeId>,
-}
-
-/// A time event of one visit.
-#[derive(Debug, Clone, Copy)]
-struct Armed {
-    /// When its state was entered.
-    entered: Time,
-    /// Fires when more nanoseconds than this have passed.
-    nanos: i64,
-    /// It was, in this visit; or it never is.
-    raised: bool,
 }
 
 impl Machine {
@@ -51,11 +42,7 @@ impl Machine {
             events: Vec::with_capacity(limits::CHART_QUEUE),
             added: Vec::new(),
             visits: vec![0; chart.nodes.len()],
-            timers: chart
-                .timers
-                .iter()
-                .map(|timer| Armed { entered: Time::default(), nanos: timer.nanos, raised: false })
-                .collect(),
+            timers: chart.timers.iter().map(Armed::at_start).collect(),
             search: Search::new(chart),
             chain: Vec::with_capacity(depth),
         };
@@ -167,21 +154,6 @@ impl Machine {
         (0..self.path.len()).any(|i| self.find(chart, self.path[i].0, &mut Nobody) != NONE)
     }
 
-    /// The first moment at which a time event of an active state is due; none if no time event is to come.
-    pub fn next_deadline(&self, chart: &Chart) -> Option<Time> {
-        if chart.timers.is_empty() {
-            return None;
-        }
-        let due = |node: &NodeId| {
-            let index = chart.nodes[node.index()].timer;
-            let timer = chart.timers.get(index as usize)?;
-            let armed = self.timers[index as usize];
-            (!armed.raised)
-                .then(|| first_after(if timer.relative { armed.entered } else { Time::default() }, armed.nanos))
-        };
-        self.path.iter().filter_map(due).min()
-    }
-
     /// What rFSM's `step(fsm, steps)` does: turns until `steps` of them counted, or nothing is left to do. A turn whose
     /// events match no transition does not count.
     pub fn step(&mut self, chart: &Chart, now: Time, steps: u64, hook: &mut impl Hook) -> Stepped {
@@ -253,7 +225,7 @@ impl Machine {
             self.transit(chart, now, hook)
         };
         if step != Step::NotEntered {
-            self.check_timers(chart, now);
+            self.check_timers(chart, now, hook);
             hook.after_step(&mut self.view(chart));
         }
         step
@@ -271,7 +243,7 @@ impl Machine {
         rests
     }
 
-    fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
+    pub(super) fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
         View { chart, active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
     }
 
@@ -288,6 +260,7 @@ impl Machine {
             return Step::NotEntered;
         }
         self.enter(chart, NodeId::ROOT, now, hook);
+        self.trace_path(chart, way, hook);
         self.execute(chart, way, now, hook);
         Step::Entered
     }
@@ -295,8 +268,10 @@ impl Machine {
     /// The outermost active state with a complete path wins, whatever the priorities further in.
     fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
         self.search.begin();
+        self.trace(chart, Trace::Searching, hook);
         for i in 0..self.path.len() {
             let node = self.path[i];
+            self.trace(chart, Trace::Checking(node), hook);
             if chart.nodes[node.index()].out.len == 0 {
                 continue;
             }
@@ -305,6 +280,7 @@ impl Machine {
                 match self.search.straight(chart, node.0, &self.events) {
                     Straight::None => continue,
                     Straight::Leaf(edge) => {
+                        self.trace(chart, Trace::Path(&[EdgeId(edge)]), hook);
                         hook.taking(chart, EdgeId(edge));
                         let row = &chart.edges[edge as usize];
                         self.segment(chart, edge, NodeId(row.lca), now, hook);
@@ -315,10 +291,12 @@ impl Machine {
             }
             let way = self.find(chart, node.0, hook);
             if way != NONE {
+                self.trace_path(chart, way, hook);
                 self.execute(chart, way, now, hook);
                 return Step::Taken;
             }
         }
+        self.trace(chart, Trace::NotFound, hook);
         Step::Unmatched
     }
 
@@ -332,7 +310,9 @@ impl Machine {
                 Doo::Yielded { idle: content } => idle = content,
                 Doo::Finished => {
                     self.mode = Mode::Done;
-                    self.queue.push(chart.nodes[leaf.index()].done);
+                    let done = chart.nodes[leaf.index()].done;
+                    self.trace(chart, Trace::Raised(done), hook);
+                    self.queue.push(done);
                 }
                 Doo::Failed => self.mode = Mode::Done,
             }
@@ -372,12 +352,15 @@ impl Machine {
     fn segment(&mut self, chart: &Chart, edge: u32, owner: NodeId, now: Time, hook: &mut impl Hook) -> bool {
         let row = &chart.edges[edge as usize];
         let keep = row.keep as usize;
+        self.trace(chart, Trace::Leaving(EdgeId(edge)), hook);
         while self.path.len() > keep {
             self.exit(chart, owner, hook);
         }
+        self.trace(chart, Trace::Effect(EdgeId(edge)), hook);
         if row.effect.len > 0 {
             self.act(chart, row.effect, Place::Effect(EdgeId(edge)), owner, hook);
         }
+        self.trace(chart, Trace::Entering(EdgeId(edge)), hook);
         let target = &chart.nodes[row.tgt as usize];
         let into = if target.kind == Kind::Connector { target.parent } else { row.tgt };
         let depth = chart.nodes[into as usize].depth as usize;
@@ -413,6 +396,7 @@ impl Machine {
         if row.kind == Kind::Leaf {
             self.leaf = None;
         }
+        self.trace(chart, Trace::Left(state), hook);
     }
 
     /// Enters all states from below the innermost active one down to `state`.
@@ -443,9 +427,11 @@ impl Machine {
                 hook.doo_reset(state);
             } else {
                 self.mode = Mode::Done;
+                self.trace(chart, Trace::Raised(row.done), hook);
                 self.queue.push(row.done);
             }
         }
+        self.trace(chart, Trace::Entered(state), hook);
     }
 
     fn act(&mut self, chart: &Chart, ops: Span, place: Place, owner: NodeId, hook: &mut impl Hook) {
@@ -458,42 +444,4 @@ impl Machine {
             }
         }
     }
-
-    pub(super) fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time, hook: &mut impl Hook) {
-        let index = chart.nodes[state.index()].timer as usize;
-        let Some(timer) = chart.timers.get(index) else { return };
-        let mut armed = Armed { entered: now, nanos: timer.nanos, raised: false };
-        if let Some(function) = timer.by {
-            let seconds = hook.seconds(function, state, &mut self.view(chart)).filter(|s| !s.is_nan());
-            armed.raised = seconds.is_none();
-            #[allow(clippy::cast_possible_truncation)] // saturates: 292 years
-            let nanos = (seconds.unwrap_or_default() * 1e9).round() as i64;
-            armed.nanos = nanos;
-        }
-        self.timers[index] = armed;
-    }
-
-    /// After a turn: time events of the active states that are due, from the leaf outwards, each once a visit. What is
-    /// raised here is seen in the next turn, even if this one was idle.
-    pub(super) fn check_timers(&mut self, chart: &Chart, now: Time) {
-        if chart.timers.is_empty() {
-            return;
-        }
-        for node in self.path.iter().rev() {
-            let index = chart.nodes[node.index()].timer;
-            let Some(timer) = chart.timers.get(index as usize) else { continue };
-            let armed = &mut self.timers[index as usize];
-            let since = if timer.relative { armed.entered } else { Time::default() };
-            if !armed.raised && now >= first_after(since, armed.nanos) {
-                armed.raised = true;
-                self.queue.push(timer.event);
-            }
-        }
-    }
-}
-
-/// The first moment that is *more* than so many nanoseconds after `since`.
-fn first_after(since: Time, nanos: i64) -> Time {
-    let first = i128::from(since.as_nanos()) + i128::from(nanos) + 1;
-    Time(u64::try_from(first.max(0)).unwrap_or(u64::MAX))
 }

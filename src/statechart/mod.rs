@@ -21,6 +21,8 @@ mod reactions;
 mod resolve;
 mod search;
 mod sim;
+mod timers;
+mod trace;
 
 pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
 pub use compile::compile;
@@ -30,3 +32,4 @@ pub use outcome::{Ended, Mode, Step, Stepped};
 pub use queue::Queue;
 pub use reactions::AtOnce;
 pub use sim::{Observation, Sim, SimError};
+pub use trace::Trace;

@@ -23,19 +23,37 @@ struct Reaction {
     leaf: NodeId,
     /// How many states from the root inwards stay active.
     keep: u32,
-    /// The states entered, outermost first.
-    entered: Span,
+    /// The states entered before the leaf, outermost first.
+    around: Span,
     /// What is raised, in order, with its owner.
     raised: Span,
+}
+
+/// What is known of one node. Its first row stands here itself: most leaves have only one or two, and to find the leaf, then
+/// its rows, then the row would be three looks into memory that wait for each other.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    first: Reaction,
+    /// The other rows, sorted by event.
+    more: Span,
+}
+
+impl Known {
+    /// Nothing is known.
+    const NONE: Self = {
+        let none = Span { start: 0, len: 0 };
+        let first = Reaction { event: EventId::NEVER, leaf: NodeId::ROOT, keep: 0, around: none, raised: none };
+        Self { first, more: none }
+    };
 }
 
 /// The reactions of a chart.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reactions {
-    /// By node: its rows, sorted by event; empty for all but leaves.
-    of: Vec<Span>,
+    /// By node; nothing is known but of leaves.
+    of: Vec<Known>,
     rows: Vec<Reaction>,
-    entered: Vec<NodeId>,
+    around: Vec<NodeId>,
     raised: Vec<(EventName, NodeId)>,
 }
 
@@ -61,22 +79,26 @@ impl Machine {
             return AtOnce::No;
         }
         let all = &chart.reactions;
-        let Some(rows) = all.of.get(leaf.index()) else { return AtOnce::No };
-        let rows = rows.of(&all.rows);
-        // Few rows are gone through faster than searched.
-        let found = if rows.len() <= 8 {
-            rows.iter().find(|row| row.event == event)
+        let Some(known) = all.of.get(leaf.index()) else { return AtOnce::No };
+        let row = if known.first.event == event {
+            &known.first
         } else {
-            rows.binary_search_by_key(&event, |row| row.event).ok().map(|at| &rows[at])
+            let rows = known.more.of(&all.rows);
+            // Few rows are gone through faster than searched.
+            let found = if rows.len() <= 8 {
+                rows.iter().find(|row| row.event == event)
+            } else {
+                rows.binary_search_by_key(&event, |row| row.event).ok().map(|at| &rows[at])
+            };
+            let Some(row) = found else { return AtOnce::No };
+            row
         };
-        let Some(row) = found else { return AtOnce::No };
         self.search.looked_at(1);
         self.path.truncate(row.keep as usize);
-        for state in row.entered.of(&all.entered) {
-            self.path.push(*state);
-            let visits = &mut self.visits[state.index()];
-            *visits = visits.wrapping_add(1);
+        for state in row.around.of(&all.around) {
+            self.visit_next(*state);
         }
+        self.visit_next(row.leaf);
         self.leaf = Some(row.leaf);
         self.mode = Mode::Done;
         for (name, owner) in row.raised.of(&all.raised) {
@@ -85,14 +107,21 @@ impl Machine {
         if chart.timers.is_empty() { AtOnce::Rests } else { self.time_after(chart, *row, now) }
     }
 
+    #[inline]
+    fn visit_next(&mut self, state: NodeId) {
+        self.path.push(state);
+        let visits = &mut self.visits[state.index()];
+        *visits = visits.wrapping_add(1);
+    }
+
     /// Time events after a reaction: those of the entered states begin anew, and those that are due are raised.
     #[cold]
     fn time_after(&mut self, chart: &Chart, row: Reaction, now: Time) -> AtOnce {
-        for state in row.entered.of(&chart.reactions.entered) {
+        for state in row.around.of(&chart.reactions.around).iter().chain([&row.leaf]) {
             self.restart_timer(chart, *state, now, &mut Nobody);
         }
         self.queue.push(chart.nodes[row.leaf.index()].done);
-        self.check_timers(chart, now);
+        self.check_timers(chart, now, &mut Nobody);
         if self.queue.events.len() == 1 {
             self.queue.events.clear();
             AtOnce::Rests
@@ -119,13 +148,14 @@ impl Machine {
 impl Reactions {
     /// Asks the engine what each event that a leaf or a state around it lists does to that leaf.
     pub(super) fn of(chart: &Chart) -> Self {
-        let mut reactions = Self { of: vec![Span::default(); chart.nodes.len()], ..Self::default() };
+        let mut reactions = Self { of: vec![Known::NONE; chart.nodes.len()], ..Self::default() };
         if !chart.pure {
             return Self::default();
         }
         let mut machine = Machine::new(chart);
         let mut events = Vec::new();
         let mut notes = Notes::default();
+        let mut firsts = 0;
         for leaf in chart.nodes().filter(|node| chart.kind(*node) == Kind::Leaf) {
             events.clear();
             let mut at = Some(leaf);
@@ -141,17 +171,27 @@ impl Reactions {
             events.sort_unstable();
             events.dedup();
             let start = reactions.rows.len();
+            let mut first = None;
             for event in &events {
                 machine.place(chart, leaf, Time::default());
                 notes.clear();
                 machine.send(*event);
                 let step = machine.turn(chart, Time::default(), &mut notes);
                 if step == Step::Taken && notes.plain && machine.rest::<Notes>(chart) {
-                    reactions.add(*event, &machine, &notes);
+                    let row = reactions.row(*event, &machine, &notes);
+                    if let Some(row) = row
+                        && first.is_some()
+                    {
+                        reactions.rows.push(row);
+                    }
+                    first = first.or(row);
                 }
             }
-            reactions.of[leaf.index()] = span(start, reactions.rows.len());
-            let size = reactions.rows.len() + reactions.entered.len() + reactions.raised.len();
+            if let Some(first) = first {
+                reactions.of[leaf.index()] = Known { first, more: span(start, reactions.rows.len()) };
+            }
+            firsts += usize::from(first.is_some());
+            let size = firsts + reactions.rows.len() + reactions.around.len() + reactions.raised.len();
             if size > limits::CHART_REACTIONS {
                 return reactions;
             }
@@ -159,19 +199,22 @@ impl Reactions {
         reactions
     }
 
-    fn add(&mut self, event: EventId, machine: &Machine, notes: &Notes) {
-        let Some(leaf) = machine.leaf else { return };
-        let (entered, raised) = (self.entered.len(), self.raised.len());
-        self.entered.extend_from_slice(&notes.entered);
+    /// What the machine just did, as a row.
+    fn row(&mut self, event: EventId, machine: &Machine, notes: &Notes) -> Option<Reaction> {
+        let leaf = machine.leaf?;
+        let (entered, around) = notes.entered.split_last()?;
+        debug_assert_eq!(*entered, leaf, "a transition ends in the leaf it enters last");
+        let starts = (self.around.len(), self.raised.len());
+        self.around.extend_from_slice(around);
         self.raised.extend_from_slice(&notes.raised);
         let keep = machine.path.len() - notes.entered.len();
-        self.rows.push(Reaction {
+        Some(Reaction {
             event,
             leaf,
             keep: u32::try_from(keep).expect("less deep than ids are many"),
-            entered: span(entered, self.entered.len()),
-            raised: span(raised, self.raised.len()),
-        });
+            around: span(starts.0, self.around.len()),
+            raised: span(starts.1, self.raised.len()),
+        })
     }
 }
 

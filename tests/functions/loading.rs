@@ -121,7 +121,7 @@ fn the_legacy_dialect_is_read() {
     assert_eq!(sim.line("").unwrap().active, ["root", "root.a"]);
     let seen = sim.line("jnt01234vel.e_VEL_ZERO_false").unwrap();
     assert_eq!(seen.active, ["root", "root.b"]);
-    assert_eq!(seen.notes, ["b {} x"]);
+    assert_eq!(seen.notes, ["b {} x", "name: STATE_ENTER root.b"]);
 }
 
 #[test]
@@ -150,4 +150,22 @@ fn a_file_that_makes_another_chart_the_second_time_is_refused() {
     let failure = (0..2).find_map(|_| opener.open(None).map(|functions| kept.push(functions)).err());
     let failure = failure.expect("two states side by side see different numbers");
     assert!(failure.message.contains("another chart"), "{failure}");
+}
+
+#[test]
+fn a_chart_that_asks_its_host_for_events_is_not_taken_for_a_pure_one() {
+    let text = |field: &str| {
+        format!(
+            "local n = 0 return rfsm.state {{ {field}, a = rfsm.state {{}}, b = rfsm.state {{}},
+              rfsm.trans {{ src='initial', tgt='a' }}, rfsm.trans {{ src='a', tgt='b', events={{'e'}} }} }}"
+        )
+    };
+    let asked = Model::new(&text("getevents = function() n = n + 1 return n == 3 and { 'e' } or {} end"));
+    let seen = asked.play(&["run", "run"]);
+    assert_eq!(seen[1].active.last().unwrap(), "root.b", "{seen:?}");
+    let idle =
+        Model::new(&text("idle_hook = function(fsm) n = n + 1 if n == 1 then rfsm.send_events(fsm, 'e') end end"));
+    assert!(!idle.is_pure());
+    // Printers only tell: what they are told of does not depend on them.
+    assert!(Model::new(&text("dbg = function() end, err = function() end")).is_pure());
 }

@@ -1,6 +1,7 @@
 //! Coordinators with functions: what they may do, what they are given, and what becomes of those that misbehave.
 
 mod confirmed;
+mod dbg;
 mod deployed;
 mod faults;
 mod guide;

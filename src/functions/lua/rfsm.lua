@@ -345,7 +345,7 @@ local function flatten(fsm)
   go(fsm, 1, 0)
   return list
 end
-native.flatten = flatten
+native.flatten, native.quiet = flatten, quiet
 
 -- For the loader: the tables of a machine that may be faulty, without a word; whether it could run.
 function native.tables(template)
@@ -390,6 +390,15 @@ function rfsm.run(fsm) return native.step(fsm, math.huge) end
 
 function rfsm.send_events(fsm, ...)
   if not rfsm.is_initialized_root(fsm) then error("ERROR send_events: invalid fsm argument", 2) end
+  if fsm.dbg ~= quiet and type(fsm.dbg) == "function" then
+    local texts = {}
+    for i = 1, select("#", ...) do
+      local event = select(i, ...)
+      if event == nil then break end
+      texts[i] = tostring(event)
+    end
+    fsm.dbg("RAISED", table.concat(texts, ", "))
+  end
   native.send(fsm, ...)
 end
 
