@@ -12,8 +12,8 @@ use std::path::PathBuf;
 /// What component types offer: ports, properties, operations, with types, units, limits and what can be undone.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A deployment file (then: the types it may use), or a type (then: that one in full); without either, all types of
-    /// this program's libraries.
+    /// A deployment file (then: the types it may use), or a type, with or without its library's name (then: that one in
+    /// full); without either, all types of this program's libraries.
     #[arg(value_name = "FILE|TYPE")]
     what: Option<String>,
     /// With a file: show this type in full.
@@ -67,7 +67,10 @@ impl Args {
             None if self.json => out.json(&catalogue.iter().collect::<Vec<_>>()),
             None => list(out, &catalogue),
             Some(name) => {
-                let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name) else {
+                let mut by_last = catalogue.iter().filter(|ty| ty.name.as_str().rsplit('.').next() == Some(&name));
+                // The name alone will do while only one library has it.
+                let only = by_last.next().filter(|_| by_last.next().is_none());
+                let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name).or(only) else {
                     return Err(Failure::no(
                         CLI_UNKNOWN_TYPE,
                         format!("there is no component type `{name}`"),

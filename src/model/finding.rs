@@ -159,12 +159,18 @@ pub fn configuration(finding: &Finding) -> Option<&str> {
     Some(rest.split('.').next().unwrap_or(rest))
 }
 
-/// The known name nearest to `name`, if one is near enough to be what was meant.
+/// The known name nearest to `name`, if one is near enough to be what was meant: as a whole, or, where `name` has one part
+/// only, by its last part (`Gian` for `standard.Gain`).
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let near = |candidate: &str| strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
     known
         .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase()), candidate))
-        .filter(|(score, candidate)| *score > 0.8 && *candidate != name)
+        .filter(|candidate| *candidate != name)
+        .map(|candidate| match candidate.rsplit_once('.') {
+            Some((_, last)) if !name.contains('.') => (near(candidate).max(near(last)), candidate),
+            _ => (near(candidate), candidate),
+        })
+        .filter(|(score, _)| *score > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
         .map(|(_, candidate)| candidate)
 }
@@ -181,4 +187,20 @@ pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = 
     let shown: Vec<String> = known.iter().take(8).map(|k| format!("`{k}`")).collect();
     let more = if known.len() > 8 { format!(" and {} more", known.len() - 8) } else { String::new() };
     format!("known {what}: {}{more}", shown.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_names_are_found_as_a_whole_and_by_their_last_part() {
+        let known = ["standard.Gain", "standard.Constant", "youbot.Dynamics"];
+        assert_eq!(nearest("Gian", known), Some("standard.Gain"));
+        assert_eq!(nearest("Gain", known), Some("standard.Gain"));
+        assert_eq!(nearest("yubot.Dynamics", known), Some("youbot.Dynamics"));
+        assert_eq!(nearest("Winch", known), None);
+        assert_eq!(nearest("other.Winch", known), None);
+        assert_eq!(nearest("arm", ["arm"]), None, "itself is no help");
+    }
 }

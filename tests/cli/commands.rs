@@ -230,6 +230,12 @@ fn types_are_listed_and_shown() {
     let one = demo.run(&["types", "deployment.yaml", "Source"]).out;
     assert!(one.contains("0 … 10") && one.contains("reset(float)") && one.contains("irreversible"), "{one}");
     assert!(at_home(&["types"]).out.contains("youbot."));
+    assert_eq!(
+        at_home(&["types", "Gain"]).out,
+        at_home(&["types", "standard.Gain"]).out,
+        "its library need not be said"
+    );
+    assert!(at_home(&["types", "Gian"]).err.contains("did you mean `standard.Gain`?"));
     let wrong = demo.run(&["types", "deployment.yaml", "Sorce", "--json"]);
     assert_eq!(wrong.code, 1);
     assert_eq!(wrong.json()["findings"][0]["code"], "cli::unknown_type");

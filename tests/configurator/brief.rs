@@ -3,7 +3,7 @@
 use crate::rig::*;
 use davit::model::*;
 use davit::platform::simulated::{Options, Simulated};
-use davit::platform::{Ended, EventSink, Execution, ObserveError, Outcome, Platform};
+use davit::platform::{Ended, Execution, Outcome, Platform};
 use davit::time::Time;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -47,9 +47,8 @@ impl Hasty {
 }
 
 impl Platform for Hasty {
-    fn catalogue(&self) -> &Catalogue {
-        self.inner.catalogue()
-    }
+    leaves_to_inner!();
+
     fn execution(&self, step: &Step) -> Execution {
         match step {
             Step::Create { .. } | Step::Destroy { .. } => Execution::Brief,
@@ -85,22 +84,6 @@ impl Platform for Hasty {
             }
             _ => self.each(&steps, each, until),
         }
-    }
-    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
-        self.inner.observe(deadline)
-    }
-    fn observe_component(
-        &self,
-        component: ComponentName,
-        deadline: Time,
-    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
-        self.inner.observe_component(component, deadline)
-    }
-    fn subscribe(&self, sink: EventSink) {
-        self.inner.subscribe(sink);
-    }
-    fn quarantined(&self) -> Vec<ComponentName> {
-        self.inner.quarantined()
     }
 }
 

@@ -28,34 +28,17 @@ impl Prepared for Counted {
 }
 
 impl Platform for Counting {
-    fn catalogue(&self) -> &Catalogue {
-        self.inner.catalogue()
-    }
+    leaves_to_inner!();
+
     fn execution(&self, step: &Step) -> Execution {
         self.inner.execution(step)
     }
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
         Platform::execute(&self.inner, step, deadline)
     }
-    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
-        self.inner.observe(deadline)
-    }
-    fn observe_component(
-        &self,
-        component: ComponentName,
-        deadline: Time,
-    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
-        self.inner.observe_component(component, deadline)
-    }
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
         let prepared = self.prepared.clone();
         self.inner.prepare(steps).map(|inner| Box::new(Counted { inner, prepared }) as _)
-    }
-    fn subscribe(&self, sink: EventSink) {
-        self.inner.subscribe(sink);
-    }
-    fn quarantined(&self) -> Vec<ComponentName> {
-        self.inner.quarantined()
     }
 }
 

@@ -105,6 +105,32 @@ pub fn configuration(name: &str, pre: &str, changes: &str, post: &str) -> Config
     }
 }
 
+/// What a platform around a simulated one leaves to that: everything but how steps are carried out.
+macro_rules! leaves_to_inner {
+    () => {
+        fn catalogue(&self) -> &davit::model::Catalogue {
+            self.inner.catalogue()
+        }
+        fn observe(&self, deadline: Time) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
+            self.inner.observe(deadline)
+        }
+        fn observe_component(
+            &self,
+            component: davit::model::ComponentName,
+            deadline: Time,
+        ) -> Result<Option<davit::model::ComponentSnapshot>, davit::platform::ObserveError> {
+            self.inner.observe_component(component, deadline)
+        }
+        fn subscribe(&self, sink: davit::platform::EventSink) {
+            self.inner.subscribe(sink);
+        }
+        fn quarantined(&self) -> Vec<davit::model::ComponentName> {
+            self.inner.quarantined()
+        }
+    };
+}
+pub(crate) use leaves_to_inner;
+
 pub struct Rig {
     pub handle: ConfiguratorHandle,
     pub platform: Simulated,

@@ -174,9 +174,8 @@ struct Treacherous {
 }
 
 impl Platform for Treacherous {
-    fn catalogue(&self) -> &Catalogue {
-        self.inner.catalogue()
-    }
+    leaves_to_inner!();
+
     fn execution(&self, step: &Step) -> Execution {
         let meant = matches!(step, Step::PropertySet { .. });
         if meant && self.armed.swap(false, Ordering::SeqCst) {
@@ -186,22 +185,6 @@ impl Platform for Treacherous {
     }
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
         Platform::execute(&self.inner, step, deadline)
-    }
-    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
-        self.inner.observe(deadline)
-    }
-    fn observe_component(
-        &self,
-        component: ComponentName,
-        deadline: Time,
-    ) -> Result<Option<ComponentSnapshot>, ObserveError> {
-        self.inner.observe_component(component, deadline)
-    }
-    fn subscribe(&self, sink: EventSink) {
-        self.inner.subscribe(sink);
-    }
-    fn quarantined(&self) -> Vec<ComponentName> {
-        self.inner.quarantined()
     }
 }
 
