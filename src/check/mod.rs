@@ -242,6 +242,21 @@ fn unasked(deployment: &Deployment, product: &product::Product<'_>, mut asked: F
     findings
 }
 
+/// What is wrong with the monitors: names, parts of what ports carry, events that nobody hears. `names`: whether the
+/// components are all known, so that names can be judged.
+pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> Findings {
+    let mut findings = match names {
+        true => monitors::check(deployment, &universe::Universe::new(deployment, catalogue)),
+        false => Vec::new(),
+    };
+    let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
+    let charts: Option<Vec<Chart>> = written.map(|chart| crate::statechart::compile(chart).0).collect();
+    if let Some(charts) = charts {
+        findings.extend(monitors::events(deployment, &charts.iter().collect::<Vec<_>>()));
+    }
+    findings
+}
+
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
 pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
     let universe = universe::Universe::new(deployment, catalogue);

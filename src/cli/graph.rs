@@ -125,7 +125,8 @@ impl Run for Args {
                         let planned = planned.map_err(refused)?;
                         planned.into_iter().last().map(|p| p.result).unwrap_or_default()
                     };
-                    draw::components(&format!("{name}: components"), &system, &read.catalogue)
+                    let title = format!("{name}: components");
+                    draw::components(&title, &system, &read.catalogue, &read.deployment.monitors)
                 }
             }
         };

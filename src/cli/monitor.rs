@@ -1,9 +1,10 @@
 //! `davit monitor`
 
 use super::exit::Exit;
-use super::input::{Parameters, is_deployment};
+use super::input::{Input, Parameters, is_deployment};
 use super::output::{Style, Table};
 use super::{Answer, Context, Failure, Run};
+use crate::check;
 use crate::diagnostics::{SourceMap, to_json};
 use crate::lang::{self, Sources};
 use crate::limits::{SAMPLES_LINE, SAMPLES_WAKES};
@@ -25,6 +26,9 @@ use std::path::PathBuf;
 /// The samples are comma-separated values: a first line with `time` (in seconds) and the signals as the monitors spell
 /// them (`Dynamics.force[0]`, `state(Arm)`, `faulted(Arm)`, `activity(control.overruns)`), then a line for each time; an
 /// empty cell is no new sample. With --json, one object a line: each event, then the table.
+///
+/// The monitors of a deployment are checked against it, as `davit check` does. What is found is told and refuses nothing: a
+/// recording may be of another system.
 ///
 /// Exit status: 0 done, whatever was raised; 1 findings; 2 a file is missing or does not parse.
 #[derive(Debug, clap::Args)]
@@ -63,20 +67,22 @@ struct Found {
 }
 
 impl Args {
-    fn monitors(&self) -> Result<Found, Failure> {
-        let options = self.parameters.options()?;
-        let (monitors, findings, sources, unreadable) = if is_deployment(&self.file) {
-            let loaded = lang::load(&self.file, &options);
-            let monitors = loaded.deployment.map(|d| d.monitors);
-            (monitors.unwrap_or_default(), loaded.findings, loaded.sources, loaded.unreadable)
+    fn monitors(&self, context: &Context) -> Result<Found, Failure> {
+        let (monitors, findings, sources) = if is_deployment(&self.file) {
+            let input = Input { file: self.file.clone(), parameters: self.parameters.clone() };
+            let read = input.read_but_for(context)?;
+            // What a configuration's text lacks may be what a monitor watches.
+            let wrong = check::monitors(&read.deployment, &read.catalogue, !has_errors(&read.findings));
+            let findings = read.findings.into_iter().chain(wrong).collect();
+            (read.deployment.monitors, findings, read.sources)
         } else {
-            let loaded = lang::load_monitors(&Sources::Disk, &self.file, &options);
-            (loaded.monitors, loaded.findings, loaded.sources, loaded.unreadable)
+            let loaded = lang::load_monitors(&Sources::Disk, &self.file, &self.parameters.options()?);
+            if has_errors(&loaded.findings) {
+                let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
+                return Err(Failure { exit, findings: loaded.findings, sources: loaded.sources, ..Failure::default() });
+            }
+            (loaded.monitors, loaded.findings, loaded.sources)
         };
-        if has_errors(&findings) {
-            let exit = if unreadable { Exit::Usage } else { Exit::No };
-            return Err(Failure { exit, findings, sources, ..Failure::default() });
-        }
         let mut chosen = Vec::new();
         for name in &self.only {
             let Some(monitor) = monitors.iter().find(|m| m.name.as_str() == name) else {
@@ -108,7 +114,7 @@ impl Args {
 
     fn replay(self, context: &Context) -> Answer {
         let renamed = self.renamed()?;
-        let Found { monitors, mut findings, mut sources } = self.monitors()?;
+        let Found { monitors, mut findings, mut sources } = self.monitors(context)?;
         let name = self.samples.display().to_string();
         let unreadable = |error: &dyn std::fmt::Display| {
             let help = "name a text of comma-separated values, the first line with `time` and the signals";

@@ -2,12 +2,17 @@
 
 use super::picture::{Direction, Edge, Node, Picture, Subject, Tone};
 use super::text::short;
-use crate::model::{Catalogue, ComponentName, Direction as PortDirection, MemberRef, Policy, RunState, Snapshot};
+use crate::model::monitor::{ConditionKind, MONITORS_TYPE, SignalKind};
+use crate::model::{
+    Catalogue, ComponentName, Direction as PortDirection, MemberRef, Monitor, Policy, RunState, Snapshot, TypeName,
+    Value,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a system looks like: a box for each component with its type, its run state and those of its ports that are
-/// connected or written; an edge for each connection, labelled with its policy where that is not `data`.
-pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue) -> Picture {
+/// connected, written or watched; an edge for each connection, labelled with its policy where that is not `data`. A
+/// component that runs `monitors` has a dashed line from each port they watch, and a row for each of them with its events.
+pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitors: &[Monitor]) -> Picture {
     let mut picture = Picture::new(Subject::Components, Direction::Right, title);
     let mut used: BTreeSet<MemberRef> = BTreeSet::new();
     for (from, to) in system.connections.keys() {
@@ -15,10 +20,20 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue) -> Pict
         used.insert(*to);
     }
     used.extend(system.ports.keys());
+    let watching = |ty: TypeName| ty.as_str() == MONITORS_TYPE;
+    let watched: Vec<(&Monitor, BTreeSet<Watched>)> = match system.components.values().any(|c| watching(c.ty)) {
+        true => monitors.iter().map(|monitor| (monitor, watches(monitor))).collect(),
+        false => Vec::new(),
+    };
+    used.extend(watched.iter().flat_map(|(_, of)| of).filter_map(|watched| match watched {
+        Watched::Port(port) => Some(*port),
+        Watched::Component(_) => None,
+    }));
     let mut boxes: BTreeMap<ComponentName, usize> = BTreeMap::new();
-    let mut rows: BTreeMap<MemberRef, usize> = BTreeMap::new();
+    let mut rows: BTreeMap<MemberRef, (PortDirection, usize)> = BTreeMap::new();
     let mut groups: BTreeMap<&str, usize> = BTreeMap::new();
     let mut tones: BTreeSet<RunState> = BTreeSet::new();
+    let mut lines: Vec<(Watched, ComponentName, usize)> = Vec::new();
     for (name, component) in &system.components {
         let parent = subsystem(&mut picture, &mut groups, name.prefix());
         let own = name.as_str().rsplit('/').next().unwrap_or(name.as_str());
@@ -41,11 +56,25 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue) -> Pict
                     PortDirection::In => &mut node.ins,
                     PortDirection::Out => &mut node.outs,
                 };
-                rows.insert(member, list.len());
+                rows.insert(member, (description.direction, list.len()));
                 list.push(match system.ports.get(&member) {
                     Some(value) => format!("{port} = {}", short(&value.to_string(), 18)),
                     None => port.to_string(),
                 });
+            }
+        }
+        if watching(component.ty) {
+            // A row for each thing that is watched, not for each monitor: several watch one port.
+            for of in watched.iter().flat_map(|(_, of)| of).collect::<BTreeSet<_>>() {
+                lines.push((*of, *name, node.ins.len()));
+                node.ins.push(of.to_string());
+            }
+            for (monitor, _) in &watched {
+                let off = component.properties.get(&monitor.name) == Some(&Value::Bool(false));
+                let events: Vec<&str> = monitor.events().map(|event| event.as_str()).collect();
+                let arrow = if events.is_empty() { "" } else { " → " };
+                let off = if off { " (off)" } else { "" };
+                node.outs.push(format!("{}{off}{arrow}{}", monitor.name, events.join(", ")));
             }
         }
         boxes.insert(*name, picture.add(node));
@@ -53,16 +82,63 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue) -> Pict
     for ((from, to), policy) in &system.connections {
         let (Some(a), Some(b)) = (boxes.get(&from.component), boxes.get(&to.component)) else { continue };
         let mut edge = Edge::new(*a, *b);
-        edge.from_port = rows.get(from).copied();
-        edge.to_port = rows.get(to).copied();
+        edge.from_port = rows.get(from).map(|(_, row)| *row);
+        edge.to_port = rows.get(to).map(|(_, row)| *row);
         if let Policy::Buffer(_) = policy {
             edge.label.push(policy.to_string());
             edge.dashed = true;
         }
         picture.edges.push(edge);
     }
+    for (watched, by, row) in lines {
+        let (component, port) = match watched {
+            Watched::Port(port) => (port.component, rows.get(&port)),
+            Watched::Component(name) => (name, None),
+        };
+        let (Some(a), Some(b)) = (boxes.get(&component), boxes.get(&by)) else { continue };
+        let mut edge = Edge::new(*a, *b);
+        // An in-port is watched at its box: lines leave at the other side.
+        edge.from_port = port.filter(|(direction, _)| *direction == PortDirection::Out).map(|(_, row)| *row);
+        edge.to_port = Some(row);
+        edge.dashed = true;
+        picture.edges.push(edge);
+    }
     picture.legend = tones.into_iter().map(|state| (tone(state), state.to_string())).collect();
     picture
+}
+
+/// What a monitor looks at. Activities are in no picture of components.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Watched {
+    Port(MemberRef),
+    Component(ComponentName),
+}
+
+impl std::fmt::Display for Watched {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Port(port) => port.fmt(f),
+            Self::Component(name) => name.fmt(f),
+        }
+    }
+}
+
+fn watches(monitor: &Monitor) -> BTreeSet<Watched> {
+    let mut of = BTreeSet::new();
+    monitor.for_each_condition(&mut |condition| match &condition.kind {
+        ConditionKind::IsTrue(signal) => _ = of.insert(Watched::Port(signal.member)),
+        ConditionKind::Silent { port, .. } => _ = of.insert(Watched::Port(*port)),
+        ConditionKind::InState { component, .. } | ConditionKind::Faulted(component) => {
+            _ = of.insert(Watched::Component(*component));
+        }
+        _ => {}
+    });
+    monitor.for_each_signal(&mut |signal| match &signal.kind {
+        SignalKind::Port(signal) => _ = of.insert(Watched::Port(signal.member)),
+        SignalKind::Age(port) | SignalKind::Rate { port, .. } => _ = of.insert(Watched::Port(*port)),
+        _ => {}
+    });
+    of
 }
 
 /// The group of a subsystem's path, made where it is not there yet.
@@ -95,7 +171,8 @@ fn tone(state: RunState) -> Tone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{ComponentSnapshot, ComponentType, Ident, PortType, TypeName, Value, ValueType};
+    use crate::model::monitor::{Condition, Sampling};
+    use crate::model::{ComponentSnapshot, ComponentType, EventName, Ident, PortType, ValueType};
 
     /// A picture of the youBot's control loop, with everything a drawing can have.
     pub(crate) fn youbot() -> (Snapshot, Catalogue) {
@@ -167,7 +244,7 @@ mod tests {
     #[test]
     fn every_component_port_and_connection_is_drawn() {
         let (system, catalogue) = youbot();
-        let picture = components("youbot", &system, &catalogue);
+        let picture = components("youbot", &system, &catalogue, &[]);
         assert_eq!(picture.edges.len(), system.connections.len());
         assert!(picture.edges.iter().all(|e| e.from_port.is_some() && e.to_port.is_some()));
         let svg = picture.svg();
@@ -180,5 +257,59 @@ mod tests {
         assert!(svg.contains("ext_ref_mode = true"));
         assert!(picture.mermaid().contains("buffer(64)"));
         assert!(picture.dot().contains("subgraph"));
+    }
+
+    #[test]
+    fn monitors_have_lines_from_what_they_watch_and_rows_for_their_events() {
+        let (mut system, mut catalogue) = youbot();
+        let name = |text: &str| Ident::new(text).unwrap();
+        let port = |text: &str| MemberRef::new(text).unwrap();
+        let silent = |text: &str| {
+            Condition::new(ConditionKind::Silent { port: port(text), time: std::time::Duration::from_millis(100) })
+        };
+        let monitor = |own: &str, when: Condition, raise: Option<&str>| Monitor {
+            name: name(own),
+            when,
+            raise: raise.map(|event| EventName::new(event).unwrap()),
+            cleared: None,
+            repeat: None,
+            sampling: Sampling::OnSample,
+            enabled: true,
+            description: None,
+            origin: crate::model::Origin::NONE,
+        };
+        let faulted = Condition::new(ConditionKind::Faulted(ComponentName::new("Base_Ctrl").unwrap()));
+        let monitors = [
+            monitor("lost", silent("Link_Rx.link_stats"), Some("e_lost")),
+            monitor("both", Condition::new(ConditionKind::Any(vec![silent("Link_Rx.link_stats"), faulted])), None),
+            monitor("inward", silent("Dynamics.f_des"), None),
+        ];
+        assert_eq!(components("none", &system, &catalogue, &monitors).edges.len(), system.connections.len());
+        catalogue.insert(ComponentType::new(MONITORS_TYPE, ""));
+        let properties = BTreeMap::from([(name("both"), Value::Bool(false)), (name("lost"), Value::Bool(true))]);
+        let component = ComponentSnapshot {
+            ty: TypeName::new(MONITORS_TYPE).unwrap(),
+            state: RunState::Running,
+            properties,
+            activity: None,
+        };
+        system.components.insert(ComponentName::new("Monitors").unwrap(), component);
+        let picture = components("youbot", &system, &catalogue, &monitors);
+        let at = picture.nodes.iter().position(|node| node.title == "Monitors").unwrap();
+        assert_eq!(picture.nodes[at].ins, ["Dynamics.f_des", "Link_Rx.link_stats", "Base_Ctrl"]);
+        assert_eq!(picture.nodes[at].outs, ["lost → e_lost", "both (off)", "inward"]);
+        let lines: Vec<&Edge> = picture.edges.iter().filter(|edge| edge.to == at).collect();
+        assert!(lines.len() == 3 && lines.iter().all(|edge| edge.dashed), "{lines:?}");
+        let from = |row: usize| {
+            let edge = lines.iter().find(|edge| edge.to_port == Some(row)).unwrap();
+            (picture.nodes[edge.from].title.as_str(), edge.from_port.map(|p| picture.nodes[edge.from].outs[p].as_str()))
+        };
+        assert_eq!(from(0), ("Dynamics", None), "an in-port has no row on the side where lines leave");
+        assert_eq!(from(1), ("Link_Rx", Some("link_stats")));
+        assert_eq!(from(2), ("Base_Ctrl", None));
+        for text in [picture.svg(), picture.dot(), picture.mermaid()] {
+            assert!(text.contains("e_lost") && text.contains("(off)") && text.contains("Link_Rx.link_stats"), "{text}");
+        }
+        assert!(picture.svg().contains("stroke-dasharray") && picture.mermaid().contains("-.->"));
     }
 }

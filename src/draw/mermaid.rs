@@ -36,11 +36,26 @@ fn flowchart(picture: &Picture) -> String {
     out
 }
 
+/// Rows of a box that no edge ends at. Those of edges stand on the edges: a box has no rows here.
+fn free_rows(picture: &Picture, index: usize) -> impl Iterator<Item = &String> {
+    let node = &picture.nodes[index];
+    let taken = |row: usize, out: bool| {
+        picture.edges.iter().any(|edge| match out {
+            true => edge.from == index && edge.from_port == Some(row),
+            false => edge.to == index && edge.to_port == Some(row),
+        })
+    };
+    let free = move |rows: &'_ [String], out: bool| (0..rows.len()).filter(|row| !taken(*row, out)).collect::<Vec<_>>();
+    let (ins, outs) = (free(&node.ins, false), free(&node.outs, true));
+    ins.into_iter().map(|row| &node.ins[row]).chain(outs.into_iter().map(|row| &node.outs[row]))
+}
+
 fn flow_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
     for index in picture.children(group) {
         let node = &picture.nodes[index];
-        let text = std::iter::once(&node.title).chain(&node.lines).map(|l| plain(l)).collect::<Vec<_>>().join("<br/>");
+        let lines = std::iter::once(&node.title).chain(&node.lines).chain(free_rows(picture, index));
+        let text = lines.map(|l| plain(l)).collect::<Vec<_>>().join("<br/>");
         if node.shape == Shape::Group && picture.children(Some(index)).next().is_some() {
             let _ = writeln!(out, "{indent}subgraph n{index} [\"{text}\"]");
             flow_level(out, picture, Some(index), depth + 1);

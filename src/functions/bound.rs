@@ -99,13 +99,12 @@ impl Bound {
     /// Compiles a machine's tables.
     pub fn new(lua: &Lua, host: &Host, fsm: &Table) -> std::result::Result<Self, Refused> {
         let list = lower::flat(&host.native, fsm)?;
-        let timed = host.native.raw_get("timed_class")?;
         // A transition is known by its number; nothing else needs a place here.
         let mut places = |_: Option<usize>, number: usize, word: &str| {
             if word.is_empty() { Origin(u32::try_from(number).unwrap_or(0)) } else { Origin::NONE }
         };
         let Lowered { chart: written, functions, transitions, values, problems } =
-            lower::lower(&list, timed, &mut places)?;
+            lower::lower(&list, &host.native, &mut places)?;
         if !problems.is_empty() {
             let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
             return Err(Refused::Findings(findings.collect()));

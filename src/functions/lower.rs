@@ -47,15 +47,27 @@ pub type Places<'a> = dyn FnMut(Option<usize>, usize, &str) -> Origin + 'a;
 
 struct Lowering<'a, 'p> {
     functions: Vec<Function>,
+    plugins: Vec<(FunctionId, String)>,
     values: Vec<(Value, EventName)>,
     problems: Vec<Problem>,
     places: &'a mut Places<'p>,
     timed_class: Table,
+    /// By function: the plugin that added it.
+    plugin_of: Table,
 }
 
 /// The flat list that `rfsm.lua` makes of a machine, as a chart.
-pub fn lower(list: &Table, timed_class: Table, places: &mut Places<'_>) -> Result<Lowered> {
-    let mut with = Lowering { functions: Vec::new(), values: Vec::new(), problems: Vec::new(), places, timed_class };
+pub fn lower(list: &Table, native: &Table, places: &mut Places<'_>) -> Result<Lowered> {
+    let (timed_class, plugin_of) = (native.raw_get("timed_class")?, native.raw_get("plugin_of")?);
+    let mut with = Lowering {
+        functions: Vec::new(),
+        plugins: Vec::new(),
+        values: Vec::new(),
+        problems: Vec::new(),
+        places,
+        timed_class,
+        plugin_of,
+    };
     let length = list.raw_len();
     // By number in the list: states not yet put into their parents.
     let mut made: Vec<Option<(State, usize, Option<Node>)>> = Vec::with_capacity(length);
@@ -104,9 +116,10 @@ pub fn lower(list: &Table, timed_class: Table, places: &mut Places<'_>) -> Resul
             parent.children.insert(0, connector.unwrap_or(Node::State(state)));
         }
     }
-    let chart =
+    let mut chart =
         made.first_mut().and_then(Option::take).map_or_else(Statechart::default, |(root, ..)| Statechart::new(root));
-    let Lowering { functions, values, problems, .. } = with;
+    let Lowering { functions, plugins, values, problems, .. } = with;
+    chart.plugins = plugins;
     Ok(Lowered { chart, functions, transitions: tables, values, problems })
 }
 
@@ -118,8 +131,11 @@ impl Lowering<'_, '_> {
     }
 
     fn function(&mut self, function: Function) -> FunctionId {
+        let id = FunctionId(u32::try_from(self.functions.len()).unwrap_or(u32::MAX));
+        let plugin = self.plugin_of.raw_get::<Option<String>>(&function).ok().flatten();
+        self.plugins.extend(plugin.map(|plugin| (id, plugin)));
         self.functions.push(function);
-        FunctionId(u32::try_from(self.functions.len() - 1).unwrap_or(u32::MAX))
+        id
     }
 
     fn state(

@@ -85,8 +85,7 @@ pub fn read(
     let mut places = |spot: Option<usize>, _: usize, word: &str| {
         place(spot.and_then(|number| spots.get(number.wrapping_sub(1))), word)
     };
-    let timed = host.native.raw_get("timed_class").map_err(failed)?;
-    let lowered = lower::lower(&list, timed, &mut places).map_err(failed)?;
+    let lowered = lower::lower(&list, &host.native, &mut places).map_err(failed)?;
     let mut runs_lua = !lowered.chart.is_pure();
     for key in ["pre_step_hook", "post_step_hook", "getevents", "idle_hook"] {
         runs_lua |= matches!(fsm.raw_get(key).map_err(failed)?, Value::Function(_));

@@ -14,12 +14,14 @@ use std::fmt;
 pub struct Statechart {
     /// The outermost state. Its name is `root`, whatever it was called in the file.
     pub root: State,
+    /// Functions that are not the model's own: a plugin of rFSM added them, of this name.
+    pub plugins: Vec<(FunctionId, String)>,
 }
 
 impl Statechart {
     /// A chart of that outermost state.
     pub fn new(root: State) -> Self {
-        Self { root }
+        Self { root, plugins: Vec::new() }
     }
 
     /// Whether nothing in it is a function (design §7: a *pure* coordinator).
@@ -91,11 +93,15 @@ impl State {
             })
     }
 
-    /// Which of its own parts are functions, by their keys.
-    pub fn functions(&self) -> Vec<&'static str> {
-        let any = |actions: &[(Action, Origin)]| actions.iter().any(|(action, _)| !action.is_pure());
-        let parts = [("entry", any(&self.entry)), ("doo", self.doo.is_some()), ("exit", any(&self.exit))];
-        parts.into_iter().filter_map(|(key, is)| is.then_some(key)).collect()
+    /// Its own functions, each with the key of the part it stands in.
+    pub fn functions(&self) -> Vec<(&'static str, FunctionId)> {
+        let of = |key, actions: &[(Action, Origin)]| {
+            actions.iter().filter_map(move |(action, _)| Some((key, action.function()?))).collect::<Vec<_>>()
+        };
+        let mut all = of("entry", &self.entry);
+        all.extend(self.doo.map(|(function, _)| ("doo", function)));
+        all.extend(of("exit", &self.exit));
+        all
     }
 
     /// Visits the place of everything in it.
@@ -203,19 +209,17 @@ impl Transition {
         }
     }
 
-    /// Which of its parts are functions, by their keys.
-    pub fn functions(&self) -> Vec<&'static str> {
-        let asks = |(trigger, _): &(Trigger, Origin)| match trigger {
-            Trigger::Predicate(_) => true,
-            Trigger::Timed(timed) => timed.by.is_some(),
-            Trigger::Event(_) => false,
-        };
-        let parts = [
-            ("events", self.events.iter().any(asks)),
-            ("guard", self.guard.is_some()),
-            ("effect", self.effect.iter().any(|(action, _)| !action.is_pure())),
-        ];
-        parts.into_iter().filter_map(|(key, is)| is.then_some(key)).collect()
+    /// Its functions, each with the key of the part it stands in.
+    pub fn functions(&self) -> Vec<(&'static str, FunctionId)> {
+        let asked = self.events.iter().filter_map(|(trigger, _)| match trigger {
+            Trigger::Predicate(function) => Some(*function),
+            Trigger::Timed(timed) => timed.by,
+            Trigger::Event(_) => None,
+        });
+        let mut all: Vec<_> = asked.map(|function| ("events", function)).collect();
+        all.extend(self.guard.map(|(function, _)| ("guard", function)));
+        all.extend(self.effect.iter().filter_map(|(action, _)| Some(("effect", action.function()?))));
+        all
     }
 
     /// Whether nothing in it is a function.
@@ -240,6 +244,11 @@ pub enum Action {
 }
 
 impl Action {
+    /// The function that it calls, if it calls one.
+    pub fn function(self) -> Option<FunctionId> {
+        if let Self::Function(function) = self { Some(function) } else { None }
+    }
+
     /// Whether it is not a function.
     pub fn is_pure(self) -> bool {
         matches!(self, Self::Raise(_))

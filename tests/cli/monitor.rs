@@ -155,3 +155,44 @@ fn what_cannot_be_read_is_usage() {
     let ran = demo.run(&["monitor", "m.lua", "--samples", "s.csv", "--only", "alinged"]);
     assert!(ran.code == 1 && ran.err.contains("`aligned`"), "{}", ran.err);
 }
+
+/// The monitors of a deployment are checked against it.
+#[test]
+fn what_is_wrong_with_a_deployments_monitors_is_told() {
+    let with = |monitors: &str| {
+        let demo = Demo::new();
+        demo.replace(
+            "deployment.yaml",
+            "coordinator: coordinator.lua",
+            "coordinator: coordinator.lua\nmonitors: [m.lua]",
+        );
+        demo.write("m.lua", &format!("Monitors {{ {monitors} }}"));
+        demo.write("s.csv", "time,source.y\n0,0.5\n1,9.5\n");
+        demo
+    };
+    let run = |demo: &Demo, more: &[&str]| {
+        let mut args = vec!["monitor", "deployment.yaml", "--samples", "s.csv"];
+        args.extend(more);
+        demo.run(&args)
+    };
+    let high = "high = monitor { when = above(\"source.y\", 8.0), event = \"e_fast\" }";
+    let ran = run(&with(high), &[]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.out.contains("e_fast"), "{}", ran.out);
+    // Nothing runs it: the demo creates no `davit.Monitors`. A warning, which refuses nothing.
+    assert!(ran.err.contains("monitor::not_run"), "{}", ran.err);
+    let deaf = run(&with(&high.replace("e_fast", "e_fats")), &[]);
+    assert_eq!(deaf.code, 0, "{}", deaf.err);
+    assert!(deaf.err.contains("monitor::unheard") && deaf.err.contains("`e_fast`"), "{}", deaf.err);
+    let wrong = run(&with(&high.replace("source.y", "source.z")), &["--column", "source.z=source.y", "--json"]);
+    assert_eq!(wrong.code, 0, "the recording has it: {}", wrong.out);
+    let last: Value = serde_json::from_str(wrong.out.lines().last().unwrap()).unwrap();
+    let found = last["findings"].as_array().unwrap().iter().find(|f| f["code"] == "conf::unknown_port");
+    assert_eq!(found.unwrap()["path"], "monitors.high", "{last:#}");
+    // A mistake in the text of a configuration keeps nobody from looking at a monitor.
+    let demo = with(high);
+    demo.replace("configurations.lua", "property_set(\"source.name\", \"second\")", "property_set(17)");
+    let ran = run(&demo, &[]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.err.contains("text::"), "{}", ran.err);
+}

@@ -42,3 +42,49 @@ fn graph_marks_functions() {
     assert!(picture.nodes.iter().any(|node| node.lines.contains(&"doo / function".to_owned())));
     assert!(picture.edges.iter().any(|edge| edge.label.iter().any(|l| l.contains("[predicate] [guard] / function"))));
 }
+
+/// Plugins add functions to a model that has none: that is told of the plugin, not of the model.
+#[test]
+fn functions_of_plugins_are_not_the_models_own() {
+    let said = |coordinator: &str| {
+        let from = Sources::memory([
+            ("d.yaml", super::deployed::DEPLOYMENT),
+            ("configurations.lua", super::deployed::CONFIGURATIONS),
+            ("coordinator.lua", coordinator),
+        ]);
+        let loaded = load_from(&from, Path::new("d.yaml"), &LoadOptions::default());
+        let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:?}", loaded.findings));
+        let mut catalogue = davit::model::Catalogue::default();
+        for ty in &deployment.types {
+            catalogue.insert(ty.clone());
+        }
+        let report = davit::check::run(deployment, &catalogue);
+        let finding = report.findings.into_iter().find(|f| f.code == codes::COORD_NOT_PURE);
+        finding.map(|f| (f.message, f.labels.into_iter().map(|label| label.text).collect::<Vec<_>>().join("; ")))
+    };
+    let model = |plugin: &str, own: &str, events: &str| {
+        format!(
+            "{plugin}
+            return rfsm.state {{
+              idle = rfsm.state {{ {own} }}, operational = rfsm.state {{}},
+              rfsm.trans {{ src = 'initial', tgt = 'idle' }},
+              rfsm.trans {{ src = 'idle', tgt = 'operational', events = {{ {events} }} }},
+              rfsm.trans {{ src = 'operational', tgt = 'idle', events = {{ 'e_shutdown' }} }},
+            }}"
+        )
+    };
+    assert_eq!(said(&model("", "", "'e_start'")), None);
+    let (message, labels) = said(&model("require 'rfsm_emem'", "", "'e_start'")).expect("said");
+    assert!(message.contains("no functions of its own, but those of the plugin `emem`"), "{message}");
+    assert!(labels.contains("added by the plugin `emem`, here and in another place"), "{labels}");
+    let (message, labels) = said(&model("require 'rfsm_await'", "", "'await(e_start, e_more)'")).expect("said");
+    assert!(message.contains("no functions of its own, but those of the plugin `await`"), "{message}");
+    assert!(labels.contains("added by the plugin `await`, here and in another place"), "{labels}");
+    let own = "exit = function() end";
+    let (message, labels) = said(&model("require 'rfsm_emem'", own, "'e_start'")).expect("said");
+    assert!(
+        message.contains("functions in 1 states and 0 transitions, beside those of the plugin `emem`"),
+        "{message}"
+    );
+    assert!(labels.contains("`root.idle`: exit") && labels.contains("added by the plugin `emem`"), "{labels}");
+}

@@ -3,8 +3,16 @@ local native, rfsm = ...
 
 local modules = {}
 
+-- By function: the plugin that added it, where nothing of the model is in it.
+native.plugin_of = setmetatable({}, { __mode = "k" })
+
+local function by(plugin, f)
+  native.plugin_of[f] = plugin
+  return f
+end
+
 -- Adds to a state's exit: `after` runs when the model's own exit did not fail. Names that it raises stay.
-local function after_exit(state, after)
+local function after_exit(state, plugin, after)
   local own = rawget(state, "exit")
   if type(own) == "function" then
     state.exit = function(fsm, s, what)
@@ -15,7 +23,7 @@ local function after_exit(state, after)
   end
   local list = {}
   for i, part in ipairs(type(own) == "table" and own or { own }) do list[i] = part end
-  list[#list + 1] = function(_, s) after(s) end
+  list[#list + 1] = by(plugin, function(_, s) after(s) end)
   state.exit = list
 end
 
@@ -65,7 +73,7 @@ modules.emem = function()
     for _, node in ipairs(fsm._nodes) do
       if rfsm.is_state(node) then
         node.emem = {}
-        after_exit(node, emem.emem_reset)
+        after_exit(node, "emem", emem.emem_reset)
       end
     end
     rfsm.pre_step_hook_add(fsm, count)
@@ -111,8 +119,9 @@ modules.await = function()
           if own then return own(t, e) end
           return true
         end
+        if not own then by("await", tr.guard) end
         if rfsm.is_state(tr.src) then
-          after_exit(tr.src, function()
+          after_exit(tr.src, "await", function()
             for name in pairs(seen) do seen[name] = false end
           end)
         end
