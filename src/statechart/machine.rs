@@ -261,6 +261,7 @@ impl Machine {
         }
         self.enter(chart, NodeId::ROOT, now, hook);
         self.trace_path(chart, way, hook);
+        self.report(chart, chart.initial, way, hook);
         self.execute(chart, way, now, hook);
         Step::Entered
     }
@@ -333,18 +334,22 @@ impl Machine {
             if self.segment(chart, taken.edge, owner, now, hook) {
                 return;
             }
-            let edge = &chart.edges[taken.edge as usize];
             way = taken.then;
-            if self.search.ways[way as usize].other != NONE {
-                let ways = &self.search.ways;
-                let mut at = way;
-                let mut all = std::iter::from_fn(|| {
-                    let way = ways.get(at as usize)?;
-                    at = way.other;
-                    Some(EdgeId(way.edge))
-                });
-                hook.conflict(chart, NodeId(edge.tgt), &mut all);
-            }
+            self.report(chart, chart.edges[taken.edge as usize].tgt, way, hook);
+        }
+    }
+
+    /// At a connector the first of its ways is taken; where there are more, that is a conflict.
+    fn report(&mut self, chart: &Chart, connector: u32, way: u32, hook: &mut impl Hook) {
+        let ways = &self.search.ways;
+        if ways[way as usize].other != NONE {
+            let mut at = way;
+            let mut all = std::iter::from_fn(|| {
+                let way = ways.get(at as usize)?;
+                at = way.other;
+                Some(EdgeId(way.edge))
+            });
+            hook.conflict(chart, NodeId(connector), &mut all);
         }
     }
 

@@ -334,6 +334,14 @@ mod choosing {
     }
 
     #[test]
+    fn several_ways_in_are_a_conflict_too() {
+        let model = root(vec![s("a", vec![]), s("b", vec![]), t("initial", "a", ""), t("initial", "b", "")]);
+        let mut run = Run::of(&model, Scripted::default());
+        run.run();
+        assert_eq!(run.hook.take(), "root+ conflict root.initial: root.a,root.b a+");
+    }
+
+    #[test]
     fn several_ways_on_from_a_connector_are_a_conflict() {
         let model = root(vec![
             s("a", vec![]),

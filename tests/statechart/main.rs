@@ -5,6 +5,7 @@ mod coordinator;
 mod naive;
 mod random;
 mod rfsm;
+mod rich;
 mod scripted;
 mod scxml;
 mod support;

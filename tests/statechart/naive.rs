@@ -1,11 +1,14 @@
 //! A second interpreter, written from the description of rFSM alone and with no thought of speed: full names as strings,
-//! lists searched from end to end, the tree of all paths built every time. It shares no code with the engine.
+//! lists searched from end to end, the tree of all paths built every time. It shares no code with the engine. Functions of
+//! a model are small programs here, which `rich.rs` writes down in Lua for the engine.
 
 use davit::model::statechart::{Action, Node, Since, State, Statechart, Trigger};
 use std::collections::{BTreeMap, BTreeSet};
 
 #[derive(Clone, Debug)]
 struct Trans {
+    /// In the order of the text: a state's own, then those of its children.
+    number: usize,
     src: String,
     tgt: String,
     events: Vec<String>,
@@ -18,6 +21,37 @@ struct Clocked {
     name: String,
     relative: bool,
     nanos: i128,
+}
+
+/// What a call answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    Yes,
+    No,
+    Nothing,
+    Error,
+}
+
+/// A function: it notes that it was called, sends events, and answers one after the other.
+#[derive(Clone, Debug)]
+pub struct Program {
+    pub id: usize,
+    pub sends: Vec<String>,
+    pub answers: Vec<Answer>,
+}
+
+/// The functions of a model.
+#[derive(Clone, Debug, Default)]
+pub struct Rich {
+    /// By state; they come before the names it raises.
+    pub entry: BTreeMap<String, Program>,
+    pub exit: BTreeMap<String, Program>,
+    /// By leaf: a part a resumption, whose first answer is what it yields; after the last it is through.
+    pub doo: BTreeMap<String, Vec<Program>>,
+    /// By the transition's number.
+    pub guard: BTreeMap<usize, Program>,
+    pub effect: BTreeMap<usize, Program>,
+    pub predicates: BTreeMap<usize, Vec<Program>>,
 }
 
 /// All complete paths on from a node: a transition and what follows it.
@@ -36,6 +70,12 @@ pub struct Naive {
     leaf: Option<String>,
     queue: Vec<String>,
     now: i128,
+    rich: Rich,
+    calls: BTreeMap<usize, usize>,
+    /// How far the activity of the leaf is; none: it is through, or there is none.
+    doo: Option<usize>,
+    /// What functions said.
+    pub said: Vec<String>,
     pub actions: Vec<String>,
     pub transition: bool,
 }
@@ -100,6 +140,11 @@ fn lua_sort(a: &mut [Trans], mut l: usize, mut u: usize) {
 impl Naive {
     /// None when a reference leads nowhere.
     pub fn new(model: &Statechart) -> Option<Self> {
+        Self::with(model, Rich::default())
+    }
+
+    /// With functions.
+    pub fn with(model: &Statechart, rich: Rich) -> Option<Self> {
         let mut naive = Self {
             states: BTreeSet::new(),
             connectors: BTreeSet::new(),
@@ -113,11 +158,15 @@ impl Naive {
             leaf: None,
             queue: vec!["e_init_fsm".to_owned()],
             now: 0,
+            rich,
+            calls: BTreeMap::new(),
+            doo: None,
+            said: Vec::new(),
             actions: Vec::new(),
             transition: false,
         };
         naive.nodes(&model.root, "root");
-        naive.transitions(&model.root, "root")?;
+        naive.transitions(&model.root, "root", &mut 0)?;
         for list in naive.outgoing.values_mut() {
             let length = list.len();
             lua_sort(list, 1, length);
@@ -169,8 +218,10 @@ impl Naive {
         self.exists(&fqn).then_some(fqn)
     }
 
-    fn transitions(&mut self, state: &State, fqn: &str) -> Option<()> {
+    fn transitions(&mut self, state: &State, fqn: &str, numbers: &mut usize) -> Option<()> {
         for transition in &state.transitions {
+            let number = *numbers;
+            *numbers += 1;
             let src = self.resolve(fqn, &transition.src.as_ref()?.0)?;
             let mut tgt = self.resolve(fqn, &transition.tgt.as_ref()?.0)?;
             if self.states.contains(&tgt) && !self.leaves.contains(&tgt) {
@@ -198,12 +249,12 @@ impl Naive {
                 Action::Raise(name) => name.to_string(),
                 Action::Function(_) => unreachable!("pure"),
             });
-            let trans = Trans { src: src.clone(), tgt, events, effect: effect.collect(), pn: transition.pn };
+            let trans = Trans { number, src: src.clone(), tgt, events, effect: effect.collect(), pn: transition.pn };
             self.outgoing.entry(src).or_default().push(trans);
         }
         for child in &state.children {
             if let Node::State(inner) = child {
-                self.transitions(inner, &format!("{fqn}.{}", inner.name))?;
+                self.transitions(inner, &format!("{fqn}.{}", inner.name), numbers)?;
             }
         }
         Some(())
@@ -228,11 +279,63 @@ impl Naive {
         })
     }
 
-    fn paths(&self, node: &str, events: &[String]) -> Tree {
+    /// Calls a function: what it says, sends and answers.
+    fn call(&mut self, program: &Program, detail: &str, tag: &str) -> Answer {
+        self.said.push(format!("{} {detail}", program.id));
+        self.queue.extend(program.sends.iter().cloned());
+        let calls = self.calls.entry(program.id).or_default();
+        let answer = program.answers[*calls % program.answers.len()];
+        *calls += 1;
+        if answer == Answer::Error {
+            self.said.push(format!("ERR {tag} no"));
+        }
+        answer
+    }
+
+    /// What entry, exit, effect and doo see of the machine.
+    fn sight(&self) -> String {
+        let innermost = self.active().last().cloned().unwrap_or_else(|| "nil".to_owned());
+        format!("{innermost} {}", self.leaf.as_deref().unwrap_or("false"))
+    }
+
+    fn mode(&self, state: &str) -> &'static str {
+        match () {
+            () if self.connectors.contains(state) => "-",
+            () if !self.active.iter().any(|s| s == state) => "inactive",
+            () if self.leaf.as_deref() == Some(state) && self.doo.is_none() => "done",
+            () => "active",
+        }
+    }
+
+    /// The guard first, whatever the events; then the events in their order, each with the list and then the predicates.
+    fn enabled(&mut self, trans: &Trans, events: &[String]) -> bool {
+        if let Some(guard) = self.rich.guard.get(&trans.number).cloned() {
+            let detail = format!("{}>{} {} {}", trans.src, trans.tgt, self.mode(&trans.src), events.join(","));
+            if matches!(self.call(&guard, &detail, "GUARD"), Answer::No | Answer::Error) {
+                return false;
+            }
+        }
+        let predicates = self.rich.predicates.get(&trans.number).cloned().unwrap_or_default();
+        if trans.events.is_empty() && predicates.is_empty() {
+            return true;
+        }
+        for event in events {
+            if trans.events.contains(event) {
+                return true;
+            }
+            for predicate in &predicates {
+                if self.call(predicate, event, "PREDICATE") == Answer::Yes {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn paths(&mut self, node: &str, events: &[String]) -> Tree {
         let mut ways = Vec::new();
-        for trans in self.outgoing.get(node).into_iter().flatten() {
-            let enabled = trans.events.is_empty() || events.iter().any(|e| trans.events.contains(e));
-            if !enabled {
+        for trans in self.outgoing.get(node).cloned().unwrap_or_default() {
+            if !self.enabled(&trans, events) {
                 continue;
             }
             if self.leaves.contains(&trans.tgt) {
@@ -247,8 +350,12 @@ impl Naive {
         Tree(ways)
     }
 
-    fn take(&mut self, tree: &Tree) {
+    fn take(&mut self, tree: &Tree, events: &[String]) {
         let (trans, then) = &tree.0[0];
+        if self.connectors.contains(&trans.src) && tree.0.len() > 1 {
+            self.said.push(format!("WARN conflicting transitions from src {} to", trans.src));
+            self.said.extend(tree.0.iter().map(|(way, _)| format!("WARN \t{}", way.tgt)));
+        }
         // The least common ancestor: the first of the target's ancestors that is one of the source's.
         let mut around_source = Vec::new();
         let mut at = trans.src.clone();
@@ -270,11 +377,22 @@ impl Naive {
             for state in leaving {
                 self.active.retain(|s| *s != state);
                 self.actions.push(format!("exit {state}"));
-                self.raise(self.exit[&state].clone());
+                let (undone, names): (Vec<_>, Vec<_>) =
+                    self.exit[&state].iter().cloned().partition(|name| name.ends_with(".undo"));
+                self.raise(undone);
+                if let Some(exit) = self.rich.exit.get(&state).cloned() {
+                    let detail = format!("{state} {}", self.sight());
+                    self.call(&exit, &detail, "EXIT");
+                }
+                self.raise(names);
                 if self.leaf.as_ref() == Some(&state) {
                     self.leaf = None;
                 }
             }
+        }
+        if let Some(effect) = self.rich.effect.get(&trans.number).cloned() {
+            let detail = format!("{}>{} {} {}", trans.src, trans.tgt, self.sight(), events.join(","));
+            self.call(&effect, &detail, "EFFECT");
         }
         self.raise(trans.effect.clone());
         let mut entering = Vec::new();
@@ -289,7 +407,7 @@ impl Naive {
             }
         }
         if !self.leaves.contains(&trans.tgt) {
-            self.take(then);
+            self.take(then, events);
         }
     }
 
@@ -301,17 +419,39 @@ impl Naive {
         self.active.push(state.to_owned());
         self.started.insert(state.to_owned(), (self.now, false));
         self.actions.push(format!("entry {state}"));
+        if let Some(entry) = self.rich.entry.get(state).cloned() {
+            let detail = format!("{state} {}", self.sight());
+            self.call(&entry, &detail, "ENTRY");
+        }
         self.raise(self.entry[state].clone());
         if self.leaves.contains(state) {
             self.leaf = Some(state.to_owned());
-            self.queue.push(format!("e_done@{state}"));
+            self.doo = self.rich.doo.contains_key(state).then_some(0);
+            if self.doo.is_none() {
+                self.queue.push(format!("e_done@{state}"));
+            }
         }
+    }
+
+    /// Resumes the leaf's activity; whether there is nothing to do.
+    fn resume(&mut self) -> bool {
+        let (Some(leaf), Some(at)) = (self.leaf.clone(), self.doo) else { return true };
+        let Some(part) = self.rich.doo[&leaf].get(at).cloned() else {
+            self.doo = None;
+            self.queue.push(format!("e_done@{leaf}"));
+            return false;
+        };
+        let detail = format!("{leaf} {}", self.sight());
+        let answer = self.call(&part, &detail, "DOO");
+        self.doo = (answer != Answer::Error).then_some(at + 1);
+        matches!(answer, Answer::Yes | Answer::Error) && self.queue.is_empty()
     }
 
     /// `step(fsm, n)`; none: more than so many turns.
     pub fn step(&mut self, mut n: u64, events: &[&str], mut turns: u64) -> Option<bool> {
         self.queue.extend(events.iter().map(|e| (*e).to_owned()));
         self.actions.clear();
+        self.said.clear();
         self.transition = false;
         loop {
             turns = turns.checked_sub(1)?;
@@ -321,10 +461,12 @@ impl Naive {
             if self.active.is_empty() {
                 let tree = self.paths("root.initial", &events);
                 if tree.0.is_empty() {
+                    let text = "failed to enter fsm root root, no valid path from root.initial";
+                    self.said.push(format!("ERR ERROR: {text} nil"));
                     return Some(false);
                 }
                 self.enter("root");
-                self.take(&tree);
+                self.take(&tree, &events);
                 self.transition = true;
             } else if !events.is_empty() {
                 let mut from_outside = self.active.clone();
@@ -332,13 +474,13 @@ impl Naive {
                 let found = from_outside.iter().map(|s| self.paths(s, &events)).find(|tree| !tree.0.is_empty());
                 match found {
                     Some(tree) => {
-                        self.take(&tree);
+                        self.take(&tree, &events);
                         self.transition = true;
                     }
                     None => counts = false,
                 }
             } else {
-                idle = true;
+                idle = self.resume();
             }
             // The plugin's hook: after idle was computed, from the leaf outwards.
             let mut from_inside = self.active.clone();

@@ -25,7 +25,7 @@ impl Choices<'_> {
     }
 }
 
-const EVENTS: [&str; 4] = ["e1", "e2", "e3", "e4"];
+pub const EVENTS: [&str; 4] = ["e1", "e2", "e3", "e4"];
 const NAMES: [&str; 3] = ["a", "b", "c"];
 
 /// States and connectors first; full names of all nodes are noted.
