@@ -1,19 +1,23 @@
 //! Request to status of a switch, beside a bare ping-pong of two threads over the same kind of channel in the same run;
-//! and the configurator's own time for it.
+//! and the configurator's own time for it. Both in turns, so that they meet the same machine: back to back, when all
+//! threads are awake and look for the next message themselves, and at rest, when both have gone to sleep meanwhile, as
+//! they have between the requests of a coordinator.
 //!
 //! `cargo bench --bench switch`
 
-use davit::configurator::{Answer, Batch, Configurator, Request, Requester, Setup};
+use davit::configurator::{Answer, Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup};
 use davit::model::*;
 use davit::platform::Platform;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::runtime::{Builder, Component, In, Libraries, Library, Prop};
-use davit::time::{Clock, Time};
+use davit::time::{Clock, Receiver, Sender};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-const ROUNDS: usize = 20_000;
+/// How often each thing is measured, in turns of so many.
+const TURNS: usize = 40;
+const TURN: usize = 200;
 
 fn member(text: &str) -> MemberRef {
     MemberRef::new(text).expect("a member")
@@ -73,81 +77,131 @@ fn median(mut times: Vec<u64>) -> u64 {
     times[times.len() / 2]
 }
 
-/// Nanoseconds of a round trip between two threads over two channels.
-fn ping_pong(clock: &Clock) -> u64 {
-    let (to, from_main) = clock.channel::<u64>(16);
-    let (back, answer) = clock.channel::<u64>(16);
-    let echo = clock.spawn("echo", move || {
-        while let Ok(n) = from_main.recv() {
-            if back.try_send(n).is_err() {
-                return;
-            }
-        }
-    });
-    let mut times = Vec::with_capacity(ROUNDS);
-    for n in 0..ROUNDS as u64 {
-        let begun = clock.now();
-        to.try_send(n).expect("room");
-        answer.recv().expect("an echo");
-        times.push(clock.now().since(begun).as_nanos() as u64);
-    }
-    drop(to);
-    let _ = echo.join(Time::NEVER);
-    median(times)
+/// Two threads and two channels.
+struct PingPong {
+    to: Sender<u64>,
+    answer: Receiver<u64>,
 }
 
-/// Nanoseconds from request to answer, and of the configurator's own time, for the switch and its undo in turn.
-fn switch(clock: &Clock, others: usize) -> (u64, u64) {
-    let loop_ = Ident::new("loop").expect("a name");
-    // Idle: the time until a running activity has really stopped is another matter.
-    let activity = Activity { period: Some(Duration::from_secs(1000)), priority: 0, cpu: None, origin: Origin::NONE };
-    let activities = BTreeMap::from([(loop_, activity)]);
-    let platform: Arc<dyn Platform> = Arc::new(EmbeddedPlatform::new(clock, &libraries(), &activities));
-    let (sink, answers) = clock.channel::<Answer>(16);
-    let handle = Configurator::start(Setup {
-        configurations: configurations(others),
-        catalogue: libraries().catalogue(),
-        activities: BTreeSet::from([loop_]),
-        platform,
-        clock: clock.clone(),
-        limits: DeploymentLimits::default(),
-        workers: 2,
-        answers: Arc::new(move |answer| drop(sink.try_send(answer))),
-        // As a session has it: every step is told.
-        progress: Some(Arc::new(|progress| _ = std::hint::black_box(progress))),
-    });
-    let mut next = 0;
-    let mut ask = |ask: Ask| {
-        next += 1;
-        let request = Request { id: RequestId(next), ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+impl PingPong {
+    fn start(clock: &Clock) -> Self {
+        let (to, from_main) = clock.channel::<u64>(16);
+        let (back, answer) = clock.channel::<u64>(16);
+        clock.spawn("echo", move || {
+            while let Ok(n) = from_main.recv() {
+                if back.try_send(n).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { to, answer }
+    }
+
+    /// Nanoseconds of a round trip.
+    fn trip(&self, clock: &Clock) -> u64 {
         let begun = clock.now();
-        handle.submit(Batch::one(request)).expect("room");
-        let answer = answers.recv().expect("an answer");
+        self.to.try_send(0).expect("room");
+        self.answer.recv().expect("an echo");
+        clock.now().since(begun).as_nanos() as u64
+    }
+}
+
+/// A configurator with the switch applied once, and `others` components that have nothing to do with it.
+struct Switched {
+    handle: ConfiguratorHandle,
+    answers: Receiver<Answer>,
+    asked: u64,
+}
+
+impl Switched {
+    fn start(clock: &Clock, others: usize) -> Self {
+        let loop_ = Ident::new("loop").expect("a name");
+        // Idle: the time until a running activity has really stopped is another matter.
+        let activity =
+            Activity { period: Some(Duration::from_secs(1000)), priority: 0, cpu: None, origin: Origin::NONE };
+        let activities = BTreeMap::from([(loop_, activity)]);
+        let platform: Arc<dyn Platform> = Arc::new(EmbeddedPlatform::new(clock, &libraries(), &activities));
+        let (sink, answers) = clock.channel::<Answer>(16);
+        let handle = Configurator::start(Setup {
+            configurations: configurations(others),
+            catalogue: libraries().catalogue(),
+            activities: BTreeSet::from([loop_]),
+            platform,
+            clock: clock.clone(),
+            limits: DeploymentLimits::default(),
+            workers: 2,
+            answers: Arc::new(move |answer| drop(sink.try_send(answer))),
+            // As a session has it: every step is told.
+            progress: Some(Arc::new(|progress| _ = std::hint::black_box(progress))),
+        });
+        let mut switched = Self { handle, answers, asked: 0 };
+        switched.ask(clock, Ask::Apply(ConfigId::new("make").expect("a name")));
+        switched
+    }
+
+    /// Nanoseconds from request to answer, and of the configurator's own time.
+    fn ask(&mut self, clock: &Clock, ask: Ask) -> (u64, u64) {
+        self.asked += 1;
+        let id = RequestId(self.asked);
+        let request = Request { id, ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+        let begun = clock.now();
+        self.handle.submit(Batch::one(request)).expect("room");
+        let answer = self.answers.recv().expect("an answer");
         assert!(answer.verdict.is_success(), "{answer:?}");
         (clock.now().since(begun).as_nanos() as u64, answer.took.as_nanos() as u64)
-    };
-    let id = ConfigId::new("switch").expect("a name");
-    ask(Ask::Apply(ConfigId::new("make").expect("a name")));
-    let (mut trips, mut own) = (Vec::with_capacity(ROUNDS), Vec::with_capacity(ROUNDS));
-    for round in 0..ROUNDS {
-        let (trip, took) = ask(if round % 2 == 0 { Ask::Apply(id) } else { Ask::UndoOf(id) });
-        trips.push(trip);
-        own.push(took);
     }
-    handle.stop(clock.now() + Duration::from_secs(10));
-    (median(trips), median(own))
+
+    /// The switch and its undo in turn.
+    fn trip(&mut self, clock: &Clock) -> (u64, u64) {
+        let id = ConfigId::new("switch").expect("a name");
+        self.ask(clock, if self.asked % 2 == 1 { Ask::Apply(id) } else { Ask::UndoOf(id) })
+    }
+}
+
+/// Medians of ping-pong, request to status and own time; before each trip everybody rests for so long.
+fn measure(clock: &Clock, others: usize, rest: Duration) -> (u64, u64, u64) {
+    let ping_pong = PingPong::start(clock);
+    let mut switched = Switched::start(clock, others);
+    let (mut bare, mut trips, mut own) = (Vec::new(), Vec::new(), Vec::new());
+    let pause = || {
+        if !rest.is_zero() {
+            clock.sleep(rest);
+        }
+    };
+    for _ in 0..TURNS {
+        // The first ones of a turn find threads that the turn before has let fall asleep.
+        for warm in 0..TURN + 20 {
+            pause();
+            let trip = ping_pong.trip(clock);
+            if warm >= 20 {
+                bare.push(trip);
+            }
+        }
+        for warm in 0..TURN + 20 {
+            pause();
+            let (trip, took) = switched.trip(clock);
+            if warm >= 20 {
+                trips.push(trip);
+                own.push(took);
+            }
+        }
+    }
+    switched.handle.stop(clock.now() + Duration::from_secs(10));
+    (median(bare), median(trips), median(own))
 }
 
 fn main() {
     let clock = Clock::real();
-    let bare = ping_pong(&clock);
-    println!("ping-pong of two threads        {bare:>8} ns (median of {ROUNDS})");
-    for others in [10, 1_000, 10_000] {
-        let (trip, own) = switch(&clock, others);
-        #[allow(clippy::cast_precision_loss)]
-        let ratio = trip as f64 / bare as f64;
-        println!(
-            "switch among {others:>6} components: own time {own:>8} ns, request to status {trip:>8} ns = {ratio:.2} ping-pongs"
-        );
+    for (how, rest) in [("back to back", Duration::ZERO), ("at rest", Duration::from_micros(100))] {
+        println!("{how} (medians of {})", TURNS * TURN);
+        for others in [10, 1_000, 10_000] {
+            let (bare, trip, own) = measure(&clock, others, rest);
+            #[allow(clippy::cast_precision_loss)]
+            let ratio = trip as f64 / bare as f64;
+            println!(
+                "  among {others:>6} components: own time {own:>6} ns; request to status {trip:>6} ns, ping-pong {bare:>6} ns: \
+                 ratio {ratio:.2}"
+            );
+        }
     }
 }

@@ -119,8 +119,8 @@ impl Engine {
                 let call = AssertUnwindSafe(|| fast.platform.execute(index, value, *at, deadline));
                 let outcome =
                     catch_unwind(call).unwrap_or_else(|_| Outcome::Unknown(Cause::Lost("a panic".to_owned())));
-                // Only who stops may have to wait, for its update to end.
-                let took = fast.switch.stops(act).then(|| {
+                // Who stops may have to wait, for its update to end.
+                let took = fast.platform.waited().then(|| {
                     let begun = std::mem::replace(at, self.clock.now());
                     at.since(begun)
                 });

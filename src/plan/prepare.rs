@@ -209,11 +209,6 @@ impl Switch {
         })
     }
 
-    /// Whether an act stops a component, which may have to end an update first.
-    pub fn stops(&self, act: Act) -> bool {
-        matches!(act, Act::Move(_, Transition::Stop, _))
-    }
-
     /// Looks at every component it touches; false: another one has its name.
     fn look(&mut self, system: &System) -> bool {
         self.acts.clear();

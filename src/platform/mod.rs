@@ -174,4 +174,9 @@ pub trait Prepared: Send {
     /// inverse: the value captured). `now`: the time, as its caller last knew it; what is written bears it. Allocates
     /// nothing, takes no lock shared with an activity.
     fn execute(&mut self, index: usize, value: Option<&Value>, now: Time, deadline: Time) -> Outcome;
+
+    /// Whether the step that was carried out last had to wait for something, so that its time is worth measuring.
+    fn waited(&self) -> bool {
+        true
+    }
 }

@@ -11,6 +11,7 @@ use std::sync::Arc;
 struct Resolved {
     inner: Arc<Inner>,
     steps: Vec<Handle>,
+    waited: bool,
 }
 
 struct Handle {
@@ -53,7 +54,7 @@ pub(super) fn prepare(inner: &Arc<Inner>, steps: &[Step]) -> Option<Box<dyn Prep
         handles.push(Handle { slot, number: registry.entry(slot).number, act });
     }
     drop(registry);
-    Some(Box::new(Resolved { inner: inner.clone(), steps: handles }))
+    Some(Box::new(Resolved { inner: inner.clone(), steps: handles, waited: false }))
 }
 
 impl Prepared for Resolved {
@@ -61,6 +62,7 @@ impl Prepared for Resolved {
         let Some(Handle { slot, number, act }) = self.steps.get(index) else {
             return Outcome::NotDone(Cause::Refused("there is no such prepared step".to_owned()));
         };
+        self.waited = false;
         let inner = &self.inner;
         let mut registry = lock(&inner.registry);
         if !registry.still(*slot, *number) {
@@ -78,11 +80,16 @@ impl Prepared for Resolved {
                 }
                 let cell = registry.entry(*slot).cell.clone();
                 drop(registry);
+                self.waited = true;
                 match inner.await_idle(&cell, deadline) {
                     Ok(()) => Outcome::Done(None),
                     Err(outcome) => outcome,
                 }
             }
         }
+    }
+
+    fn waited(&self) -> bool {
+        self.waited
     }
 }
