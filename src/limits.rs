@@ -24,6 +24,14 @@ pub const SOCKET_WRITE: Duration = Duration::from_secs(5);
 
 /// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
 pub const LOG_ENTRIES: usize = 4096;
+
+/// Of these, events that components raise by themselves: a monitor that chatters a thousand times a second displaces its
+/// own past and nobody else's.
+pub const LOG_REPORTS: usize = 1024;
+
+/// How often it is told that events were dropped because a coordinator does not keep up; what comes in between is counted.
+pub const DROPS_TOLD: Duration = Duration::from_secs(1);
+
 /// Events that may wait inside a statechart for its next step. A pure chart never has more than one completion and one
 /// time event per active state; the rest is for functions that send events, and for sets given to `davit sim`.
 pub const CHART_QUEUE: usize = 1024;

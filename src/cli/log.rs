@@ -76,6 +76,11 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))
         }
         "returned" => format!("returned   {}", text(&entry["component"])),
+        "dropped" => format!(
+            "{}    {} events: the coordinator does not keep up",
+            out.paint(Style::Care, "dropped"),
+            entry["events"]
+        ),
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),
     };

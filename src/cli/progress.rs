@@ -97,6 +97,10 @@ impl Progress {
             }
             Happening::Returned { component } => self.line(format!("{time}  {component} returned and was cleaned up")),
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
+            Happening::Dropped { events } => {
+                let word = out.paint(Style::Care, "dropped");
+                self.line(format!("{time}  {word}  {events} events: the coordinator does not keep up"));
+            }
             Happening::Phase { phase: Phase::Broken } => {
                 self.line(format!("{time}  {}", out.paint(Style::Bad, "broken")));
             }

@@ -65,6 +65,11 @@ fn print(out: &Output, status: &Json) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();
         out.line(format!("waiting for  {}", names.join(", ")));
     }
+    let dropped = ["control", "report"].map(|lane| status["dropped"][lane].as_u64().unwrap_or_default());
+    if dropped != [0, 0] {
+        let all = format!("{} events ({} of them answers or an operator's)", dropped[0] + dropped[1], dropped[0]);
+        out.line(format!("{}      {all}: the coordinator does not keep up", out.paint(Style::Care, "dropped")));
+    }
     let empty = Vec::new();
     let stack = status["stack"].as_array().unwrap_or(&empty);
     out.line(format!(

@@ -71,6 +71,14 @@ pub struct Dropped {
     pub report: u64,
 }
 
+impl Dropped {
+    /// This and another one, as one.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { control: self.control + other.control, report: self.report + other.report }
+    }
+}
+
 /// Both lanes.
 #[derive(Debug)]
 pub(super) struct Inbox {

@@ -3,12 +3,15 @@
 //!
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
+use super::lanes::Lanes;
 use super::log::{Answered, Fault, Happening, Log, Phase};
+use crate::coordinator::Refused;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId};
 use crate::time::{Clock, Signal, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -19,6 +22,8 @@ pub type Observer = Arc<dyn Fn(Time, &Happening) + Send + Sync>;
 pub struct Hub {
     clock: Clock,
     state: Mutex<State>,
+    /// Whether events were dropped that nobody was told of.
+    untold: AtomicBool,
     /// Wakes whoever drives the session.
     pub changed: Signal,
     /// Wakes threads outside the clock (those of the control socket).
@@ -34,9 +39,11 @@ struct State {
     faults: Vec<Fault>,
     log: Log,
     observers: Vec<Observer>,
-    /// The newest answers and events, for those who wait for one: `(number, text)`.
-    heard: VecDeque<(u64, String)>,
-    heard_count: u64,
+    /// The newest answers and events, for those who wait for one.
+    heard: Lanes<String>,
+    /// Events that found an inbox full since that was last told, and when it was.
+    dropped: u64,
+    dropped_told: Option<Time>,
     /// The newest answers.
     answers: VecDeque<Answered>,
     active: Vec<String>,
@@ -83,12 +90,14 @@ impl Hub {
                 faults: Vec::new(),
                 log: Log::default(),
                 observers: Vec::new(),
-                heard: VecDeque::new(),
-                heard_count: 0,
+                heard: Lanes::new(limits::HEARD, limits::HEARD),
+                dropped: 0,
+                dropped_told: None,
                 answers: VecDeque::new(),
                 active: Vec::new(),
                 epoch: 0,
             }),
+            untold: AtomicBool::new(false),
             changed: clock.signal(),
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
@@ -122,6 +131,37 @@ impl Hub {
 
     /// Writes down that something happened, and tells the observers.
     pub fn note(&self, what: Happening) {
+        self.record(what, false);
+    }
+
+    /// The same, of an event that a component raised by itself: however many there are, they displace only each other.
+    pub fn report(&self, what: Happening) {
+        self.record(what, true);
+    }
+
+    /// Counts an event that found its coordinator's inbox full. That is told at once, and what comes after it at most once
+    /// in [`limits::DROPS_TOLD`], with the next event that comes then.
+    pub fn taken(&self, taken: Result<(), Refused>) {
+        let full = taken == Err(Refused::Full);
+        if !full && !self.untold.load(Ordering::Relaxed) {
+            return;
+        }
+        let now = self.clock.now();
+        let events = {
+            let mut state = self.lock();
+            state.dropped += u64::from(full);
+            let soon = state.dropped_told.is_some_and(|told| now < told + limits::DROPS_TOLD);
+            self.untold.store(soon && state.dropped > 0, Ordering::Relaxed);
+            if soon || state.dropped == 0 {
+                return;
+            }
+            state.dropped_told = Some(now);
+            std::mem::take(&mut state.dropped)
+        };
+        self.note(Happening::Dropped { events });
+    }
+
+    fn record(&self, what: Happening, is_report: bool) {
         let now = self.clock.now();
         let observers = {
             let mut state = self.lock();
@@ -137,15 +177,10 @@ impl Hub {
                 _ => None,
             };
             if let Some(event) = heard {
-                state.heard_count += 1;
-                let number = state.heard_count;
-                if state.heard.len() == limits::HEARD {
-                    state.heard.pop_front();
-                }
-                state.heard.push_back((number, event));
+                state.heard.push(event, is_report);
             }
             state.epoch += 1;
-            state.log.push(now, what.clone());
+            state.log.push(now, what.clone(), is_report);
             state.observers.clone()
         };
         for observer in observers {
@@ -227,7 +262,7 @@ impl Hub {
         state
             .answers
             .iter()
-            .filter(|a| !a.ok && state.heard.iter().any(|(number, text)| *number > since && *text == a.answer))
+            .filter(|a| !a.ok && state.heard.iter().any(|(number, text)| number > since && *text == a.answer))
             .flat_map(|a| a.reasons.iter().map(move |reason| format!("{}: {reason}", a.answer)))
             .collect()
     }
@@ -275,12 +310,12 @@ impl Hub {
 
     /// How many events and answers were heard so far: where a wait for the next one begins.
     pub fn heard(&self) -> u64 {
-        self.lock().heard_count
+        self.lock().heard.count()
     }
 
     /// Whether `event` was heard after the `since`-th; answers its number.
     pub fn heard_since(&self, event: &str, since: u64) -> Option<u64> {
-        self.lock().heard.iter().find(|(number, text)| *number > since && text == event).map(|(number, _)| *number)
+        self.lock().heard.iter().find(|(number, text)| *number > since && *text == event).map(|(number, _)| number)
     }
 
     /// The answer to a request, if it has come (and is not long ago).

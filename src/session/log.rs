@@ -1,12 +1,14 @@
-//! What happened, in memory: a bounded ring of entries, oldest dropped first.
+//! What happened, in memory: a bounded number of entries, oldest dropped first.
 
+use super::lanes::Lanes;
 use crate::configurator::{StepEnd, StepName};
+use crate::coordinator::Dropped;
 use crate::limits;
 use crate::model::Snapshot;
 use crate::time::Time;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// One thing that happened.
@@ -77,6 +79,11 @@ pub enum Happening {
     Forced {
         /// What.
         note: String,
+    },
+    /// A coordinator does not keep up: events found its inbox full and were dropped.
+    Dropped {
+        /// How many since this was last told.
+        events: u64,
     },
     /// A function of the coordinator printed something, or failed.
     Said {
@@ -171,31 +178,30 @@ impl Phase {
     }
 }
 
-/// The ring.
-#[derive(Debug, Default)]
-pub struct Log {
-    entries: VecDeque<Entry>,
-    dropped: u64,
+/// What happened, in memory.
+#[derive(Debug)]
+pub struct Log(Lanes<Entry>);
+
+impl Default for Log {
+    fn default() -> Self {
+        Self(Lanes::new(limits::LOG_ENTRIES - limits::LOG_REPORTS, limits::LOG_REPORTS))
+    }
 }
 
 impl Log {
-    /// Adds an entry, dropping the oldest past the bound.
-    pub fn push(&mut self, at: Time, what: Happening) {
-        if self.entries.len() == limits::LOG_ENTRIES {
-            self.entries.pop_front();
-            self.dropped += 1;
-        }
-        self.entries.push_back(Entry { at: at.as_secs_f64(), what });
+    /// Adds an entry, dropping the oldest of its kind past the bound. `is_report`: a component raised an event.
+    pub fn push(&mut self, at: Time, what: Happening, is_report: bool) {
+        self.0.push(Entry { at: at.as_secs_f64(), what }, is_report);
     }
 
     /// The newest `last` entries, oldest first.
     pub fn last(&self, last: usize) -> Vec<Entry> {
-        self.entries.iter().skip(self.entries.len().saturating_sub(last)).cloned().collect()
+        self.0.newest(last).cloned().collect()
     }
 
     /// How many entries were dropped.
     pub fn dropped(&self) -> u64 {
-        self.dropped
+        self.0.dropped()
     }
 }
 
@@ -244,6 +250,8 @@ pub struct StatusView {
     pub faults: Vec<Fault>,
     /// Requests that are not answered yet.
     pub outstanding: Vec<String>,
+    /// Events that found a coordinator's inbox full, since the session began.
+    pub dropped: Dropped,
     /// Seconds of its clock since its start.
     pub at: f64,
 }

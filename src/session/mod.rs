@@ -6,6 +6,7 @@
 
 pub mod client;
 pub mod hub;
+mod lanes;
 mod life;
 pub mod log;
 mod parts;

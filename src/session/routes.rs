@@ -130,14 +130,13 @@ impl ToConfigurator {
             .map(|(_, other)| other.clone())
             .collect();
         for other in others {
-            // A full lane counts what it drops.
-            let _ = other.deliver(Incoming::report(event));
+            self.hub.taken(other.deliver(Incoming::report(event)));
         }
     }
 
     fn deliver(&self, incoming: Incoming) {
         if let Some(coordinator) = self.junction.upgrade().and_then(|j| j.coordinator(self.name)) {
-            let _ = coordinator.deliver(incoming);
+            self.hub.taken(coordinator.deliver(incoming));
         }
     }
 }
@@ -183,7 +182,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
             (Some(owner), Ok(visit)) => Incoming::answer(event, Tag { owner, visit }),
             _ => Incoming::control(event),
         };
-        let _ = coordinator.deliver(incoming);
+        hub.taken(coordinator.deliver(incoming));
     }
     // Only now: who sees that all is answered also sees that the coordinator has something to react to.
     hub.settled(answer.request.id);
@@ -208,9 +207,8 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
             return;
         }
     };
-    hub.note(Happening::Event { event: event.to_string(), from });
+    hub.report(Happening::Event { event: event.to_string(), from });
     for coordinator in junction.all() {
-        // A full lane counts what it drops.
-        let _ = coordinator.deliver(Incoming::report(event));
+        hub.taken(coordinator.deliver(Incoming::report(event)));
     }
 }

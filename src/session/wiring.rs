@@ -9,7 +9,7 @@ use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
 use crate::configurator::{
     Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
 };
-use crate::coordinator::Incoming;
+use crate::coordinator::{Dropped, Incoming};
 use crate::functions::Opener;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
@@ -209,6 +209,7 @@ impl Session {
             stack,
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
+            dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
         }
     }

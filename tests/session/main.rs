@@ -2,6 +2,7 @@
 
 mod beside;
 mod bringup;
+mod flood;
 mod hangs;
 mod life;
 mod socket;
