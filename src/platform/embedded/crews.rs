@@ -25,7 +25,7 @@ pub(super) struct Crew {
     pub(super) members: Vec<Option<u32>>,
     pub(super) holes: usize,
     /// Components being made for it.
-    pub(super) expected: usize,
+    pub(super) expected: Vec<ComponentName>,
     pub(super) unpublished: bool,
     pub(super) disordered: bool,
     pub(super) looped: bool,
@@ -44,7 +44,7 @@ impl Registry {
                 thread: None,
                 members: Vec::new(),
                 holes: 0,
-                expected: 0,
+                expected: Vec::new(),
                 unpublished: false,
                 disordered: false,
                 looped: false,
@@ -122,17 +122,19 @@ impl Registry {
         }
     }
 
-    /// A component that was to be made for an activity has been made, or not.
-    pub(super) fn arrived(&mut self, name: Ident) {
-        if let Some(crew) = self.crews.get_mut(&name) {
-            crew.expected -= 1;
+    /// A component that was to be made for an activity has been made, or not, or is waited for no longer.
+    pub(super) fn arrived(&mut self, component: ComponentName, name: Ident) {
+        if let Some(crew) = self.crews.get_mut(&name)
+            && let Some(at) = crew.expected.iter().position(|expected| *expected == component)
+        {
+            crew.expected.swap_remove(at);
         }
         self.end_if_empty(name);
     }
 
     /// Ends an activity that has no component any more.
     pub(super) fn end_if_empty(&mut self, name: Ident) {
-        if self.crews.get(&name).is_some_and(|crew| crew.expected == 0 && crew.holes == crew.members.len())
+        if self.crews.get(&name).is_some_and(|crew| crew.expected.is_empty() && crew.holes == crew.members.len())
             && let Some(crew) = self.crews.remove(&name)
         {
             self.hide_activity(name);

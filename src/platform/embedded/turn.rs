@@ -15,7 +15,7 @@ use crate::runtime::beat::Beat;
 use crate::runtime::cell::Cell;
 use crate::runtime::{Notice, guard};
 use crate::time::{RecvError, Time, lock};
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -27,6 +27,8 @@ struct Turn {
     /// When the step under way began.
     began: AtomicU64,
     ended: Mutex<Vec<Ended>>,
+    /// Whether the one that was given up was not in quarantine before.
+    fresh: AtomicBool,
 }
 
 /// Nothing more is begun, and what is under way comes back too late.
@@ -42,10 +44,17 @@ impl Turn {
         self.began.store(now.0, Ordering::Release);
         i == 0 || self.move_on(2 * i - 1, 2 * i)
     }
+}
 
-    /// Step `i` has come to its end in time. Said before its effect can be seen, so that nobody gives up what is there.
-    fn in_time(&self, i: usize) -> bool {
-        self.move_on(2 * i, 2 * i + 1)
+/// Who carries a step out: a worker, as number so and so of a turn, or whoever calls.
+#[derive(Clone, Copy)]
+struct Place<'a>(Option<(&'a Turn, usize)>);
+
+impl Place<'_> {
+    /// The step has come to its end in time. Asked once, before its effect can be seen, so that nobody gives up what is
+    /// there.
+    fn in_time(self) -> bool {
+        self.0.is_none_or(|(turn, i)| turn.move_on(2 * i, 2 * i + 1))
     }
 }
 
@@ -61,8 +70,13 @@ impl Inner {
     /// many as are done at once. No further one is begun after one that is not done, nor a while after the first.
     pub(super) fn in_turn(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
         let first = self.clock.now();
-        let turn =
-            Arc::new(Turn { steps, at: AtomicUsize::new(0), began: AtomicU64::new(first.0), ended: Mutex::default() });
+        let turn = Arc::new(Turn {
+            steps,
+            at: AtomicUsize::new(0),
+            began: AtomicU64::new(first.0),
+            ended: Mutex::default(),
+            fresh: AtomicBool::new(false),
+        });
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
             let (inner, turn) = (self.own.clone(), turn.clone());
@@ -113,9 +127,9 @@ impl Inner {
             return false;
         }
         let step = &turn.steps[at / 2];
-        registry.quarantined.insert(step.component());
-        if let Step::Create { activity, .. } = step {
-            registry.arrived(activity.unwrap_or(self.default_activity));
+        turn.fresh.store(registry.quarantined.insert(step.component()), Ordering::Release);
+        if let Step::Create { component, activity, .. } = step {
+            registry.arrived(*component, activity.unwrap_or(self.default_activity));
         }
         true
     }
@@ -127,7 +141,7 @@ impl Inner {
             if i > 0 && now.since(first) >= limits::BRIEF_TURN || !turn.begin(i, now) {
                 return;
             }
-            let Brief::Ended(outcome) = self.brief(step, &|| turn.in_time(i)) else { return };
+            let Brief::Ended(outcome) = self.brief(step, Place(Some((turn, i)))) else { return };
             let done = matches!(outcome, Outcome::Done(_));
             lock(&turn.ended).push(Ended { outcome, took: Some(self.clock.now().since(now)) });
             if !done {
@@ -138,7 +152,7 @@ impl Inner {
 
     /// Carries out a step of a type that promises to be made and dropped at once, in the caller's thread.
     pub(super) fn at_once(&self, step: &Step) -> Outcome {
-        match self.brief(step, &|| true) {
+        match self.brief(step, Place(None)) {
             Brief::Ended(outcome) => outcome,
             Brief::Late => Outcome::Unknown(Cause::Timeout),
         }
@@ -152,32 +166,18 @@ impl Inner {
         })
     }
 
-    /// `in_time`: whether somebody still waits; asked once, before the effect can be seen.
-    fn brief(&self, step: &Step, in_time: &dyn Fn() -> bool) -> Brief {
+    fn brief(&self, step: &Step, place: Place) -> Brief {
         match step {
             Step::Create { component, ty, activity, properties } => {
-                self.create(*component, *ty, *activity, properties, in_time)
+                self.create(*component, *ty, *activity, properties, place)
             }
-            Step::Destroy { component } => self.destroy(*component, in_time),
-            other => {
-                in_time();
-                Brief::Ended(Outcome::NotDone(Cause::Refused(format!("`{other}` is not brief"))))
-            }
+            Step::Destroy { component } => self.destroy(*component, place),
+            other => self.not_done(other.component(), Cause::Refused(format!("`{other}` is not brief")), place),
         }
     }
 
-    fn create(
-        &self,
-        name: ComponentName,
-        ty: TypeName,
-        asked: Option<Ident>,
-        values: &[Value],
-        in_time: &dyn Fn() -> bool,
-    ) -> Brief {
-        let not_done = |cause| {
-            in_time();
-            Brief::Ended(Outcome::NotDone(cause))
-        };
+    fn create(&self, name: ComponentName, ty: TypeName, asked: Option<Ident>, values: &[Value], place: Place) -> Brief {
+        let not_done = |cause| self.not_done(name, cause, place);
         let Some(kind) = self.kinds.get(&ty) else {
             return not_done(Cause::Refused(format!("no library here makes a `{ty}`")));
         };
@@ -191,6 +191,7 @@ impl Inner {
         let wake = {
             let mut registry = lock(&self.registry);
             if let Err(cause) = registry.is_free(name) {
+                drop(registry);
                 return not_done(cause);
             }
             let make = || {
@@ -203,7 +204,7 @@ impl Inner {
                 Activity::new(crew, spec, &self.clock, Box::new(late))
             };
             let crew = registry.crew(crew, make, &self.clock);
-            crew.expected += 1;
+            crew.expected.push(name);
             let activity = &crew.activity;
             activity.is_event_driven().then(|| activity.signal.clone())
         };
@@ -212,11 +213,11 @@ impl Inner {
         beat.set_now(self.clock.now());
         let made = guard::call(|| kind.make(&beat, values.to_vec()));
         let mut registry = lock(&self.registry);
-        if !in_time() {
+        if !place.in_time() {
+            registry.arrived(name, crew);
             drop(registry);
             let _ = guard::call(|| drop(made));
-            self.back_again(name);
-            return Brief::Late;
+            return self.back_again(name, place);
         }
         let result = match made {
             Err(panic) => Err(Cause::Panicked(panic)),
@@ -230,11 +231,11 @@ impl Inner {
                 }
             },
         };
-        registry.arrived(crew);
+        registry.arrived(name, crew);
         Brief::Ended(super::steps::outcome(result))
     }
 
-    fn destroy(&self, name: ComponentName, in_time: &dyn Fn() -> bool) -> Brief {
+    fn destroy(&self, name: ComponentName, place: Place) -> Brief {
         let mut registry = lock(&self.registry);
         let taken = registry.find(name).and_then(|slot| {
             let cell = registry.entry(slot).cell.clone();
@@ -252,10 +253,7 @@ impl Inner {
         drop(registry);
         let taken = match taken {
             Ok(taken) => taken,
-            Err(cause) => {
-                in_time();
-                return Brief::Ended(Outcome::NotDone(cause));
-            }
+            Err(cause) => return self.not_done(name, cause, place),
         };
         // The component's own code, here too: it may close devices.
         let dropped = guard::call(|| drop(taken));
@@ -263,16 +261,22 @@ impl Inner {
             // It is gone all the same.
             self.notices.send(Notice::Faulted { component: name, reason, at: self.clock.now() });
         }
-        if in_time() {
-            return Brief::Ended(Outcome::Done(None));
-        }
-        self.back_again(name);
-        Brief::Late
+        if place.in_time() { Brief::Ended(Outcome::Done(None)) } else { self.back_again(name, place) }
+    }
+
+    /// It did not happen, and nothing of the component's own code was called.
+    fn not_done(&self, name: ComponentName, cause: Cause, place: Place) -> Brief {
+        if place.in_time() { Brief::Ended(Outcome::NotDone(cause)) } else { self.back_again(name, place) }
     }
 
     /// What was given up has come back, and nothing is left of it.
-    fn back_again(&self, name: ComponentName) {
-        lock(&self.registry).quarantined.remove(&name);
-        self.tell(PlatformEvent::Returned { component: name, at: self.clock.now() });
+    fn back_again(&self, name: ComponentName, place: Place) -> Brief {
+        let mut registry = lock(&self.registry);
+        if place.0.is_some_and(|(turn, _)| turn.fresh.load(Ordering::Acquire)) {
+            registry.quarantined.remove(&name);
+            drop(registry);
+            self.tell(PlatformEvent::Returned { component: name, at: self.clock.now() });
+        }
+        Brief::Late
     }
 }
