@@ -1,6 +1,7 @@
 //! The youBot reference application, measured in simulated time.
 
 mod bench;
+mod chatter;
 mod coupling;
 mod files;
 mod golden;
