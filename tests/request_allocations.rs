@@ -106,7 +106,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         ask(Ask::UndoOf(switch));
     }
     // A channel makes its list of sleepers when a thread first sleeps in it, which on a busy machine may be late. What
-    // is made once ends; what a request makes shows in every round.
+    // is made once ends; what a request makes shows in every round, and what grows by doubling in five of the twenty.
     let told = steps.load(Ordering::Relaxed);
     let rounds: Vec<u64> = std::iter::repeat_with(|| {
         let before = COUNT.load(Ordering::SeqCst);
@@ -117,9 +117,9 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         COUNT.load(Ordering::SeqCst) - before
     })
     .take(20)
-    .scan(false, |ended, count| (!std::mem::replace(ended, count == 0)).then_some(count))
     .collect();
     assert!(steps.load(Ordering::Relaxed) - told >= 4_000, "its steps are told on the way");
-    assert_eq!(rounds.last(), Some(&0), "allocations in each round of 2,000 requests: {rounds:?}");
+    let clean = rounds.iter().filter(|allocations| **allocations == 0).count();
+    assert!(clean >= 17, "allocations in each round of 2,000 requests: {rounds:?}");
     handle.stop(clock.now() + Duration::from_secs(10));
 }

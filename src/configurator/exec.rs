@@ -92,7 +92,7 @@ impl Engine {
                 at += 1;
                 continue;
             }
-            if run.gives_way && self.urgent() {
+            if self.gives_way(run) {
                 return End::GaveWay;
             }
             match self.platform.execution(&work[at].step) {
@@ -131,7 +131,7 @@ impl Engine {
         let execution = |step: &Step| platform.execution(step);
         let mut order = Order::new(work, from, &execution);
         loop {
-            if run.gives_way && self.urgent() {
+            if self.gives_way(run) {
                 return End::GaveWay;
             }
             if run.stops() {
@@ -193,7 +193,7 @@ impl Engine {
             if run.flights.is_empty() {
                 return true;
             }
-            if run.gives_way && self.urgent() {
+            if self.gives_way(run) {
                 return false;
             }
             self.await_flight(run);
@@ -300,74 +300,92 @@ impl Engine {
 
     /// Settles unknown outcomes by reading the platform back. False: it gave way (and some are still unknown).
     fn settle_unread(&mut self, work: &[Item], run: &mut Run) -> bool {
+        // Several are settled by one look at the whole: a platform that does not answer is asked once, not once for each.
+        let several =
+            run.unread.iter().filter(|(i, _)| !matches!(work[*i as usize].step, Step::Operation(_))).count() > 1;
+        let mut whole = None;
         while let Some((i, cause)) = run.unread.pop() {
             let step = &work[i as usize].step;
             self.note_quarantine();
-            match self.settle(step, run) {
+            let settled = match self.question(step) {
+                Err(settled) => settled,
+                Ok(call) => {
+                    let asked = match &whole {
+                        Some(reply) => Ok(reply),
+                        None => {
+                            let call = if several { Call::Observe } else { call };
+                            self.ask(call, run.gives_way).map(|reply| &*whole.insert(reply))
+                        }
+                    };
+                    match asked {
+                        Err(GaveWay) => {
+                            run.unread.push((i, cause));
+                            return false;
+                        }
+                        Ok(reply) => self.judge(step, reply.as_ref(), run),
+                    }
+                }
+            };
+            match settled {
                 Settled::Happened => self.happened(work, i, run),
                 Settled::DidNot => self.did_not_happen(step, i, cause, run),
                 Settled::Nobody => {
                     run.over[i as usize] = true;
                     run.unsettled.push(i);
                 }
-                Settled::GaveWay => {
-                    run.unread.push((i, cause));
-                    return false;
-                }
             }
         }
         true
     }
 
-    /// Reads back whether `step`, which the model does not have yet, happened.
-    fn settle(&mut self, step: &Step, run: &mut Run) -> Settled {
-        let component = step.component();
-        let call = match step {
+    /// What must be observed to know whether `step` happened; an error: what is known without.
+    fn question(&self, step: &Step) -> Result<Call, Settled> {
+        match step {
             Step::State { .. } | Step::Create { .. } | Step::Destroy { .. } | Step::PropertySet { .. } => {
-                Call::ObserveComponent(component)
+                Ok(Call::ObserveComponent(step.component()))
             }
-            Step::Connect { .. } | Step::Disconnect { .. } | Step::PortWrite { .. } => Call::Observe,
+            Step::Connect { .. } | Step::Disconnect { .. } | Step::PortWrite { .. } => Ok(Call::Observe),
             // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known.
             Step::Operation(call) => {
                 let leaves_nothing = self
                     .system
-                    .component(component)
+                    .component(step.component())
                     .and_then(|node| node.ty.operations.get(&call.operation.member))
                     .is_some_and(|operation| operation.effect == crate::model::Effect::None);
-                return if leaves_nothing { Settled::DidNot } else { Settled::Nobody };
+                Err(if leaves_nothing { Settled::DidNot } else { Settled::Nobody })
             }
+        }
+    }
+
+    /// Whether `step`, which the model does not have yet, happened, from what was observed.
+    fn judge(&mut self, step: &Step, reply: Option<&Reply>, run: &mut Run) -> Settled {
+        let component = step.component();
+        let (one, whole) = match reply {
+            Some(Reply::ObservedComponent(Ok(seen))) => (seen.as_ref(), None),
+            Some(Reply::Observed(Ok(seen))) => (seen.components.get(&component), Some(seen)),
+            _ => return Settled::Nobody,
         };
-        let reply = match self.ask(call, run.gives_way) {
-            Ok(reply) => reply,
-            Err(GaveWay) => return Settled::GaveWay,
-        };
-        let is = match reply {
-            Some(Reply::ObservedComponent(Ok(seen))) => match step {
-                Step::State { transition, .. } => match seen {
-                    Some(seen) if seen.state == transition.target() => Some(true),
-                    Some(seen) if seen.state == RunState::Faulted => {
-                        self.made_faulted(component, run);
-                        Some(false)
-                    }
-                    Some(seen) => {
-                        (self.system.component(component).map(|node| node.state) == Some(seen.state)).then_some(false)
-                    }
-                    None => None,
-                },
-                Step::Create { ty, .. } => Some(seen.is_some_and(|seen| seen.ty == *ty)),
-                Step::Destroy { .. } => Some(seen.is_none()),
-                Step::PropertySet { property, value } => {
-                    seen.and_then(|seen| seen.properties.get(&property.member).map(|now| now == value))
+        let is = match step {
+            Step::State { transition, .. } => match one {
+                Some(seen) if seen.state == transition.target() => Some(true),
+                Some(seen) if seen.state == RunState::Faulted => {
+                    self.made_faulted(component, run);
+                    Some(false)
                 }
-                _ => None,
+                Some(seen) => {
+                    (self.system.component(component).map(|node| node.state) == Some(seen.state)).then_some(false)
+                }
+                None => None,
             },
-            Some(Reply::Observed(Ok(seen))) => match step {
-                Step::Connect { from, to, policy } => Some(seen.connections.get(&(*from, *to)) == Some(policy)),
-                Step::Disconnect { from, to } => Some(!seen.connections.contains_key(&(*from, *to))),
-                Step::PortWrite { port, value } => Some(seen.ports.get(port) == value.as_ref()),
-                _ => None,
-            },
-            _ => None,
+            Step::Create { ty, .. } => Some(one.is_some_and(|seen| seen.ty == *ty)),
+            Step::Destroy { .. } => Some(one.is_none()),
+            Step::PropertySet { property, value } => {
+                one.and_then(|seen| seen.properties.get(&property.member).map(|now| now == value))
+            }
+            Step::Connect { from, to, policy } => whole.map(|seen| seen.connections.get(&(*from, *to)) == Some(policy)),
+            Step::Disconnect { from, to } => whole.map(|seen| !seen.connections.contains_key(&(*from, *to))),
+            Step::PortWrite { port, value } => whole.map(|seen| seen.ports.get(port) == value.as_ref()),
+            Step::Operation(_) => None,
         };
         match is {
             Some(true) => Settled::Happened,
@@ -414,7 +432,6 @@ enum Settled {
     Happened,
     DidNot,
     Nobody,
-    GaveWay,
 }
 
 /// Something urgent came while an answer was waited for.

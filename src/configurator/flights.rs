@@ -11,6 +11,8 @@ use crate::platform::{Cause, Ended, Execution, Outcome};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A call that is out: one blocking step, or several brief ones.
 pub(super) struct Flight {
@@ -18,12 +20,15 @@ pub(super) struct Flight {
     items: SmallVec<[u32; 1]>,
     started: Time,
     deadline: Time,
+    /// Set: no further one of several is to be begun.
+    stop: Arc<AtomicBool>,
 }
 
 impl Engine {
     /// Hands items to a worker: one of any kind, or several brief ones. Their preconditions hold.
     pub(super) fn launch(&mut self, work: &[Item], items: SmallVec<[u32; 1]>, run: &mut Run) {
         let started = self.clock.now();
+        let stop = Arc::<AtomicBool>::default();
         let step = |i: &u32| &work[*i as usize].step;
         items.iter().for_each(|i| self.tell_started(step(i)));
         let (call, deadline) = match *items {
@@ -31,12 +36,12 @@ impl Engine {
             // The last of them begins within the turn.
             _ => {
                 let steps = items.iter().map(|i| step(i).clone()).collect();
-                (Call::Several(steps, self.patience), started + limits::BRIEF_TURN + self.patience)
+                (Call::Several(steps, self.patience, stop.clone()), started + limits::BRIEF_TURN + self.patience)
             }
         };
         let deadline = deadline.min(run.until);
         let ticket = self.pool.start(call, deadline);
-        run.flights.push(Flight { ticket, items, started, deadline });
+        run.flights.push(Flight { ticket, items, started, deadline, stop });
     }
 
     /// Carries out the brief steps from `work[from]` on, as many as go in one call, and takes in what came of them. False:
@@ -68,7 +73,7 @@ impl Engine {
         }
         self.launch(work, items, run);
         while !run.flights.is_empty() {
-            if run.gives_way && self.urgent() {
+            if self.gives_way(run) {
                 return false;
             }
             self.await_flight(run);
@@ -84,10 +89,19 @@ impl Engine {
         true
     }
 
+    /// Whether something urgent waits that this gives way to; then no more of it is begun by the calls that are out.
+    pub(super) fn gives_way(&self, run: &Run) -> bool {
+        let gives_way = run.gives_way && self.urgent();
+        if gives_way {
+            run.flights.iter().for_each(|flight| flight.stop.store(true, Ordering::Release));
+        }
+        gives_way
+    }
+
     /// Waits until a call is back or given up, or something urgent came.
     pub(super) fn await_flight(&mut self, run: &Run) {
         while !run.flights.iter().any(|flight| self.has_reply(flight.ticket)) {
-            if run.gives_way && self.urgent() {
+            if self.gives_way(run) {
                 return;
             }
             let until = run.flights.iter().map(|flight| flight.deadline).min().unwrap_or(Time::NEVER);

@@ -12,6 +12,7 @@ use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
 use crate::time::{Clock, Receiver, Sender, Time};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// A call of the platform, by its number.
@@ -21,8 +22,8 @@ pub(super) struct Ticket(pub u64);
 /// What a worker is to call.
 pub(super) enum Call {
     Execute(Step),
-    /// Several brief steps, each with so much time.
-    Several(Vec<Step>, Duration),
+    /// Several brief steps, each with so much time; none is begun any more once it is set.
+    Several(Vec<Step>, Duration, Arc<AtomicBool>),
     Observe,
     ObserveComponent(ComponentName),
 }
@@ -64,9 +65,9 @@ fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
     let lost = || ObserveError::Lost("the platform panicked".to_owned());
     match call {
         Call::Execute(step) => Reply::Executed(execute(platform, &step, deadline)),
-        Call::Several(steps, each) => {
+        Call::Several(steps, each, stop) => {
             let count = steps.len();
-            let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline)));
+            let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline, &stop)));
             Reply::Several(several.unwrap_or_else(|_| {
                 let outcome = Outcome::Unknown(Cause::Lost("the platform panicked".to_owned()));
                 vec![Ended { outcome, took: None }; count]

@@ -9,6 +9,7 @@ pub mod simulated;
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
 use crate::time::Time;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// How a step ended, as far as the platform knows.
@@ -123,12 +124,13 @@ pub trait Platform: Send + Sync {
     fn execute(&self, step: &Step, deadline: Time) -> Outcome;
 
     /// Carries out brief steps, none of which needs another one, in their order: each has `each` from its beginning, and
-    /// `until` at most. Begins no further one after one that is not done, nor after [`BRIEF_TURN`](crate::limits::BRIEF_TURN). Answers for
-    /// those that were begun, at least one; the others did not happen.
+    /// `until` at most. Begins no further one after one that is not done, nor after
+    /// [`BRIEF_TURN`](crate::limits::BRIEF_TURN), nor once `stop` is set. Answers for those that were begun, at least one;
+    /// the others did not happen.
     ///
     /// A platform that calls steps brief carries out several; by itself this carries out the first.
-    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
-        let _ = each;
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
+        let _ = (each, stop);
         steps.iter().take(1).map(|step| Ended { outcome: self.execute(step, until), took: None }).collect()
     }
 

@@ -1,12 +1,13 @@
 //! Brief steps: several in one call of the platform, in any manner a platform may carry them out.
 
 use crate::rig::*;
+use davit::configurator::{Progress, progress::StepEnd};
 use davit::model::*;
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::simulated::{Faults, Options, Simulated};
 use davit::platform::{Ended, Execution, Outcome, Platform};
 use davit::time::Time;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +24,8 @@ enum Manner {
     Panics,
     /// Does not come back for half a minute, once, after the first of them.
     Lost,
+    /// The same, and cannot be observed meanwhile.
+    Gone,
 }
 
 /// Creating and destroying are brief here; the calls that carry them out are counted.
@@ -58,26 +61,27 @@ impl Platform for Hasty {
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
         Platform::execute(&self.inner, step, deadline)
     }
-    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
         let first = self.calls.fetch_add(1, Ordering::SeqCst) == 0;
         match self.manner {
             Manner::One => self.each(&steps[..1], each, until),
             Manner::Slow(ms) => {
                 let clock = self.inner.clock();
-                steps
-                    .iter()
-                    .flat_map(|step| {
+                let mut ended = Vec::new();
+                for step in &steps {
+                    if ended.is_empty() || !stop.load(Ordering::SeqCst) {
                         clock.sleep(Duration::from_millis(ms));
-                        self.each(std::slice::from_ref(step), each, until)
-                    })
-                    .collect()
+                        ended.extend(self.each(std::slice::from_ref(step), each, until));
+                    }
+                }
+                ended
             }
             Manner::Silent if first => Vec::new(),
             Manner::Panics if first => {
                 self.each(&steps[..1], each, until);
                 panic!("a defect of the platform")
             }
-            Manner::Lost if first => {
+            Manner::Lost | Manner::Gone if first => {
                 let ended = self.each(&steps[..1], each, until);
                 self.inner.clock().sleep(Duration::from_secs(30));
                 ended
@@ -92,6 +96,11 @@ fn rig(manner: Manner, blocking: bool) -> (Rig, Arc<AtomicUsize>) {
     let counted = calls.clone();
     let options = Options { blocking, ..Options::default() };
     (Rig::with(scenario(), options, move |inner| Arc::new(Hasty { inner, manner, calls: counted })), calls)
+}
+
+/// Whether it tells that a step of that name was done.
+fn told_of(told: &Progress, verb: &str) -> bool {
+    matches!(told, Progress::Ended { step, end: StepEnd::Done, undoing: false, .. } if step.verb == verb)
 }
 
 #[test]
@@ -130,6 +139,23 @@ fn a_platform_that_breaks_its_word_is_read_back() {
 }
 
 #[test]
+fn a_platform_that_does_not_answer_is_not_asked_for_each() {
+    let (rig, _) = rig(Manner::Gone, false);
+    let blind = Faults { blind: true, ..Faults::default() };
+    rig.submit("make");
+    rig.wait(0.01);
+    rig.platform.set_faults(blind);
+    let began = rig.clock.now();
+    while rig.events().is_empty() {
+        rig.wait(0.1);
+        assert!(rig.clock.now().since(began) < Duration::from_millis(4_500), "one question is enough");
+    }
+    assert_eq!(rig.events(), ["make.broken"]);
+    rig.wait(60.0);
+    rig.each_answered_once();
+}
+
+#[test]
 fn a_safe_configuration_comes_before_the_rest_of_many() {
     let (rig, _) = rig(Manner::Slow(100), false);
     rig.submit("make");
@@ -137,6 +163,9 @@ fn a_safe_configuration_comes_before_the_rest_of_many() {
     rig.submit("quiet");
     rig.wait(0.01);
     assert_eq!(rig.events(), ["quiet.ok"], "it does not wait for the end of `make`");
+    rig.wait(0.19);
+    let made = rig.progress.lock().unwrap().iter().filter(|told| told_of(told, "create")).count();
+    assert_eq!(made, 2, "the third was not begun any more");
     rig.wait(10.0);
     rig.in_step();
     rig.each_answered_once();

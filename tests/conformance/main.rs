@@ -45,6 +45,7 @@ macro_rules! every_rule {
             a_quarantined_component_can_be_disconnected,
             a_call_that_returns_late_is_cleaned_up,
             brief_steps_are_carried_out_as_far_as_they_are_done,
+            what_is_not_done_by_its_deadline_does_not_happen_later,
             unknown_is_settled_by_reading_back,
             events_of_components_reach_the_sink,
             prepared_steps_do_what_executed_ones_do,

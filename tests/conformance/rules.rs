@@ -3,6 +3,8 @@
 use crate::bed::*;
 use davit::model::*;
 use davit::platform::{Cause, Ended, Outcome, PlatformEvent};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use {Policy::Buffer, Policy::Data, Transition::Cleanup, Transition::Configure, Transition::Start, Transition::Stop};
 
@@ -355,7 +357,7 @@ pub fn brief_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) {
     let names = ["a", "b", "c"];
     let mut steps: Vec<Step> = names.iter().map(|n| create(n)).collect();
     while !steps.is_empty() {
-        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until());
+        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until(), &Arc::default());
         assert!(!ended.is_empty() && ended.len() <= steps.len());
         assert!(ended.iter().all(|e| e.outcome == Outcome::Done(None)), "{ended:?}");
         steps.drain(..ended.len());
@@ -364,7 +366,7 @@ pub fn brief_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) {
     // One that hangs ends the turn: what comes before it is done, what comes after it is not begun.
     let mut steps = vec![destroy("a"), create_misbehaving("bad"), create("d"), destroy("b")];
     while steps[0].component() != name("bad") {
-        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until());
+        let ended = made.platform.execute_brief(steps.clone(), LIMIT, until(), &Arc::default());
         let done = ended.iter().take_while(|e| e.outcome == Outcome::Done(None)).count();
         assert!(done > 0, "{ended:?}");
         steps.drain(..done);
@@ -375,7 +377,7 @@ pub fn brief_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) {
         }
     }
     if made.platform.quarantined().is_empty() {
-        let ended = made.platform.execute_brief(steps, LIMIT, made.deadline());
+        let ended = made.platform.execute_brief(steps, LIMIT, made.deadline(), &Arc::default());
         assert_eq!(ended[0].outcome, Outcome::Unknown(Cause::Timeout));
     }
     assert_eq!(made.platform.quarantined(), [name("bad")]);
@@ -383,8 +385,30 @@ pub fn brief_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) {
     made.wait(Duration::from_secs(5));
     assert!(made.platform.quarantined().is_empty());
     assert_eq!(made.see().components.keys().copied().collect::<Vec<_>>(), [name("b"), name("c")], "nothing else began");
-    let wrong = made.platform.execute_brief(vec![create("b"), create("e")], LIMIT, until());
+    // Once it is told to stop it begins no second one.
+    let stop = Arc::new(AtomicBool::new(true));
+    let stopped = made.platform.execute_brief(vec![destroy("c"), destroy("b")], LIMIT, until(), &stop);
+    assert!(matches!(stopped[..], [Ended { outcome: Outcome::Done(None), .. }]), "{stopped:?}");
+    assert_eq!(made.see().components.keys().copied().collect::<Vec<_>>(), [name("b")]);
+    let wrong = made.platform.execute_brief(vec![create("b"), create("e")], LIMIT, until(), &Arc::default());
     assert!(matches!(wrong[..], [Ended { outcome: Outcome::NotDone(Cause::Refused(_)), .. }]), "{wrong:?}");
+}
+
+pub fn what_is_not_done_by_its_deadline_does_not_happen_later(bed: &dyn Bed) {
+    let made = bed.make(&[]);
+    made.does(create("a"));
+    for (step, there) in [(destroy("a"), [true, false]), (create("b"), [false, true])] {
+        // Its deadline is past: it may happen all the same, or not, but not when it was answered that it did not.
+        let outcome = made.platform.execute(&step, made.clock.now());
+        made.wait(Duration::from_secs(5));
+        let happened = match outcome {
+            Outcome::Done(_) => 1,
+            Outcome::NotDone(_) => 0,
+            Outcome::Unknown(_) => continue,
+        };
+        assert_eq!(made.state_of(&step.component().to_string()).is_some(), there[happened], "`{step}`: {outcome:?}");
+        assert!(made.platform.quarantined().is_empty());
+    }
 }
 
 pub fn unknown_is_settled_by_reading_back(bed: &dyn Bed) {

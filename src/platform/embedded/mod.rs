@@ -37,6 +37,7 @@ use crate::time::{Clock, Time, lock};
 use registry::Registry;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 use std::time::Duration;
 use workers::Workers;
@@ -148,8 +149,8 @@ impl Platform for EmbeddedPlatform {
         }
     }
 
-    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
-        self.inner.in_turn(steps, each, until)
+    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
+        self.inner.in_turn(steps, each, until, stop)
     }
 
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
@@ -199,8 +200,8 @@ impl Drop for EmbeddedPlatform {
         for thread in threads {
             let _ = thread.join(self.inner.clock.now() + limits::RUNTIME_END);
         }
-        // The components' own code, here too: who hangs in it is left behind with its worker.
-        let drop_them = Box::new(move || _ = guard::call(|| drop(entries)));
+        // The components' own code, here too: who hangs in it is left behind with its worker, and who stands behind it.
+        let drop_them = Box::new(move || entries.into_iter().for_each(|entry| _ = guard::call(|| drop(entry))));
         let _ = guard::call(|| self.inner.workers.run(drop_them));
         self.inner.workers.close();
     }

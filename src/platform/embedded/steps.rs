@@ -40,7 +40,7 @@ impl Inner {
             Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step),
             Step::Create { .. } | Step::Destroy { .. } => {
                 let each = deadline.since(self.clock.now());
-                let mut ended = self.in_turn(vec![step.clone()], each, deadline);
+                let mut ended = self.in_turn(vec![step.clone()], each, deadline, &Arc::default());
                 ended.pop().map_or(Outcome::Unknown(Cause::Timeout), |ended| ended.outcome)
             }
             Step::Connect { from, to, policy } => outcome(self.connect(*from, *to, *policy)),

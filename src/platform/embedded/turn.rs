@@ -22,7 +22,8 @@ use std::time::Duration;
 /// Steps that a worker carries out one after the other.
 struct Turn {
     steps: Vec<Step>,
-    /// `2 i`: step `i` is under way; `2 i + 1`: it has come to its end, the next has not begun; [`OVER`]: nobody waits.
+    /// `2 i`: step `i` has not begun, the one before has come to its end; `2 i + 1`: it is under way; [`OVER`]: nobody
+    /// waits.
     at: AtomicUsize,
     /// When the step under way began.
     began: AtomicU64,
@@ -42,7 +43,7 @@ impl Turn {
     /// Step `i` begins; false: nobody waits any more.
     fn begin(&self, i: usize, now: Time) -> bool {
         self.began.store(now.0, Ordering::Release);
-        i == 0 || self.move_on(2 * i - 1, 2 * i)
+        self.move_on(2 * i, 2 * i + 1)
     }
 }
 
@@ -54,7 +55,7 @@ impl Place<'_> {
     /// The step has come to its end in time. Asked once, before its effect can be seen, so that nobody gives up what is
     /// there.
     fn in_time(self) -> bool {
-        self.0.is_none_or(|(turn, i)| turn.move_on(2 * i, 2 * i + 1))
+        self.0.is_none_or(|(turn, i)| turn.move_on(2 * i + 1, 2 * i + 2))
     }
 }
 
@@ -68,7 +69,8 @@ enum Brief {
 impl Inner {
     /// Carries out steps that make or destroy components, one after the other, each within `each` and before `until`: as
     /// many as are done at once. No further one is begun after one that is not done, nor a while after the first.
-    pub(super) fn in_turn(&self, steps: Vec<Step>, each: Duration, until: Time) -> Vec<Ended> {
+    /// Once `stop` is set none is begun either.
+    pub(super) fn in_turn(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
         let first = self.clock.now();
         let turn = Arc::new(Turn {
             steps,
@@ -79,10 +81,10 @@ impl Inner {
         });
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
-            let (inner, turn) = (self.own.clone(), turn.clone());
+            let (inner, turn, stop) = (self.own.clone(), turn.clone(), stop.clone());
             Box::new(move || {
                 if let Some(inner) = inner.upgrade() {
-                    inner.take_turn(&turn, first);
+                    inner.take_turn(&turn, first, &stop);
                 }
                 let _ = answer.try_send(());
             })
@@ -107,13 +109,17 @@ impl Inner {
             let due = (Time(turn.began.load(Ordering::Acquire)) + each).min(until);
             if self.clock.now() < due {
                 deadline = due;
-            } else if at.is_multiple_of(2) {
+            } else if !at.is_multiple_of(2) {
                 if self.leave_behind(&turn, at) {
                     let mut ended = std::mem::take(&mut *lock(&turn.ended));
                     ended.push(Ended { outcome: Outcome::Unknown(Cause::Timeout), took: None });
                     return ended;
                 }
             } else if turn.move_on(at, OVER) {
+                if at == 0 {
+                    // No worker came to it in time, and none will begin it.
+                    return vec![Ended { outcome: Outcome::NotDone(Cause::Timeout), took: None }];
+                }
                 // Between two steps there is nobody's code but ours: the worker sees it and answers.
                 deadline = Time::NEVER;
             }
@@ -135,10 +141,11 @@ impl Inner {
     }
 
     /// The worker's side.
-    fn take_turn(&self, turn: &Turn, first: Time) {
+    fn take_turn(&self, turn: &Turn, first: Time, stop: &AtomicBool) {
         for (i, step) in turn.steps.iter().enumerate() {
             let now = self.clock.now();
-            if i > 0 && now.since(first) >= limits::BRIEF_TURN || !turn.begin(i, now) {
+            let enough = now.since(first) >= limits::BRIEF_TURN || stop.load(Ordering::Acquire);
+            if i > 0 && enough || !turn.begin(i, now) {
                 return;
             }
             let Brief::Ended(outcome) = self.brief(step, Place(Some((turn, i)))) else { return };
@@ -223,7 +230,13 @@ impl Inner {
             Err(panic) => Err(Cause::Panicked(panic)),
             Ok(Err(text)) => Err(Cause::Refused(text)),
             Ok(Ok(made)) => match registry.is_free(name) {
-                Err(cause) => Err(cause),
+                Err(cause) => {
+                    // Somebody else was quicker. Its own code again, so not under the lock.
+                    registry.arrived(name, crew);
+                    drop(registry);
+                    let _ = guard::call(|| drop(made));
+                    return Brief::Ended(Outcome::NotDone(cause));
+                }
                 Ok(()) => {
                     let cell = Arc::new(Cell::new(kind.clone(), beat, made.body));
                     registry.insert(cell, made.ends, made.values, asked, crew);
