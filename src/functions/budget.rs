@@ -72,7 +72,21 @@ impl Budget {
         over
     }
 
-    fn error(&self) -> mlua::Error {
+    /// Counts the steps of something that is no Lua, each like an instruction; `false`: they are used up.
+    pub fn steps(&self) -> impl FnMut() -> bool + '_ {
+        let mut steps = 0;
+        move || {
+            steps += 1;
+            if steps < limits::CALL_LOOK {
+                return true;
+            }
+            steps = 0;
+            !self.look()
+        }
+    }
+
+    /// What a call whose budget is used up ends with.
+    pub fn error(&self) -> mlua::Error {
         let limit = self.limit.get() / 1_000_000;
         mlua::Error::runtime(format!("ended after {limit} million instructions: is there an endless loop?"))
     }

@@ -15,6 +15,7 @@ mod host;
 mod lower;
 mod native;
 mod open;
+mod patterns;
 mod tracing;
 mod values;
 #[cfg(target_os = "linux")]

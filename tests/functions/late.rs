@@ -99,6 +99,13 @@ fn nothing_in_a_call_outlives_its_budget() {
                x = rfsm.state {{ entry = {endless} }}, rfsm.trans {{ src='initial', tgt='x' }} }}) rfsm.run(m)"
         ),
         "load('while true do end')()".to_owned(),
+        // Library calls that run in one piece.
+        "(('a'):rep(40)):find(('a?'):rep(40) .. ('a'):rep(40) .. 'b')".to_owned(),
+        "pcall(string.match, ('a'):rep(1000), '.-.-.-.-b')".to_owned(),
+        "for _ in string.gmatch(('a'):rep(100000), '.-b') do end".to_owned(),
+        "string.gsub(('a'):rep(1000), '(.-)%1(.-)%2b', '')".to_owned(),
+        "string.gfind(('a'):rep(3000000), '.*b')".to_owned(),
+        "while true do string.find(('ab'):rep(1000), '(.-)b') end".to_owned(),
     ] {
         ends(&model("", &format!("entry = function() {body} end"), ""), "ENTRY");
     }
@@ -213,4 +220,43 @@ fn coroutines_answer_as_luas_own() {
     let stock: String = lua.load(text).set_name("@test").eval().expect("it runs");
     assert_eq!(own[0].as_str().expect("a text"), stock);
     assert!(stock.lines().count() > 40, "{stock}");
+}
+
+/// They are looked at before, and answer as Lua's.
+#[test]
+fn pattern_functions_answer_as_luas_own() {
+    let text = r##"
+        local log = {}
+        local function say(...)
+          local out = table.pack(...)
+          for i = 1, out.n do out[i] = tostring(out[i]) end
+          log[#log + 1] = table.concat(out, " ")
+        end
+        local long = ("key = some value; "):rep(500)
+        for _, s in ipairs { "a key=value b", long, "" } do
+          for _, p in ipairs { "(%w+)%s*=%s*(%w+)", "^(.-)%s*=", "()=()", "%b=;", "%f[%w]%w+", "e*", "x-", "^key", "(k)e%1?", "." } do
+            say(s:find(p)) say(s:find(p, 5)) say(s:find(p, -3)) say(s:find(p, 1, true)) say(s:match(p)) say(s:match(p, 3))
+            local count, sum = 0, 0
+            for a, b in s:gmatch(p) do count = count + 1 sum = sum + #tostring(a) + #tostring(b) end
+            say(count, sum)
+            local out, n = s:gsub(p, "<%0>") say(#out, n)
+            out, n = s:gsub(p, function(x) return #tostring(x) end, 7) say(#out, n)
+            out, n = s:gsub(p, { key = "K" }) say(#out, n)
+          end
+        end
+        say(string.find(12345, "34")) say(("x"):rep(3, ",")) say(#(""):rep(3, "ab")) say(("x"):rep(-1) == "")
+        for _, p in ipairs { "[a", "%", "(", ")", "%1", "(()", "%f", "%b", ("("):rep(40) } do
+          say(pcall(string.find, "some text", p)) say(pcall(string.gsub, long, p, ""))
+        end
+        say(pcall(function() local at = ("x"):find("[a") return at end)) say(pcall(function() local s = long:gsub("%", "") return s end))
+        say(pcall(function() return ("x"):gsub("x", function() error("mine") end) end))
+        say(pcall(function() return ("x"):gsub("x", function() error({}) end) end) == false)
+        say(table.concat(table.move({ 1, 2, 3 }, 1, 3, 2), ","))
+        return (table.concat(log, "\n"):gsub("'[%a?]+'", "NAME"))
+    "##;
+    let own = super::lab::run(text);
+    let lua = mlua::Lua::new();
+    let stock: String = lua.load(text).set_name("@test").eval().expect("it runs");
+    assert_eq!(own[0].as_str().expect("a text"), stock);
+    assert!(stock.lines().count() > 300);
 }

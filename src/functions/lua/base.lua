@@ -73,6 +73,73 @@ function collectgarbage(what)
   return 0
 end
 
+-- ---- what runs in one piece ------------------------------------------------------------------------------------------
+
+-- Nothing ends a function of the library while it runs. A pattern that could take long on a text is walked through
+-- beforehand, under the call's budget (`patterns.rs`).
+local type = type
+local find, match, gmatch, gsub = string.find, string.match, string.gmatch, string.gsub
+local walk, room_of = native.walk, native.room
+local rooms, known = {}, 0
+
+local function is_long(text, pattern)
+  if type(text) ~= "string" or type(pattern) ~= "string" then return false end
+  local room = rooms[pattern]
+  if not room then
+    if known >= 256 then rooms, known = {}, 0 end
+    room = room_of(pattern)
+    rooms[pattern], known = room, known + 1
+  end
+  return #text > room
+end
+
+local function whole(n) return math.type(n) == "integer" and n or nil end
+
+-- An error of theirs is told at the line of the model that called.
+local function answered(ok, ...)
+  if ok then return ... end
+  local why = ...
+  error(why, 2)
+end
+
+-- The same of one that calls the model's functions, whose errors have their places.
+local function replaced(ok, ...)
+  if ok then return ... end
+  if over() then error(failure(), 0) end
+  local why = ...
+  error(why, 0)
+end
+
+function string.find(s, p, init, plain)
+  if not plain and is_long(s, p) then walk(s, p, whole(init), 1, true) end
+  return answered(raw_pcall(find, s, p, init, plain))
+end
+function string.match(s, p, init)
+  if is_long(s, p) then walk(s, p, whole(init), 1, true) end
+  return answered(raw_pcall(match, s, p, init))
+end
+function string.gmatch(s, p, init)
+  if is_long(s, p) then walk(s, p, whole(init), nil, false) end
+  return answered(raw_pcall(gmatch, s, p, init))
+end
+function string.gsub(s, p, replacement, n)
+  if is_long(s, p) then walk(s, p, nil, whole(n), true) end
+  if type(replacement) == "string" then return answered(raw_pcall(gsub, s, p, replacement, n)) end
+  return replaced(raw_pcall(gsub, s, p, replacement, n))
+end
+
+local rep, move = string.rep, table.move
+function string.rep(s, n, separator)
+  if s == "" and (separator == nil or separator == "") and type(n) == "number" and n > 1 then n = 1 end
+  return rep(s, n, separator)
+end
+function table.move(from, first, last, ...)
+  if type(first) == "number" and type(last) == "number" and last - first > 10000000 then
+    error("too many elements to move", 2)
+  end
+  return move(from, first, last, ...)
+end
+
 -- ---- names of older Luas --------------------------------------------------------------------------------------------
 
 unpack, loadstring = table.unpack, load
