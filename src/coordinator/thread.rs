@@ -24,8 +24,11 @@ struct Shared {
     /// Index of the active leaf plus one; 0 before the chart was entered. The leaf tells the whole active configuration.
     leaf: AtomicUsize,
     detached: AtomicBool,
-    /// Held while the coordinator reacts; whoever holds it knows that no name is being raised.
-    commanding: Mutex<()>,
+    /// Held while the coordinator reacts.
+    reacting: Mutex<()>,
+    /// Held while the listener is called; whoever holds it knows that nothing is being told. Not held while a function of
+    /// the model runs, which may take as long as it likes.
+    telling: Mutex<()>,
     delivered: AtomicU64,
     stale: AtomicU64,
     waiting: Mutex<Waiting>,
@@ -83,7 +86,8 @@ impl Coordinator {
             bell: clock.signal(),
             leaf: AtomicUsize::new(0),
             detached: AtomicBool::new(false),
-            commanding: Mutex::new(()),
+            reacting: Mutex::new(()),
+            telling: Mutex::new(()),
             delivered: AtomicU64::new(0),
             stale: AtomicU64::new(0),
             waiting: Mutex::new(Waiting::default()),
@@ -183,21 +187,22 @@ impl Coordinator {
 
     /// Whether it has reacted to everything delivered so far: no event waits, and no step is under way.
     pub fn is_settled(&self) -> bool {
-        match self.shared.commanding.try_lock() {
-            Ok(_commanding) => lock(&self.shared.inbox).is_empty(),
+        match self.shared.reacting.try_lock() {
+            Ok(_reacting) => lock(&self.shared.inbox).is_empty(),
             Err(TryLockError::Poisoned(_)) => true,
             Err(TryLockError::WouldBlock) => false,
         }
     }
 
-    /// Takes the command from it: when this returns, its listener hears nothing from it any more (a call from the listener
-    /// itself lets the present step end). Its last state stays readable; its thread ends by itself.
+    /// Takes the command from it: when this returns, its listener hears nothing from it any more. Waits for a call of the
+    /// listener at most, never for a function of the model. Its last state stays readable; its thread ends by itself, once
+    /// nothing in it hangs.
     pub fn detach(&self) {
         self.shared.detached.store(true, Ordering::SeqCst);
         self.shared.bell.notify();
         let own = lock(&self.shared.thread).id == Some(std::thread::current().id());
         if !own {
-            drop(lock(&self.shared.commanding));
+            drop(lock(&self.shared.telling));
         }
         lock(&self.shared.waiting).all.clear();
     }
@@ -265,7 +270,7 @@ impl Shared {
 
     /// Whether there was something to react to.
     fn react(&self, reaction: impl FnOnce() -> bool) -> bool {
-        let _commanding = lock(&self.commanding);
+        let _reacting = lock(&self.reacting);
         !self.detached.load(Ordering::SeqCst) && reaction()
     }
 }
@@ -288,62 +293,54 @@ struct Told<'a, L> {
 }
 
 impl<L> Told<'_, L> {
-    fn silent(&self) -> bool {
-        self.shared.detached.load(Ordering::SeqCst)
+    /// Calls the listener, unless the coordinator has been detached: that waits for the end of the call.
+    fn tell(&mut self, call: impl FnOnce(&mut L)) {
+        let _telling = lock(&self.shared.telling);
+        if !self.shared.detached.load(Ordering::SeqCst) {
+            call(&mut self.listener);
+        }
     }
 }
 
 impl<L: Listener> Listener for Told<'_, L> {
     fn raised(&mut self, chart: &Chart, batch: &[Raised]) {
-        if !self.silent() {
-            self.listener.raised(chart, batch);
-        }
+        self.tell(|listener| listener.raised(chart, batch));
     }
 
     fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
-        if self.silent() {
-            return;
-        }
-        self.shared.leaf.store(active.last().map_or(0, |leaf| leaf.index() + 1), Ordering::SeqCst);
-        lock(&self.shared.waiting).all.retain(|(_, state, told)| {
-            let reached = active.contains(state);
-            if reached {
-                // One place, one value: it cannot be full, and whoever stopped waiting does not mind.
-                let _ = told.try_send(());
-            }
-            !reached
+        let shared = self.shared;
+        self.tell(|listener| {
+            shared.leaf.store(active.last().map_or(0, |leaf| leaf.index() + 1), Ordering::SeqCst);
+            lock(&shared.waiting).all.retain(|(_, state, told)| {
+                let reached = active.contains(state);
+                if reached {
+                    // One place, one value: it cannot be full, and whoever stopped waiting does not mind.
+                    let _ = told.try_send(());
+                }
+                !reached
+            });
+            listener.moved(chart, active);
         });
-        self.listener.moved(chart, active);
     }
 
     fn unmatched(&mut self, event: EventName) {
-        if !self.silent() {
-            self.listener.unmatched(event);
-        }
+        self.tell(|listener| listener.unmatched(event));
     }
 
     fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {
         self.shared.stale.fetch_add(1, Ordering::Relaxed);
-        if !self.silent() {
-            self.listener.stale(chart, event, tag);
-        }
+        self.tell(|listener| listener.stale(chart, event, tag));
     }
 
     fn rested(&mut self) {
-        if !self.silent() {
-            self.listener.rested();
-        }
+        self.tell(Listener::rested);
     }
 
     fn said(&mut self, said: &Said) {
-        if !self.silent() {
-            self.listener.said(said);
-        }
+        self.tell(|listener| listener.said(said));
     }
 
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
-        if !self.silent() {
-            self.listener.trouble(chart, trouble);
-        }
+        self.tell(|listener| listener.trouble(chart, trouble));
     }
 }

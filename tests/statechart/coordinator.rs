@@ -4,7 +4,7 @@ use crate::support::*;
 use davit::coordinator::{Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag, Trouble, Waited};
 use davit::limits;
 use davit::model::names::EventName;
-use davit::statechart::{Chart, NodeId, Raised};
+use davit::statechart::{Chart, Hook, NodeId, Raised};
 use davit::time::{Clock, Time};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
@@ -353,4 +353,31 @@ fn when_it_rests_it_is_seen_to_rest() {
     clock.sleep(Duration::from_millis(1));
     assert_eq!(*seen.lock().unwrap(), [false, true]);
     coordinator.stop(Time::NEVER).unwrap();
+}
+
+#[test]
+fn it_is_detached_though_a_function_of_its_model_hangs() {
+    /// A function that takes ten seconds in the entry of `copying`.
+    struct Slow(Clock);
+    impl Hook for Slow {
+        fn entered(&mut self, chart: &Chart, state: NodeId) {
+            if chart.fqn(state).to_string() == "root.copying" {
+                self.0.sleep(Duration::from_secs(10));
+            }
+        }
+    }
+    let clock = Clock::simulated();
+    let _guard = clock.enter();
+    let (log, own) = (Log::default(), clock.clone());
+    let coordinator =
+        Coordinator::start_with("coordinator", Arc::new(copying()), &clock, log.clone(), move || Ok(Slow(own)));
+    coordinator.deliver(Incoming::control(event("e_aligned"))).unwrap();
+    clock.sleep(Duration::from_millis(1));
+    let asked = clock.now();
+    assert!(!coordinator.is_settled());
+    coordinator.detach();
+    assert_eq!(clock.now(), asked, "nobody waits for it");
+    assert!(coordinator.stop(clock.now() + Duration::from_secs(1)).is_err(), "its thread is still in the function");
+    clock.sleep(Duration::from_secs(20));
+    assert!(log.take().is_empty(), "what it comes back with is told to nobody");
 }
