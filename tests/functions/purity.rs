@@ -1,6 +1,6 @@
 //! What `check` and `graph` say of functions.
 
-use super::support::read;
+use super::support::{Model, read};
 use davit::draw;
 use davit::lang::{LoadOptions, Sources, load_from};
 use davit::model::codes;
@@ -87,4 +87,17 @@ fn functions_of_plugins_are_not_the_models_own() {
         "{message}"
     );
     assert!(labels.contains("`root.idle`: exit") && labels.contains("added by the plugin `emem`"), "{labels}");
+}
+
+#[test]
+fn a_pure_file_that_gets_a_function_need_not_be_rewritten() {
+    let text = |body: &str| {
+        format!(
+            "return state {{ a = state {{ {body} }}, j = conn {{}}, trans {{ src = 'initial', tgt = 'j' }}, trans {{ src = 'j', tgt = 'a' }} }}"
+        )
+    };
+    let pure = read(&[("model.lua", &text(""))], &[]);
+    assert!(pure.coordinator.is_some(), "{:?}", pure.findings);
+    let model = Model::of(&[("model.lua", &text("entry = function() print('in') end"))], &[]);
+    assert_eq!(model.notes(&["run"]), ["in"]);
 }

@@ -21,6 +21,11 @@ rfsm.transition = rfsm.trans
 rfsm.connector, rfsm.junc = rfsm.conn, rfsm.conn
 rfsm.yield = coroutine.yield
 
+-- Their names alone will do too, as in a pure coordinator's file: it is not to be rewritten for its first function.
+for name, made in pairs(rfsm) do
+  if type(made) == "table" then rawset(_G, name, made) end
+end
+
 -- ---- what something is --------------------------------------------------------------------------------------------
 
 local function kind(o)
