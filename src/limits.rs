@@ -187,6 +187,11 @@ pub const CALL_LOOK: u32 = 1_000;
 /// waits for a reaction.
 pub const CALL_TICK: Duration = Duration::from_millis(10);
 
+/// Instructions that one [`CALL_TICK`] of a counted call stands for, beside those that it executed: so instructions that
+/// take long (long texts put together) end too, after two seconds of processor time. One that keeps its budget of plain
+/// instructions is over before that counts.
+pub const CALL_TICK_INSTRUCTIONS: u32 = 5_000;
+
 /// Bytes that the Lua state of one coordinator with functions may hold.
 pub const FUNCTIONS_BYTES: usize = 64 * 1024 * 1024;
 

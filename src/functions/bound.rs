@@ -56,6 +56,8 @@ pub struct Bound {
     pub thread: RefCell<Option<Thread>>,
     /// The events of this step as the functions get them.
     pub events: RefCell<Option<Table>>,
+    /// Coroutines that were ended by their budget, as keys: they are not to be closed.
+    pub ended: Table,
     /// Words that functions are called with.
     pub words: Words,
     /// The model has a `dbg` printer of its own.
@@ -81,6 +83,8 @@ pub struct Words {
     pub doo: LuaString,
     pub pre_step: LuaString,
     pub post_step: LuaString,
+    /// The name of the printer that hears of what happens.
+    pub dbg: LuaString,
 }
 
 /// Why a machine could not be made of its tables.
@@ -183,7 +187,9 @@ impl Bound {
                 doo: word("doo")?,
                 pre_step: word("pre_step_hook")?,
                 post_step: word("post_step_hook")?,
+                dbg: word("dbg")?,
             },
+            ended: host.native.raw_get("ended")?,
             traces: Cell::new(false),
             quiet: host.native.raw_get("quiet")?,
             failed: RefCell::default(),
@@ -197,7 +203,7 @@ impl Bound {
 
     /// Looks whether there is a `dbg` printer that wants to hear of what happens; it may come and go between steps.
     pub fn look_for_dbg(&self) {
-        let dbg = self.fsm.raw_get::<Value>("dbg");
+        let dbg = self.fsm.raw_get::<Value>(&self.words.dbg);
         self.traces.set(dbg.is_ok_and(|dbg| matches!(dbg, Value::Function(_)) && dbg != self.quiet));
     }
 

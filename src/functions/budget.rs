@@ -31,12 +31,9 @@ impl Budget {
         let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), ..Self::default() });
         let counted = budget.clone();
         let triggers = HookTriggers::new().every_nth_instruction(limits::CALL_LOOK);
-        lua.set_global_hook(
-            triggers,
-            move |_, _| {
-                if counted.look() { Err(counted.error()) } else { Ok(VmState::Continue) }
-            },
-        )?;
+        lua.set_global_hook(triggers, move |_, _| {
+            if counted.look(limits::CALL_LOOK) { Err(counted.error()) } else { Ok(VmState::Continue) }
+        })?;
         Ok(budget)
     }
 
@@ -46,7 +43,7 @@ impl Budget {
         #[cfg(target_os = "linux")]
         {
             let budget = Rc::downgrade(self);
-            let look = move || budget.upgrade().is_some_and(|budget| budget.look());
+            let look = move |instructions| budget.upgrade().is_some_and(|budget| budget.look(instructions));
             if let Some(watch) = Watch::start(lua, look)
                 && self.watch.set(watch).is_ok()
             {
@@ -63,8 +60,8 @@ impl Budget {
     }
 
     /// So many instructions more; whether they are too many.
-    fn look(&self) -> bool {
-        self.used.set(self.used.get() + u64::from(limits::CALL_LOOK));
+    fn look(&self, instructions: u32) -> bool {
+        self.used.set(self.used.get() + u64::from(instructions));
         let over = self.used.get() > self.limit.get();
         if over {
             self.over.set(true);
@@ -81,7 +78,7 @@ impl Budget {
                 return true;
             }
             steps = 0;
-            !self.look()
+            !self.look(limits::CALL_LOOK)
         }
     }
 

@@ -80,7 +80,12 @@ impl Calls {
         };
         let value: Value = bound.calling(view, || {
             let arguments = (&bound.fsm, &bound.nodes[state.index()], &bound.words.doo);
-            resuming(&thread, || thread.resume(arguments))
+            let outcome = resuming(&thread, || thread.resume(arguments));
+            // It may have given itself to others, who must not close it.
+            if outcome.is_err() && bound.budget.is_over() {
+                bound.ended.raw_set(&thread, true)?;
+            }
+            outcome
         })?;
         Ok(if thread.status() == ThreadStatus::Resumable {
             Doo::Yielded { idle: !matches!(value, Value::Nil | Value::Boolean(false)) }
@@ -202,6 +207,7 @@ impl Hook for Calls {
 
     fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
         *self.bound.events.borrow_mut() = None;
+        self.bound.look_for_dbg();
         self.step_hook(&self.bound.words.pre_step, view, Some(added));
     }
 

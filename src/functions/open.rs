@@ -59,7 +59,7 @@ pub struct Reads {
     pub chart: Statechart,
     /// What is wrong in its parts.
     pub problems: Vec<Problem>,
-    /// Whether it needs Lua to run: functions, hooks, plugins, `getevents`.
+    /// Whether it needs Lua to run: functions, hooks, plugins, `getevents`, `dbg`.
     pub runs_lua: bool,
     /// What was printed.
     pub said: Vec<Said>,
@@ -78,6 +78,7 @@ pub fn read(
     let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
     let (lua, host) = state(program.open, reader).map_err(failed)?;
     let template = template(&lua, &host, program)?;
+    let tells = template.raw_get::<Value>("dbg").map_err(failed)?.is_function();
     let tables: Function = host.native.raw_get("tables").map_err(failed)?;
     let fsm: Table = host.budget.spend(limits::LUA_INSTRUCTIONS, || tables.call(template)).map_err(failed)?;
     let list = host.budget.spend(limits::LUA_INSTRUCTIONS, || lower::flat(&host.native, &fsm)).map_err(failed)?;
@@ -86,7 +87,7 @@ pub fn read(
         place(spot.and_then(|number| spots.get(number.wrapping_sub(1))), word)
     };
     let lowered = lower::lower(&list, &host.native, &mut places).map_err(failed)?;
-    let mut runs_lua = !lowered.chart.is_pure();
+    let mut runs_lua = tells || !lowered.chart.is_pure();
     for key in ["pre_step_hook", "post_step_hook", "getevents", "idle_hook"] {
         runs_lua |= matches!(fsm.raw_get(key).map_err(failed)?, Value::Function(_));
     }
@@ -161,7 +162,6 @@ impl Opener {
         host.voice.drain(&mut said);
         said.into_iter().filter(|line| line.by == Printer::Err).for_each(|line| host.voice.say(line.by, &line.text));
         bound.driven.set(true);
-        bound.look_for_dbg();
         // In simulated time every run is to be like every other, so what decides is what was counted.
         if !simulated {
             host.budget.count_late(&lua);

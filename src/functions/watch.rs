@@ -2,7 +2,8 @@
 //!
 //! As soon as a hook is set, Lua looks up from its work at every instruction. So none is set when a call begins. A timer of
 //! the operating system ticks with the processor time of this thread, and its signal comes to this very thread. When a
-//! tick finds the call under way that the tick before found, it sets the counting hook on what runs. Lua allows
+//! tick finds the call under way that the tick before found, it sets the counting hook on what runs, and so does each tick
+//! after it, so that few instructions that take long are ended too. Lua allows
 //! `lua_sethook` in a signal handler ("can be called during a signal", `ldebug.c`; the interpreter's own Ctrl-C does it);
 //! from another thread it would be a data race.
 //!
@@ -31,8 +32,8 @@ struct Running {
 pub struct Watch {
     lua: WeakLua,
     main: *mut lua_State,
-    /// Counts `limits::CALL_LOOK` instructions; whether the budget is used up.
-    look: Box<dyn Fn() -> bool>,
+    /// Counts so many instructions; whether the budget is used up.
+    look: Box<dyn Fn(u32) -> bool>,
     calls: Cell<u64>,
     /// The number of the call under way; 0: none.
     call: AtomicU64,
@@ -41,7 +42,8 @@ pub struct Watch {
     counting: AtomicBool,
     /// The innermost one that runs.
     running: AtomicPtr<Running>,
-    _timer: Timer,
+    /// Held for as long as it ticks.
+    timer: Option<Timer>,
 }
 
 thread_local! {
@@ -58,9 +60,13 @@ fn current<'a>() -> Option<&'a Watch> {
 }
 
 impl Watch {
-    /// Watches the calls of `lua` on this thread from now on; `look` is asked about every so many instructions of a call
-    /// that takes long. None: the operating system gives no timer.
-    pub fn start(lua: &Lua, look: impl Fn() -> bool + 'static) -> Option<Self> {
+    /// Watches the calls of `lua` on this thread from now on; `look` is told of every so many instructions of a call that
+    /// takes long. None: the operating system gives no timer.
+    pub fn start(lua: &Lua, look: impl Fn(u32) -> bool + 'static) -> Option<Self> {
+        Self::with(lua, look, Timer::start).filter(|watch| watch.timer.is_some())
+    }
+
+    fn with(lua: &Lua, look: impl Fn(u32) -> bool + 'static, timer: impl FnOnce() -> Option<Timer>) -> Option<Self> {
         CURRENT.with(|_| ());
         let mut main = ptr::null_mut();
         let asked: Result<()> = {
@@ -85,7 +91,7 @@ impl Watch {
             seen: AtomicU64::new(0),
             counting: AtomicBool::new(false),
             running: AtomicPtr::new(ptr::null_mut()),
-            _timer: Timer::start()?,
+            timer: timer(),
         })
     }
 
@@ -134,15 +140,18 @@ impl Watch {
             return;
         }
         self.counting.store(true, Relaxed);
+        // Those that wait count on where they are. The one that runs looks at its next instruction, however few fit between
+        // two ticks; at every tick, since Lua may just have been about to forget a hook that was set before.
         let mut at = self.running.load(Relaxed);
-        // Again at every tick: Lua may just have been about to forget a hook that was there before.
+        let mut waits = false;
         // SAFETY: entries are on the stacks of the calls that are under way on this thread, innermost first, each put here
         // after it was filled and taken away before it goes; this thread stands still meanwhile. The threads of Lua in
         // them are anchored by who resumed them.
         while let Some(thread) = unsafe { at.as_ref() } {
             // SAFETY: a living thread of Lua, on whose operating-system thread this runs, as `lua_sethook` wants it in a
             // signal handler.
-            unsafe { count(thread.state) };
+            unsafe { if waits { count(thread.state) } else { set(thread.state, AT_ONCE) } };
+            waits = true;
             at = thread.resumed_by;
         }
     }
@@ -182,13 +191,30 @@ fn entered<R>(state: *mut lua_State, resume: impl FnOnce() -> R) -> R {
     }
 }
 
-/// Sets the counting hook.
+/// A hook that looks at the next instruction. By this number [`look`] knows that a tick set it.
+const AT_ONCE: c_int = 1;
+
+/// Sets the counting hook where it is missing: to set it again would begin its count anew.
 ///
 /// # Safety
 /// `state` is a living thread of Lua that belongs to this thread of the operating system.
 unsafe fn count(state: *mut lua_State) {
+    // SAFETY: as above.
+    unsafe {
+        if !ffi::lua_gethook(state).is_some_and(|hook| ptr::fn_addr_eq(hook, look as unsafe extern "C-unwind" fn(_, _)))
+        {
+            set(state, limits::CALL_LOOK.cast_signed());
+        }
+    }
+}
+
+/// Sets the counting hook, to look after so many instructions.
+///
+/// # Safety
+/// As [`count`].
+unsafe fn set(state: *mut lua_State, every: c_int) {
     // SAFETY: as above; `look` may be called whenever Lua calls hooks.
-    unsafe { ffi::lua_sethook(state, Some(look), ffi::LUA_MASKCOUNT, limits::CALL_LOOK.cast_signed()) };
+    unsafe { ffi::lua_sethook(state, Some(look), ffi::LUA_MASKCOUNT, every) };
 }
 
 /// The hook. It holds nothing that a jump of Lua's would leave behind.
@@ -197,13 +223,15 @@ unsafe extern "C-unwind" fn look(state: *mut lua_State, _: *mut ffi::lua_Debug) 
     // SAFETY: Lua calls this with the thread that runs, and guarantees room for what is pushed here. An error ends the
     // hook and the instruction it was called at, as Lua provides for hooks.
     unsafe {
-        match counting {
-            None => ffi::lua_sethook(state, None, 0, 0),
-            Some(watch) if (watch.look)() => {
-                ffi::lua_pushstring(state, c"ended: its instructions are used up".as_ptr());
-                ffi::lua_error(state)
-            }
-            Some(_) => (),
+        let Some(watch) = counting else { return ffi::lua_sethook(state, None, 0, 0) };
+        let mut instructions = limits::CALL_LOOK;
+        if ffi::lua_gethookcount(state) == AT_ONCE {
+            set(state, instructions.cast_signed());
+            instructions = limits::CALL_TICK_INSTRUCTIONS;
+        }
+        if (watch.look)(instructions) {
+            ffi::lua_pushstring(state, c"ended: its instructions are used up".as_ptr());
+            ffi::lua_error(state)
         }
     }
 }
@@ -313,21 +341,23 @@ mod tests {
     use super::*;
     use std::rc::Rc;
 
-    /// A state whose function `tick` is a tick, and whose calls are over after so many looks.
+    /// A state whose function `tick` is a tick, the only ones there are, and whose calls are over after so many looks.
     fn watched(looks: u64) -> (Lua, Watch, Rc<Cell<u64>>) {
         let lua = Lua::new();
         let seen = Rc::new(Cell::new(0));
         let counted = seen.clone();
-        let look = move || {
+        let look = move |_| {
             counted.set(counted.get() + 1);
             counted.get() >= looks
         };
-        let watch = Watch::start(&lua, look).expect("a timer");
+        let watch = Watch::with(&lua, look, || None).expect("a main thread");
         let tick = lua.create_function(|_, ()| {
             current().expect("a call").tick();
             Ok(())
         });
         lua.globals().set("tick", tick.expect("a function")).expect("a global");
+        let asks = lua.create_function(|lua, ()| Ok(hooked(lua))).expect("a function");
+        lua.globals().set("hooked", asks).expect("a global");
         let (resume, _) = functions(&lua).expect("functions");
         lua.globals().set("resume", resume).expect("a global");
         (lua, watch, seen)
@@ -344,14 +374,29 @@ mod tests {
     fn two_ticks_in_one_call_count_it_and_its_end_ends_that() {
         let (lua, watch, seen) = watched(u64::MAX);
         let run = |text: &str| watch.during(|| lua.load(text).exec()).expect("it runs");
-        run("tick() for i = 1, 1e5 do end");
-        run("tick() for i = 1, 1e5 do end");
-        assert!(!hooked(&lua));
-        // Real ticks come too, so only what is certain is asked.
-        seen.set(0);
-        run("tick() tick() for i = 1, 1e5 do end");
+        run("tick() assert(not hooked()) for i = 1, 1e5 do end assert(not hooked())");
+        run("tick() assert(not hooked()) for i = 1, 1e5 do end assert(not hooked())");
+        assert_eq!(seen.get(), 0);
+        run("tick() tick() assert(hooked()) for i = 1, 1e5 do end assert(hooked())");
         assert!(seen.get() >= 100, "{}", seen.get());
         assert!(!hooked(&lua) && !watch.counting.load(Relaxed));
+    }
+
+    #[test]
+    fn ticks_do_not_begin_the_count_anew_but_are_looks() {
+        let (lua, watch, seen) = watched(u64::MAX);
+        watch.during(|| lua.load("for i = 1, 101 do tick() end").exec()).expect("it runs");
+        assert_eq!(seen.get(), 100);
+    }
+
+    #[test]
+    fn a_coroutine_that_yields_between_two_looks_is_counted() {
+        let (lua, watch, seen) = watched(u64::MAX);
+        let text =
+            "local co = coroutine.create(function() while true do for i = 1, 900 do end coroutine.yield() end end)
+            tick() tick() for i = 1, 100 do resume(co) end";
+        watch.during(|| lua.load(text).exec()).expect("it runs");
+        assert!(seen.get() >= 80, "{}", seen.get());
     }
 
     #[test]
@@ -382,6 +427,25 @@ mod tests {
         assert!(hooked());
         run("resume(co)");
         assert!(!hooked());
+    }
+
+    #[test]
+    fn a_tick_counts_as_the_instructions_that_its_time_is_for() {
+        let lua = Lua::new();
+        let sum = Rc::new(Cell::new(0));
+        let counted = sum.clone();
+        let look = move |instructions: u32| {
+            counted.set(counted.get() + u64::from(instructions));
+            false
+        };
+        let watch = Watch::with(&lua, look, || None).expect("a main thread");
+        let tick = lua.create_function(|_, ()| {
+            current().expect("a call").tick();
+            Ok(())
+        });
+        lua.globals().set("tick", tick.expect("a function")).expect("a global");
+        watch.during(|| lua.load("tick() tick() tick() for i = 1, 1500 do end").exec()).expect("it runs");
+        assert_eq!(sum.get(), 2 * u64::from(limits::CALL_TICK_INSTRUCTIONS) + u64::from(limits::CALL_LOOK));
     }
 
     #[test]

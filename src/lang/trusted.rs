@@ -2,7 +2,8 @@
 //! rFSM's names of today and of old.
 //!
 //! A file is read as a pure one first: where that succeeds it is one, with the stricter reading that catches typing
-//! errors (unless its host functions feed it: `getevents`, `idle_hook`). Only where it does not is it run as a trusted one.
+//! errors (unless functions of its root feed it or listen: `getevents`, `idle_hook`, `dbg`). Only where it does not is it
+//! run as a trusted one.
 
 use super::files::Sources;
 use super::lower::chart;
@@ -75,12 +76,13 @@ pub fn read(
     open(cx, from, path, reading, params, trust)
 }
 
-/// Whether a chart has functions that say what happens to it, though none of its own. Printers only tell, so a chart with
-/// them stays pure.
+/// Whether a chart has functions that say what happens to it or hear of it, though none of its own. The other printers tell
+/// only of what functions do, so a chart with them stays pure.
 fn asks_its_host(root: &Node) -> bool {
     let Kind::Made(_, fields, _) = &root.kind else { return false };
-    let says =
-        |entry: &Entry| matches!(&*entry.key, "getevents" | "idle_hook") && matches!(entry.value.kind, Kind::Function);
+    let says = |entry: &Entry| {
+        matches!(&*entry.key, "getevents" | "idle_hook" | "dbg") && matches!(entry.value.kind, Kind::Function)
+    };
     fields.iter().any(says)
 }
 

@@ -131,3 +131,32 @@ fn a_machine_of_the_models_own_may_be_given_a_dbg_later() {
            'RAISED', 'STATE_ENTER', 'TRANSITION', 'CHECKING', 'CHECKING', 'TRANSITION', 'HIBERNATING' })",
     );
 }
+
+#[test]
+fn a_chart_whose_only_function_is_its_dbg_tells_it() {
+    let text = "return rfsm.state { dbg = function(tag, name) if tag == 'STATE_ENTER' then print(name) end end,
+        a = rfsm.state {}, b = rfsm.state {},
+        rfsm.trans { src='initial', tgt='a' }, rfsm.trans { src='a', tgt='b', events={'e'} } }";
+    assert_eq!(told(&Model::new(text), &["run", "e"]), [vec!["root", "root.a"], vec!["root.b"]]);
+    for silent in ["dbg = false,", "", "err = function() end,"] {
+        assert!(
+            Model::new(&format!(
+                "return rfsm.state {{ {silent} a = rfsm.state {{}}, rfsm.trans {{ src='initial', tgt='a' }} }}"
+            ))
+            .is_pure()
+        );
+    }
+}
+
+#[test]
+fn a_dbg_that_a_function_gives_and_takes_away_hears_of_the_steps_between() {
+    let text = "return rfsm.state {
+        a = rfsm.state { entry = function(fsm) fsm.dbg = function(tag, name) if tag == 'STATE_ENTER' then print(name) end end end },
+        b = rfsm.state { entry = function(fsm) fsm.dbg = false end }, c = rfsm.state {},
+        rfsm.trans { src='initial', tgt='a' }, rfsm.trans { src='a', tgt='b', events={'e'} }, rfsm.trans { src='b', tgt='c', events={'e'} } }";
+    let seen = told(&Model::new(text), &["run", "f", "e", "e"]);
+    assert!(seen[0].is_empty() && seen[3].is_empty(), "{seen:?}");
+    let text = text.replace("fsm.dbg = false", "");
+    let seen = told(&Model::new(&text), &["run", "e", "e"]);
+    assert_eq!(seen[1..], [vec!["root.b"], vec!["root.c"]]);
+}

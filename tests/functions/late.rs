@@ -145,6 +145,37 @@ fn coroutines_that_are_older_than_the_call_end_too() {
     assert!(arrived && errors.len() == 2 && errors[0].contains("ENTRY") && errors[1].contains("EXIT"), "{errors:?}");
 }
 
+/// Fewer instructions than are counted at once fit between two ticks.
+#[test]
+fn expensive_instructions_end_too() {
+    ends(&model("", "entry = function() while true do local s = ('x'):rep(1e6) end end", ""), "ENTRY");
+    let joins = "local s = ('abcdefgh'):rep(250000) while true do local t = s .. 'x' end";
+    ends(&model("", &format!("exit = function() {joins} end"), ""), "EXIT");
+}
+
+/// What a coroutine would do when it is closed is not done for one that was ended: nothing could end that.
+#[test]
+fn closing_what_was_ended_is_refused() {
+    let endless = "local c <close> = setmetatable({}, { __close = function() while true do end end })
+        local function spin() while true do end end spin()";
+    for a in [
+        format!("entry = function() co = coroutine.create(function() {endless} end) coroutine.resume(co) end"),
+        format!("entry = function() coroutine.wrap(function() co = coroutine.running() {endless} end)() end"),
+        format!("doo = function() co = coroutine.running() {endless} end"),
+    ] {
+        let exit = "exit = function() print('closed', coroutine.close(co)) print(coroutine.status(co)) end";
+        let model = model("local co", &format!("{a}, {exit}"), "");
+        for clock in [Clock::real(), Clock::simulated()] {
+            let mut sim = model.sim_on(Some(clock));
+            let seen: Vec<_> = ["run", "e", "run"].map(|line| sim.line(line).expect("a line")).into();
+            let notes: Vec<_> = seen.iter().flat_map(|seen| seen.notes.clone()).collect();
+            assert_eq!(notes.len(), 4, "{notes:?}");
+            assert!(notes[0].contains("million instructions"), "{notes:?}");
+            assert_eq!(notes[1..], ["closed false ended: its instructions are used up", "dead", "in b"], "{a}");
+        }
+    }
+}
+
 #[test]
 fn what_was_ended_leaves_no_trace() {
     // The coroutine was running when its call was ended; later calls do their work, in it and beside it.

@@ -27,19 +27,36 @@ end
 
 -- What runs in another coroutine must be known to those who count (`watch.rs`).
 local resume, close = native.resume or raw_resume, native.close or raw_close
-function coroutine.resume(...) return passed(resume(...)) end
+
+-- A coroutine that was ended in a look is left without hooks: what it would do when it is closed, nothing could end.
+local ended = setmetatable({}, { __mode = "k" })
+native.ended = ended
+
+local function noted(thread, ok, ...)
+  if not ok and over() then
+    ended[thread] = true
+    error(failure(), 0)
+  end
+  return ok, ...
+end
+
+function coroutine.resume(thread, ...) return noted(thread, resume(thread, ...)) end
 
 function coroutine.close(thread)
   local how = status(thread)
   if how ~= "suspended" and how ~= "dead" then error("cannot close a " .. how .. " coroutine", 2) end
   if over() then error(failure(), 0) end
+  if ended[thread] then return false, failure() end
   return passed(close(thread))
 end
 
 local function unwrapped(thread, ok, ...)
   if ok then return ... end
   local why = ...
-  if over() then error(failure(), 0) end
+  if over() then
+    ended[thread] = true
+    error(failure(), 0)
+  end
   if status(thread) == "dead" then
     local _, later = close(thread)
     if later ~= nil then why = later end
