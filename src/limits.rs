@@ -25,8 +25,8 @@ pub const SOCKET_WRITE: Duration = Duration::from_secs(5);
 /// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
 pub const LOG_ENTRIES: usize = 4096;
 
-/// Of these, events that components raise by themselves: a monitor that chatters a thousand times a second displaces its
-/// own past and nobody else's.
+/// Of these, events that components and monitors raise by themselves: one that chatters a thousand times a second displaces
+/// such events, its own and those of others, and nothing else of the log.
 pub const LOG_REPORTS: usize = 1024;
 
 /// How often it is told that events were dropped because a coordinator does not keep up; what comes in between is counted.
@@ -219,18 +219,23 @@ pub const CHECK_TRANSITIONS: usize = 100_000;
 /// wrong when requests queue up goes wrong with two of them.
 pub const CHECK_WAITING: usize = 2;
 
-/// Frames of one configuration that `check` follows: a fourth one means that going round adds one each time.
+/// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
+/// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.
+pub const CHECK_PILED: usize = 32;
+
+/// Frames of one configuration and one coordinator that `check` follows: a fourth one means that going round adds one
+/// each time.
 pub const CHECK_FRAMES: usize = 3;
+
+/// The same behind an undoing that failed: there it is the failing that adds one each time, which is no mistake of the
+/// coordinator. What one left frame under another leads to, further ones do too.
+pub const CHECK_LEFT: usize = 2;
 
 /// Coordinators side by side that `check` follows together: the states of their product are soon past any budget.
 pub const CHECK_TOGETHER: usize = 3;
 
 /// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
 pub const CHECK_INBOX: usize = 6;
-
-/// The same behind an undoing that failed: there it is the failing that adds one each time, which is no mistake of the
-/// coordinator. What one left frame under another leads to, further ones do too.
-pub const CHECK_LEFT: usize = 2;
 
 /// Forced steps told one by one; more are told by number, so that a line can be read.
 pub const FORCED_SHOWN: usize = 8;

@@ -131,6 +131,9 @@ pub(super) fn way(product: &mut Product<'_>, from: State, first: EventName, neve
         }
         last = at;
         let mut next: Vec<(Move, State)> = Vec::new();
+        if state.waiting.len() > limits::CHECK_PILED {
+            continue;
+        }
         if let Some(unit) = state.waiting.first() {
             let asks = unit.asks.clone();
             match product.head(&state) {
@@ -169,17 +172,35 @@ pub(super) fn way(product: &mut Product<'_>, from: State, first: EventName, neve
     Way { from, moves, reached: reached.is_some(), refused }
 }
 
+/// Where the coordinator comes to by what it asks for by itself, before anybody wants it up. Where it goes round for ever:
+/// where on that round it listens to who wants it up.
+fn settled(product: &mut Product<'_>, start: State) -> State {
+    let wanted = product.chart.event(product.deployment.deploy.event);
+    let mut way = vec![start.clone()];
+    let mut seen: FxHashSet<State> = std::iter::once(start).collect();
+    loop {
+        let last = way[way.len() - 1].clone();
+        if last.waiting.is_empty() || last.waiting.len() > limits::CHECK_PILED {
+            return last;
+        }
+        let Applied::Done { world, .. } = product.head(&last) else { return last };
+        let next = product.answer(&last, true, world);
+        if !seen.insert(next.clone()) || way.len() >= limits::CHECK_TRANSITIONS {
+            let round = way.iter().position(|state| *state == next).unwrap_or(0);
+            let listens = |state: &&State| product.reactions.react(state.leaf, wanted).taken;
+            return way[round..].iter().find(listens).cloned().unwrap_or(next);
+        }
+        way.push(next);
+    }
+}
+
 /// The ways up and, when that arrives, down. None when the coordinator cannot be entered or a state is not there.
 pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let deployment = product.deployment;
     let up = product.chart.find(&deployment.deploy.up).ok()?;
     let down = product.chart.find(&deployment.shutdown.down).ok()?;
-    let mut start = product.start()?;
-    // What the coordinator asks for by itself, before anybody wants it up.
-    while !start.waiting.is_empty() {
-        let Applied::Done { world, .. } = product.head(&start) else { break };
-        start = product.answer(&start, true, world);
-    }
+    let start = product.start()?;
+    let start = settled(product, start);
     let rise = way(product, start, deployment.deploy.event, deployment.shutdown.event, up);
     if !rise.reached {
         return Some((rise, None));

@@ -84,7 +84,10 @@ pub fn explore(product: &mut Product<'_>) -> Exploration {
 
 impl Search<'_, '_> {
     fn run(&mut self) {
-        let Some(start) = self.product.start() else { return };
+        let Some(start) = self.product.start() else {
+            self.cut = true;
+            return;
+        };
         self.reach(start, None, Failed::Nothing);
         loop {
             if self.edges.len() >= limits::CHECK_TRANSITIONS && (!self.clean.is_empty() || !self.failed.is_empty()) {
@@ -116,6 +119,10 @@ impl Search<'_, '_> {
 
     fn expand(&mut self, at: u32) {
         let state = self.states[at as usize].clone();
+        if state.waiting.len() > limits::CHECK_PILED {
+            self.cut = true;
+            return;
+        }
         self.followed[at as usize] = true;
         if let Some(head) = state.waiting.first() {
             let asks = head.asks.clone();
@@ -206,7 +213,11 @@ impl Search<'_, '_> {
             transitions: self.edges.len(),
             complete: !self.cut,
             unfollowed: self.followed.iter().filter(|followed| !**followed).count(),
-            without_failure: self.clean.is_empty(),
+            without_failure: !self
+                .followed
+                .iter()
+                .zip(&self.with_failure)
+                .any(|(f, with)| !f && *with == Failed::Nothing),
             together: None,
         };
         let by = super::world::requester(self.product.deployment);

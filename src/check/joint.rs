@@ -51,9 +51,11 @@ pub fn follow(joint: &mut Together<'_>, alone: &[Exploration]) -> Followed {
         refused: Vec::new(),
         ends: FxHashSet::default(),
     };
-    if let Some(start) = search.joint.start() {
-        search.reach(start, None, Failed::Nothing);
-    }
+    // One of them cannot be entered (said where its chart is compiled): there is nothing to follow, and nothing is known.
+    let Some(start) = search.joint.start() else {
+        return Followed { findings: Vec::new(), explored: Explored::default() };
+    };
+    search.reach(start, None, Failed::Nothing);
     while search.edges.len() < limits::CHECK_TRANSITIONS {
         let Some(at) = search.clean.pop_front().or_else(|| search.unclean.pop_front()) else { break };
         search.expand(at);
@@ -82,6 +84,10 @@ impl Search<'_, '_> {
     fn expand(&mut self, at: u32) {
         let state = self.states[at as usize].clone();
         let so_far = self.failed[at as usize];
+        if state.waiting.len() > limits::CHECK_PILED {
+            self.joint.overflow = true;
+            return;
+        }
         self.followed[at as usize] = true;
         if let Some(head) = state.waiting.first() {
             let (unit, by) = (head.unit.clone(), head.by);
@@ -96,6 +102,8 @@ impl Search<'_, '_> {
                     (None, true)
                 }
                 Applied::TooDeep(_) => {
+                    // Said of the one that goes round; what the others would do then is not known.
+                    self.joint.overflow = true;
                     self.ends.insert(at);
                     (None, false)
                 }
@@ -134,7 +142,7 @@ impl Search<'_, '_> {
             transitions: self.edges.len(),
             complete: unfollowed == 0 && !self.joint.overflow,
             unfollowed,
-            without_failure: self.clean.is_empty(),
+            without_failure: !self.followed.iter().zip(&self.failed).any(|(f, with)| !f && *with == Failed::Nothing),
             together: None,
         };
         let mut findings = Vec::new();

@@ -78,7 +78,7 @@ pub struct Together<'a> {
     /// What the configurator does.
     pub worlds: Worlds<'a>,
     outside: Vec<EventName>,
-    /// More events were on their way at once than are followed.
+    /// More events were on their way, more requests waited or more frames were in force at once than are followed.
     pub overflow: bool,
 }
 

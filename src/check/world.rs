@@ -45,7 +45,7 @@ pub enum Applied {
         world: WorldId,
         /// Whether there is a step that can fail.
         may_fail: bool,
-        /// A configuration that may be undone, of which there are more than [`limits::CHECK_LEFT`] frames then.
+        /// A configuration that may be undone, of which one coordinator has more than [`limits::CHECK_LEFT`] frames then.
         left: Option<ConfigId>,
     },
     /// It is refused, and the world stays.
@@ -55,7 +55,7 @@ pub enum Applied {
         /// Why.
         findings: Rc<Findings>,
     },
-    /// It would leave more frames of one configuration than are followed.
+    /// It would leave more frames of one configuration and one coordinator than are followed.
     TooDeep(ConfigId),
 }
 
@@ -185,14 +185,15 @@ impl<'a> Worlds<'a> {
         self.undone.as_ref().is_none_or(|undone| undone.contains(&id))
     }
 
-    /// A configuration of which there are more frames than that.
+    /// A configuration of which one coordinator has more frames than that. Those of another one come of other rounds.
     fn more_than(&self, most: usize, world: &World) -> Option<ConfigId> {
-        let mut counts: FxHashMap<ConfigId, usize> = FxHashMap::default();
-        world.stack.frames().iter().map(|f| f.configuration).find(|id| {
-            let count = counts.entry(*id).or_default();
+        let mut counts: FxHashMap<(ConfigId, Requester), usize> = FxHashMap::default();
+        let deep = world.stack.frames().iter().find(|frame| {
+            let count = counts.entry((frame.configuration, frame.requester)).or_default();
             *count += 1;
-            self.is_undone(*id) && *count > most
-        })
+            self.is_undone(frame.configuration) && *count > most
+        });
+        deep.map(|frame| frame.configuration)
     }
 
     fn intern(&mut self, world: World) -> WorldId {

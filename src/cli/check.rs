@@ -6,7 +6,7 @@ use super::output::Style;
 use super::{Answer, Context, Run};
 use crate::check::{self, Explored};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_TOGETHER, CHECK_TRANSITIONS, CHECK_WAITING};
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TOGETHER, CHECK_TRANSITIONS, CHECK_WAITING};
 use crate::model::{Finding, Severity, finding};
 use serde_json::json;
 
@@ -111,7 +111,8 @@ fn bounds(explored: &Explored) -> Vec<String> {
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
         lines.push(format!(
-            "{} states were met and not followed further{rest}: the budget is {CHECK_TRANSITIONS} transitions",
+            "{} states were met and not followed further{rest}: the budget is {CHECK_TRANSITIONS} transitions, and \
+             {CHECK_PILED} requests that wait",
             explored.unfollowed
         ));
     }

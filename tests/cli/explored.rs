@@ -109,3 +109,54 @@ fn what_was_not_followed_is_told() {
     let text = demo.run(&["check", "deployment.yaml"]).out;
     assert!(text.contains("not all there are") && text.contains("were met and not followed further"), "{text}");
 }
+
+/// A coordinator that starts to work as soon as it is entered: `check` comes to an end all the same.
+fn by_itself(states: &str) -> Value {
+    let demo = Demo::new();
+    demo.write(
+        "configurations.lua",
+        "ConfiguratorConf {
+          base = Configuration { create(\"source\", \"Source\", { properties = { name = \"it\" } }) },
+          x = Configuration { group = \"g\", property_set(\"source.k\", 2.0) },
+          y = Configuration { group = \"g\", property_set(\"source.k\", 3.0) },
+        }",
+    );
+    demo.write("coordinator.lua", &format!("return state {{ on = state {{}}, {states} }}"));
+    demo.replace("deployment.yaml", "emits: [e_ready]\n", "");
+    demo.replace("deployment.yaml", "up: operational, failed: [failed],", "up: on,");
+    demo.run(&["check", "deployment.yaml", "--json"]).json()
+}
+
+#[test]
+fn who_goes_round_by_itself_is_followed_to_an_end() {
+    let round = "a = state {}, idle = state { entry = \"base.undo\" }, b = state { entry = \"base\" },
+      trans { src = \"initial\", tgt = \"b\" },
+      trans { src = \"b\", tgt = \"idle\", events = { \"base.ok\" } },
+      trans { src = \"idle\", tgt = \"b\", events = { \"base.undone\" } },
+      trans { src = \"on\", tgt = \"idle\", events = { \"e_shutdown\" } },";
+    // Wherever on its round it listens, that is where it is brought up from.
+    for at in ["b", "idle"] {
+        let json = by_itself(&format!("{round} trans {{ src = \"{at}\", tgt = \"on\", events = {{ \"e_start\" }} }}"));
+        assert_eq!(json["explored"]["complete"], true, "{json:#}");
+        let codes: Vec<&str> =
+            json["findings"].as_array().unwrap().iter().map(|f| f["code"].as_str().unwrap()).collect();
+        assert!(!codes.contains(&"deploy::never_up"), "{at}: {json:#}");
+    }
+}
+
+/// Each answer makes it ask for two things more.
+#[test]
+fn who_asks_for_more_than_is_answered_is_followed_so_far() {
+    let piles = "idle = state { entry = \"base\" },
+      a = state { m = state {}, n = state {},
+        trans { src = \"initial\", tgt = \"m\", effect = { \"x\", \"y\" } },
+        trans { src = \"m\", tgt = \"n\", events = { \"x.ok\", \"y.ok\" }, effect = { \"x\", \"y\" } },
+        trans { src = \"n\", tgt = \"m\", events = { \"x.ok\", \"y.ok\" }, effect = { \"x\", \"y\" } } },
+      trans { src = \"initial\", tgt = \"idle\" },
+      trans { src = \"idle\", tgt = \"a\", events = { \"base.ok\" } },
+      trans { src = \"a\", tgt = \"on\", events = { \"e_start\" } },
+      trans { src = \"on\", tgt = \"idle\", events = { \"e_shutdown\" } },";
+    let json = by_itself(piles);
+    assert_eq!(json["explored"]["complete"], false, "{json:#}");
+    assert!(json["explored"]["states"].as_u64().unwrap() > 30, "{json:#}");
+}

@@ -249,3 +249,79 @@ shutdown: {{ event: e_shutdown, down: [arm:idle, gripper:idle], within_s: 5 }}\n
     assert_eq!(json["explored"]["together"], true, "{json:#}");
     assert!(of_code(&json, "coord::refused_by_other").is_empty(), "{json:#}");
 }
+
+/// One of them waits for an event before it is entered at all: nothing is known of what they do together.
+#[test]
+fn one_that_cannot_be_entered_is_told_and_nothing_is_claimed() {
+    let one = "return state { a = state {},
+      trans { src = \"initial\", tgt = \"a\", events = { \"e_start\" } },
+      trans { src = \"a\", tgt = \"a\", events = { \"e_shutdown\" } } }";
+    let two = one
+        .replace(", events = { \"e_start\" } },", " }, trans { src = \"a\", tgt = \"a\", events = { \"e_start\" } },");
+    let demo = Demo::new();
+    demo.write("one.lua", one);
+    demo.write("two.lua", &two);
+    demo.write("conf.lua", "ConfiguratorConf { x = Configuration { create(\"x\", \"Drive\") } }");
+    let parts = [("coordinators: { one: one.lua, two: two.lua }", "[one:a, two:a]"), ("coordinator: one.lua", "a")];
+    for (number, (coordinators, down)) in parts.into_iter().enumerate() {
+        demo.write(
+            "two.yaml",
+            &format!(
+                "{DEPLOYMENT}{coordinators}
+deploy: {{ event: e_start, up: a, within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: {down}, within_s: 5 }}\n"
+            ),
+        );
+        let json = demo.run(&["check", "two.yaml", "--json"]).json();
+        assert_eq!(of_code(&json, "chart::entry_waits").len(), 1, "{json:#}");
+        assert_eq!(json["explored"]["complete"], false, "{json:#}");
+        let together = if number == 0 { Value::Bool(false) } else { Value::Null };
+        assert_eq!(json["explored"]["together"], together, "{json:#}");
+        for code in ["coord::no_way_down", "deploy::never_up"] {
+            assert!(of_code(&json, code).is_empty(), "{json:#}");
+        }
+    }
+}
+
+/// Each applies `common` twice on the way up, and undoes both: four frames, no more than two of them by one.
+fn twice(undo: &str) -> Value {
+    let climber = "return state {
+      idle = state {}, one = state { entry = \"common\" }, two = state { entry = \"common\" }, up = state {},
+      leaving = state { entry = \"common.undo\" }, last = state { entry = \"UNDO\" },
+      trans { src = \"initial\", tgt = \"idle\" },
+      trans { src = \"idle\", tgt = \"one\", events = { \"e_start\" } },
+      trans { src = \"one\", tgt = \"two\", events = { \"common.ok\" } },
+      trans { src = \"two\", tgt = \"up\", events = { \"common.ok\" } },
+      trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+      trans { src = \"leaving\", tgt = \"last\", events = { \"common.undone\", \"common.undo.failed\" } },
+      trans { src = \"last\", tgt = \"idle\", events = { \"common.undone\", \"common.undo.failed\", \"e_shutdown\" } },
+      trans { src = \"one\", tgt = \"last\", events = { \"common.failed\", \"common.broken\", \"e_shutdown\" } },
+      trans { src = \"two\", tgt = \"leaving\", events = { \"common.failed\", \"common.broken\", \"e_shutdown\" } },
+    }";
+    let demo = Demo::new();
+    demo.write("arm.lua", &climber.replace("UNDO", undo));
+    demo.write("gripper.lua", &climber.replace("UNDO", "common.undo"));
+    demo.write("conf.lua", "ConfiguratorConf { common = Configuration { description = \"what both need\" } }");
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ arm: arm.lua, gripper: gripper.lua }}\nemits: [e_other]
+deploy: {{ event: e_start, up: up, within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: [arm:idle, gripper:idle], within_s: 5 }}\n"
+        ),
+    );
+    demo.run(&["check", "two.yaml", "--json"]).json()
+}
+
+#[test]
+fn frames_are_counted_by_coordinator_and_a_way_that_is_cut_is_told() {
+    let json = twice("common.undo");
+    assert_eq!(json["explored"]["together"], true, "{json:#}");
+    for code in ["deploy::never_up", "coord::stack_grows", "coord::no_way_down"] {
+        assert!(of_code(&json, code).is_empty(), "{json:#}");
+    }
+    // One that keeps a frame each time round: what comes of that is not followed, so nothing is claimed.
+    let json = twice("e_other");
+    assert_eq!(of_code(&json, "coord::stack_grows").len(), 1, "{json:#}");
+    assert_eq!(json["explored"]["together"], false, "{json:#}");
+}
