@@ -63,8 +63,8 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
 
 /// What is wrong with the step after which it happens. A verb alone means each of its steps.
 fn step(reaction: &SimulatedReaction, universe: &Universe) -> Findings {
-    let mut words = reaction.after.split(' ');
-    let verb = words.next().unwrap_or_default();
+    let text = reaction.after.trim();
+    let (verb, rest) = text.split_once(' ').map_or((text, None), |(verb, rest)| (verb, Some(rest)));
     let part = PARTS.iter().find(|(name, _)| *name == verb).map(|(_, member)| *member);
     if part.is_none() && !WHOLE.contains(&verb) {
         let known = WHOLE.into_iter().chain(PARTS.iter().map(|(name, _)| *name));
@@ -75,21 +75,65 @@ fn step(reaction: &SimulatedReaction, universe: &Universe) -> Findings {
                 .help(did_you_mean(verb, "steps", known)),
         ];
     }
-    let Some(operand) = words.next() else { return Vec::new() };
-    let unreadable = |what: &str, example: &str| {
-        Finding::error(SIMULATED_UNKNOWN_STEP, format!("`{operand}` is not {what}"))
-            .at(reaction.origin)
-            .help(format!("write it as `davit plan` prints steps, such as `{verb} {example}`"))
+    let Some(rest) = rest else { return Vec::new() };
+    let Some(part) = part else { return whole(reaction, verb, rest, universe) };
+    if !matches!(verb, "connect" | "disconnect") {
+        // A value or arguments follow, which nobody can know before the step is planned.
+        let (operand, _) = rest.split_once([' ', '(']).unwrap_or((rest, ""));
+        return member(reaction, verb, part, operand, universe);
+    }
+    let mut words = rest.split(' ');
+    let mut findings = member(reaction, verb, part, words.next().unwrap_or_default(), universe);
+    match words.next() {
+        None => {}
+        Some("->") => {
+            findings.extend(words.next().into_iter().flat_map(|to| member(reaction, verb, part, to, universe)));
+            let policy = words.collect::<Vec<_>>().join(" ");
+            if !policy.is_empty() && (verb == "disconnect" || !policy.starts_with('(')) {
+                findings.push(never(reaction, &policy, &format!("{verb} radio.out -> arm.in")));
+            }
+        }
+        Some(word) => findings.push(never(reaction, word, &format!("{verb} radio.out -> arm.in"))),
+    }
+    findings
+}
+
+/// What follows is in the text of no such step.
+fn never(reaction: &SimulatedReaction, word: &str, example: &str) -> Finding {
+    Finding::error(SIMULATED_UNKNOWN_STEP, format!("no step is written with `{word}` there"))
+        .at(reaction.origin)
+        .labelled("after which step?")
+        .help(format!("write it as `davit plan` prints steps, such as `{example}`"))
+}
+
+/// What is wrong with the component of a step that is done to it as a whole. A creation goes on with its type.
+fn whole(reaction: &SimulatedReaction, verb: &str, rest: &str, universe: &Universe) -> Findings {
+    let mut words = rest.split(' ');
+    let operand = words.next().unwrap_or_default();
+    let Ok(name) = ComponentName::new(operand) else {
+        return vec![unreadable(reaction, operand, "a component", &format!("{verb} radio"))];
     };
-    let Some(part) = part else {
-        return match ComponentName::new(operand) {
-            Err(_) => vec![unreadable("a component", "radio")],
-            Ok(name) if universe.of(name).is_empty() => vec![universe.unknown(name, reaction.origin)],
-            Ok(_) => Vec::new(),
-        };
-    };
-    let Ok(member) = MemberRef::new(operand.split('(').next().unwrap_or(operand)) else {
-        return vec![unreadable("a member of a component", "radio.channel")];
+    let creations = universe.of(name);
+    if creations.is_empty() {
+        return vec![universe.unknown(name, reaction.origin)];
+    }
+    match words.next() {
+        None => Vec::new(),
+        Some(":") if verb == "create" => Vec::new(),
+        Some(word) => vec![never(reaction, word, &format!("{verb} {operand}"))],
+    }
+}
+
+fn unreadable(reaction: &SimulatedReaction, operand: &str, what: &str, example: &str) -> Finding {
+    Finding::error(SIMULATED_UNKNOWN_STEP, format!("`{operand}` is not {what}"))
+        .at(reaction.origin)
+        .help(format!("write it as `davit plan` prints steps, such as `{example}`"))
+}
+
+/// What is wrong with a member that a step is done to.
+fn member(reaction: &SimulatedReaction, verb: &str, part: Member, operand: &str, universe: &Universe) -> Findings {
+    let Ok(member) = MemberRef::new(operand) else {
+        return vec![unreadable(reaction, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };
     let creations = universe.of(member.component);
     if creations.is_empty() {

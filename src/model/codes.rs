@@ -619,7 +619,7 @@ codes! {
         "`simulated: { reactions: [...] }` says what components raise by themselves after a step was done. The step is \
          written as `davit plan` prints it, or with its beginning: `start radio`, `property_set radio.channel`, \
          `operation_call arm.home`, or a verb alone for all of its steps. Here the first word is no step's, or what follows \
-         is no component or member.";
+         is no component or member, or stands in no step's text: the reaction would never come.";
     SIMULATED_UNHEARD = "simulated::unheard", "nobody listens to what a simulated component raises",
         "A simulated component raises an event that no transition of a coordinator waits for, and no configuration is \
          confirmed by it. It is probably misspelt; if not, it can be left out.";
