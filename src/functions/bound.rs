@@ -56,8 +56,8 @@ pub struct Bound {
     pub thread: RefCell<Option<Thread>>,
     /// The events of this step as the functions get them.
     pub events: RefCell<Option<Table>>,
-    /// Coroutines that were ended by their budget, as keys: they are not to be closed.
-    pub ended: Table,
+    /// Resumes the coroutine of a `doo`.
+    pub go_on: Function,
     /// Words that functions are called with.
     pub words: Words,
     /// The model has a `dbg` printer of its own.
@@ -189,7 +189,7 @@ impl Bound {
                 post_step: word("post_step_hook")?,
                 dbg: word("dbg")?,
             },
-            ended: host.native.raw_get("ended")?,
+            go_on: host.native.raw_get("go_on")?,
             traces: Cell::new(false),
             quiet: host.native.raw_get("quiet")?,
             failed: RefCell::default(),

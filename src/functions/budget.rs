@@ -1,9 +1,10 @@
 //! What one call may take, and what its errors are called.
 
+use super::exact;
 #[cfg(target_os = "linux")]
 use super::watch::Watch;
 use crate::limits;
-use mlua::{HookTriggers, Lua, Result, Thread, VmState};
+use mlua::{Lua, Result};
 use std::cell::Cell;
 #[cfg(target_os = "linux")]
 use std::cell::OnceCell;
@@ -29,11 +30,7 @@ impl Budget {
     pub fn install(lua: &Lua) -> Result<Rc<Self>> {
         lua.set_memory_limit(limits::FUNCTIONS_BYTES)?;
         let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), ..Self::default() });
-        let counted = budget.clone();
-        let triggers = HookTriggers::new().every_nth_instruction(limits::CALL_LOOK);
-        lua.set_global_hook(triggers, move |_, _| {
-            if counted.look(limits::CALL_LOOK) { Err(counted.error()) } else { Ok(VmState::Continue) }
-        })?;
+        exact::begin(lua)?;
         Ok(budget)
     }
 
@@ -45,9 +42,9 @@ impl Budget {
             let budget = Rc::downgrade(self);
             let look = move |instructions| budget.upgrade().is_some_and(|budget| budget.look(instructions));
             if let Some(watch) = Watch::start(lua, look)
-                && self.watch.set(watch).is_ok()
+                && exact::end(lua).is_ok()
             {
-                lua.remove_global_hook();
+                let _ = self.watch.set(watch);
             }
         }
         #[cfg(not(target_os = "linux"))]
@@ -59,8 +56,16 @@ impl Budget {
         self.over.get()
     }
 
+    /// Whether only calls that take long are counted.
+    pub(super) fn counts_late(&self) -> bool {
+        #[cfg(target_os = "linux")]
+        return self.watch.get().is_some();
+        #[cfg(not(target_os = "linux"))]
+        false
+    }
+
     /// So many instructions more; whether they are too many.
-    fn look(&self, instructions: u32) -> bool {
+    pub(super) fn look(&self, instructions: u32) -> bool {
         self.used.set(self.used.get() + u64::from(instructions));
         let over = self.used.get() > self.limit.get();
         if over {
@@ -104,7 +109,7 @@ impl Budget {
         }
         self.used.set(0);
         self.limit.set(limit);
-        let outcome = self.watched(call);
+        let outcome = exact::during(self, || self.watched(call));
         drop(leave);
         if self.over.replace(false) {
             return Err(self.error());
@@ -123,17 +128,6 @@ impl Budget {
     #[cfg(not(target_os = "linux"))]
     fn watched<R>(&self, call: impl FnOnce() -> R) -> R {
         call()
-    }
-}
-
-/// Resumes a coroutine within a call.
-pub fn resuming<R>(thread: &Thread, resume: impl FnOnce() -> R) -> R {
-    #[cfg(target_os = "linux")]
-    return super::watch::resuming(thread, resume);
-    #[cfg(not(target_os = "linux"))]
-    {
-        let _ = thread;
-        resume()
     }
 }
 

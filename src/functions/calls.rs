@@ -1,7 +1,6 @@
 //! The hook: how the engine calls a machine's functions, with what rFSM gives them.
 
 use super::bound::Bound;
-use super::budget::resuming;
 use super::host::Host;
 use super::tracing;
 use crate::limits;
@@ -79,13 +78,8 @@ impl Calls {
             }
         };
         let value: Value = bound.calling(view, || {
-            let arguments = (&bound.fsm, &bound.nodes[state.index()], &bound.words.doo);
-            let outcome = resuming(&thread, || thread.resume(arguments));
-            // It may have given itself to others, who must not close it.
-            if outcome.is_err() && bound.budget.is_over() {
-                bound.ended.raw_set(&thread, true)?;
-            }
-            outcome
+            // By Lua's own resume: mlua's clears the stack of a thread that failed, and so closes its variables uncounted.
+            bound.go_on.call((&thread, &bound.fsm, &bound.nodes[state.index()], &bound.words.doo))
         })?;
         Ok(if thread.status() == ThreadStatus::Resumable {
             Doo::Yielded { idle: !matches!(value, Value::Nil | Value::Boolean(false)) }

@@ -11,6 +11,7 @@
 mod bound;
 mod budget;
 mod calls;
+mod exact;
 mod host;
 mod lower;
 mod native;

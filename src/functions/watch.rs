@@ -8,11 +8,11 @@
 //! from another thread it would be a data race.
 //!
 //! What is absent: verdicts (`budget.rs` counts and decides) and wall clocks: a thread that waits has no ticks. All that
-//! touches Lua behind mlua's back is in this file.
+//! touches Lua behind mlua's back is in this file and in `exact.rs`.
 
 use crate::limits;
 use mlua::ffi::{self, lua_State};
-use mlua::{Function, Lua, Result, Thread, WeakLua};
+use mlua::{Function, Lua, Result, WeakLua};
 use std::cell::Cell;
 use std::ffi::c_int;
 use std::ptr;
@@ -179,11 +179,7 @@ impl Watch {
     }
 }
 
-/// While `resume` resumes `thread`, ticks reach it too.
-pub fn resuming<R>(thread: &Thread, resume: impl FnOnce() -> R) -> R {
-    entered(thread.state(), resume)
-}
-
+/// While `resume` resumes a thread, ticks reach it too.
 fn entered<R>(state: *mut lua_State, resume: impl FnOnce() -> R) -> R {
     match current() {
         Some(watch) => watch.entered(state, resume),
@@ -339,6 +335,7 @@ fn signal() -> Option<c_int> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mlua::Thread;
     use std::rc::Rc;
 
     /// A state whose function `tick` is a tick, the only ones there are, and whose calls are over after so many looks.

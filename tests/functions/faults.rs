@@ -46,6 +46,10 @@ fn protected_calls_and_coroutines_do_not_outlive_the_budget() {
         "while true do coroutine.resume(coroutine.create(function() while true do end end)) end",
         "while true do coroutine.wrap(function() for i = 1, 10 do end end)() end",
         "local function f() return f() end f()",
+        // What is closed on the way out is counted too.
+        "local c <close> = setmetatable({}, { __close = function() while true do end end }) while true do end",
+        "coroutine.wrap(function()
+           local c <close> = setmetatable({}, { __close = function() while true do end end }) while true do end end)()",
     ] {
         told(&model(&format!("entry = function() {body} end"), ""), "ENTRY", "million instructions");
     }

@@ -30,7 +30,6 @@ local resume, close = native.resume or raw_resume, native.close or raw_close
 
 -- A coroutine that was ended in a look is left without hooks: what it would do when it is closed, nothing could end.
 local ended = setmetatable({}, { __mode = "k" })
-native.ended = ended
 
 local function noted(thread, ok, ...)
   if not ok and over() then
@@ -39,6 +38,13 @@ local function noted(thread, ok, ...)
   end
   return ok, ...
 end
+
+-- For who drives a `doo`.
+local function gone_on(ok, value)
+  if ok then return value end
+  error(value, 0)
+end
+function native.go_on(thread, ...) return gone_on(noted(thread, resume(thread, ...))) end
 
 function coroutine.resume(thread, ...) return noted(thread, resume(thread, ...)) end
 

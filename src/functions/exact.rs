@@ -1,0 +1,71 @@
+//! Counting every call from its first instruction on.
+//!
+//! The hook is our own. An error out of one of mlua's clears the frame of the function that runs first, and so closes the
+//! variables of that function (`local x <close>`) inside the hook, where nothing is counted: what they do when they are
+//! closed would run for ever.
+
+use crate::limits;
+use mlua::ffi::{self, lua_State};
+use mlua::{Lua, Result};
+use std::cell::Cell;
+use std::ptr;
+
+use super::budget::Budget;
+
+thread_local! {
+    /// Whose call is under way on this thread.
+    static CURRENT: Cell<*const Budget> = const { Cell::new(ptr::null()) };
+}
+
+/// Counts the instructions of all code of a state for [`during`]. Coroutines inherit it from who makes them.
+pub fn begin(lua: &Lua) -> Result<()> {
+    // SAFETY: a hook that keeps to what Lua allows in hooks, on a state of this thread.
+    unsafe { lua.exec_raw((), |state| set(state, true)) }
+}
+
+/// Counts no more. Coroutines that have the hook lose it in their next call.
+pub fn end(lua: &Lua) -> Result<()> {
+    // SAFETY: as above.
+    unsafe { lua.exec_raw((), |state| set(state, false)) }
+}
+
+/// Makes a call whose instructions `budget` counts.
+pub fn during<R>(budget: &Budget, call: impl FnOnce() -> R) -> R {
+    struct Leave(*const Budget);
+    impl Drop for Leave {
+        fn drop(&mut self) {
+            CURRENT.set(self.0);
+        }
+    }
+    let _leave = Leave(CURRENT.replace(budget));
+    call()
+}
+
+/// # Safety
+/// `state` is a living thread of Lua that belongs to this thread of the operating system.
+unsafe fn set(state: *mut lua_State, on: bool) {
+    let every = limits::CALL_LOOK.cast_signed();
+    // SAFETY: as above; `count` may be called whenever Lua calls hooks.
+    unsafe {
+        if on {
+            ffi::lua_sethook(state, Some(count), ffi::LUA_MASKCOUNT, every)
+        } else {
+            ffi::lua_sethook(state, None, 0, 0)
+        }
+    }
+}
+
+/// The hook. It holds nothing that a jump of Lua's would leave behind.
+unsafe extern "C-unwind" fn count(state: *mut lua_State, _: *mut ffi::lua_Debug) {
+    // SAFETY: `during` put the budget there from a borrow that lives until it has taken it away again, and Lua runs inside
+    // of that. Lua guarantees room for what is pushed here; an error ends the hook and the instruction it was called at.
+    unsafe {
+        let Some(budget) = CURRENT.get().as_ref() else { return };
+        if budget.counts_late() {
+            set(state, false);
+        } else if budget.look(limits::CALL_LOOK) {
+            ffi::lua_pushstring(state, c"ended: its instructions are used up".as_ptr());
+            ffi::lua_error(state)
+        }
+    }
+}
