@@ -63,6 +63,13 @@ pub const INBOX_CONTROL: usize = 1024;
 /// no news any more.
 pub const INBOX_REPORT: usize = 4096;
 
+/// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: twice
+/// what its inbox holds.
+pub const MOMENT_TURNS: u32 = 10_000;
+
+/// What a reaction takes then: a deadline of seconds comes after some thousand rounds.
+pub const MOMENT_PAUSE: Duration = Duration::from_millis(1);
+
 /// Findings shown on a terminal in one go; more are counted, since nobody reads on.
 pub const FINDINGS_SHOWN: usize = 50;
 

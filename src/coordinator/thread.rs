@@ -3,6 +3,7 @@
 use super::core::{Core, Listener, Trouble};
 use super::inbox::{Dropped, Inbox, Incoming, Refused};
 use super::{Delivered, Tag};
+use crate::limits;
 use crate::model::names::EventName;
 use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
 use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
@@ -241,6 +242,7 @@ impl Shared {
             core.start(self.clock.now(), &mut listener);
             true
         });
+        let mut round = Round::default();
         while !self.detached.load(Ordering::SeqCst) {
             let now = self.clock.now();
             // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
@@ -257,7 +259,9 @@ impl Shared {
                 }
                 None => false,
             });
-            if !worked {
+            if worked {
+                round.turn(&self.clock, now);
+            } else {
                 listener.rested();
                 self.bell.wait(core.next_deadline().unwrap_or(Time::NEVER));
             }
@@ -272,6 +276,32 @@ impl Shared {
     fn react(&self, reaction: impl FnOnce() -> bool) -> bool {
         let _reacting = lock(&self.reacting);
         !self.detached.load(Ordering::SeqCst) && reaction()
+    }
+}
+
+/// How much happened at one moment of simulated time. A coordinator whose requests are answered at once and that goes
+/// round for ever would keep time from moving, and nobody's deadline would ever come.
+#[derive(Default)]
+struct Round {
+    at: Time,
+    turns: u32,
+}
+
+impl Round {
+    /// It reacted at `now`; when that was too much for a moment, time passes.
+    fn turn(&mut self, clock: &Clock, now: Time) {
+        if !clock.is_simulated() {
+            return;
+        }
+        if now != self.at {
+            *self = Self { at: now, turns: 0 };
+        }
+        self.turns = self.turns.saturating_add(1);
+        if self.turns > limits::MOMENT_TURNS {
+            clock.sleep(limits::MOMENT_PAUSE);
+            // Time that passes only here does not end the round.
+            self.at = clock.now();
+        }
     }
 }
 

@@ -91,3 +91,29 @@ fn names_are_checked() {
     let codes: Vec<&str> = json["findings"].as_array().unwrap().iter().map(|f| f["code"].as_str().unwrap()).collect();
     assert!(codes.contains(&"simulated::not_used"), "{codes:?}");
 }
+
+/// Everything is answered at once there, so time would stand still for ever: the deadline comes all the same.
+#[test]
+fn who_goes_round_for_ever_does_not_stop_simulated_time() {
+    let demo = Demo::new();
+    demo.write("configurations.lua", "ConfiguratorConf { x = Configuration { create(\"sink\", \"Sink\") } }");
+    demo.write(
+        "coordinator.lua",
+        "return state {
+          a = state { entry = \"x\" }, b = state { entry = \"x.undo\" }, on = state {}, idle = state {},
+          down = state { entry = \"x.undo\" },
+          trans { src = \"initial\", tgt = \"a\" },
+          trans { src = \"a\", tgt = \"b\", events = { \"x.ok\", \"x.failed\", \"x.broken\" } },
+          trans { src = \"b\", tgt = \"a\", events = { \"x.undone\", \"x.undo.failed\", \"x.undo.broken\" } },
+          trans { src = \"b\", tgt = \"on\", events = { \"e_start\" } },
+          trans { src = \"on\", tgt = \"down\", events = { \"e_shutdown\" } },
+          trans { src = \"down\", tgt = \"idle\", events = { \"x.undone\", \"x.undo.failed\", \"x.undo.broken\" } },
+        }",
+    );
+    demo.replace("deployment.yaml", "emits: [e_ready]\n", "");
+    demo.replace("deployment.yaml", "up: operational, failed: [failed], within_s: 5", "up: on, within_s: 0.2");
+    demo.write("script.lua", "deploy('deployment.yaml')");
+    let ran = demo.run(&["run", "script.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 1, "{}", ran.err);
+    assert!(ran.err.contains("not up after 0.2 s"), "{}", ran.err);
+}
