@@ -35,6 +35,11 @@ fn endless_loops_end() {
         "local t = setmetatable({}, { __index = function(t, k) return t[k + 1] end }) while true do pcall(function() return t[1] end) end",
         "local t = setmetatable({}, { __add = function(a, b) while true do end end }) return t + 1",
         "local t = setmetatable({}, { __close = function() while true do end end }) do local x <close> = t end",
+        // What is closed when the budget has ended what runs, in the file itself, in a coroutine, and of a string.
+        "local x <close> = setmetatable({}, { __close = function() while true do end end }) while true do end",
+        "local m = {} local t = setmetatable({}, m) m.__close = function() while true do end end local x <close> = t while true do end",
+        "coroutine.wrap(function() local x <close> = setmetatable({}, { __close = function() while true do end end }) while true do end end)()",
+        "while true do pcall(coroutine.wrap(function() for _ in next, {1}, nil, setmetatable({}, { __close = function() while true do end end }) do while true do end end end)) end",
         "goto a ::a:: goto a",
         "for i = 1, math.huge do end",
         "local function f() return f() end f()",

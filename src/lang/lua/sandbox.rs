@@ -344,6 +344,10 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
 pub fn start_budget(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
     let recorder = shared.clone();
     let started = processor_time();
+    // Strings have a metatable, which a file can reach.
+    if let Some(meta) = lua.type_metatable::<mlua::LuaString>() {
+        known_metatables(lua)?.raw_set(meta, true)?;
+    }
     let used = std::cell::Cell::new(0_u64);
     lua.set_global_hook(HookTriggers::new().every_nth_instruction(TICK), move |lua, debug| {
         let mut recorder = recorder.borrow_mut();
@@ -367,6 +371,7 @@ pub fn start_budget(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
             return Ok(VmState::Continue);
         }
         drop(recorder);
+        close_nothing(lua)?;
         lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), |_, _| {
             Err(mlua::Error::runtime("the budget is used up"))
         })?;
@@ -429,7 +434,7 @@ fn concat(
 }
 
 /// `setmetatable` without finalisers: they would run with hooks off, where no budget reaches.
-fn set_metatable(_: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Result<Table> {
+fn set_metatable(lua: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Result<Table> {
     if let Some(old) = table.metatable()
         && old.raw_get::<Value>("__metatable")? != Value::Nil
     {
@@ -440,8 +445,30 @@ fn set_metatable(_: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Result
     {
         return Err(mlua::Error::runtime("finalisers (`__gc`) are closed to Lua here"));
     }
+    if let Some(meta) = &meta {
+        known_metatables(lua)?.raw_set(meta, true)?;
+    }
     table.set_metatable(meta)?;
     Ok(table)
+}
+
+/// All metatables of a file, as the keys of a table that does not keep them.
+fn known_metatables(lua: &Lua) -> mlua::Result<Table> {
+    const KEY: &str = "davit.metatables";
+    if let Some(known) = lua.named_registry_value::<Option<Table>>(KEY)? {
+        return Ok(known);
+    }
+    let (known, weak) = (lua.create_table()?, lua.create_table()?);
+    weak.raw_set("__mode", "k")?;
+    known.set_metatable(Some(weak))?;
+    lua.set_named_registry_value(KEY, &known)?;
+    Ok(known)
+}
+
+/// Variables that close something (`local x <close>`) close nothing any more: what an error closes on its way out of a
+/// hook, or with a coroutine that has ended, runs with hooks off, where no budget reaches.
+fn close_nothing(lua: &Lua) -> mlua::Result<()> {
+    known_metatables(lua)?.for_each(|meta: Table, _: bool| meta.raw_set("__close", Value::Nil))
 }
 
 /// The text of an error, without stack traces.
