@@ -12,11 +12,20 @@ return state {
   },
   leaving = state {},
   failed  = state {},
+  -- What an undo that failed has left is tried once more, in order.
+  clearing = state {
+    faster   = state { entry = "slow.undo" },
+    removing = state { entry = "build.undo" },
+    trans { src = "initial", tgt = "faster" },
+    trans { src = "faster",  tgt = "removing", events = { "slow.undone" } },
+  },
   trans { src = "initial", tgt = "idle" },
   trans { src = "idle",    tgt = "up",      events = { "e_start" } },
   trans { src = "up",      tgt = "failed",  events = { "build.failed", "build.broken" } },
   trans { src = "up",      tgt = "leaving", events = { "e_shutdown" } },
   trans { src = "leaving", tgt = "idle",    events = { "build.undone" } },
   trans { src = "leaving", tgt = "failed",  events = { "build.undo.failed", "build.undo.broken" } },
-  trans { src = "failed",  tgt = "idle",    events = { "e_shutdown" } },
+  trans { src = "failed",   tgt = "clearing", events = { "e_shutdown" } },
+  trans { src = "clearing", tgt = "idle",     events = { "build.undone" } },
+  trans { src = "clearing", tgt = "failed",   events = { "slow.undo.failed", "slow.undo.broken", "build.undo.failed", "build.undo.broken" } },
 }
