@@ -1,0 +1,8 @@
+//! What was confirmed of rFSM by probes (rfsm.md, marked there) as far as functions, the checks of `init` and the API are
+//! concerned, and the gaps of its own tests. What the engine does without functions is in `tests/statechart/confirmed`.
+
+mod api;
+mod construction;
+mod enabled;
+mod executing;
+mod stepping;
