@@ -44,6 +44,10 @@ pub const CHART_RUN: u64 = 10_000;
 /// chart past it is stepped by searching, which takes longer but not the more the larger it is.
 pub const CHART_REACTIONS: usize = 1 << 20;
 
+/// Transitions of a statechart that a running model may still add to, with the rows that are left behind when they move:
+/// about 20 MB.
+pub const GROWN_EDGES: usize = 1 << 18;
+
 /// Levels of states in a statechart. People write five; the walk through a chart is recursive.
 pub const CHART_DEPTH: usize = 100;
 

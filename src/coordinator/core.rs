@@ -54,6 +54,12 @@ pub trait Listener {
         let _ = said;
     }
 
+    /// The model has added to its own chart: from now on this is it, and the numbers of what there was stay. Called with
+    /// the same one again after each further step.
+    fn grown(&mut self, chart: &Arc<Chart>) {
+        let _ = chart;
+    }
+
     /// The chart behaved badly.
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
         let _ = (chart, trouble);
@@ -140,7 +146,7 @@ impl<F: Hook> Core<F> {
         Self { chart, machine, batch, functions, said: Vec::new(), again: None }
     }
 
-    /// The chart.
+    /// The chart, as it was read.
     pub fn chart(&self) -> &Arc<Chart> {
         &self.chart
     }
@@ -165,7 +171,7 @@ impl<F: Hook> Core<F> {
         listener: &mut (impl Listener + ?Sized),
     ) -> Delivered {
         if let Some(tag) = tag.filter(|tag| !self.machine.is_present(&self.chart, tag.owner, tag.visit)) {
-            listener.stale(&self.chart, event, tag);
+            listener.stale(self.machine.chart(&self.chart), event, tag);
             return Delivered::Stale;
         }
         let id = self.functions.event(&self.chart, event);
@@ -215,7 +221,7 @@ impl<F: Hook> Core<F> {
     /// Hands on what the step raised.
     fn tell(&mut self, listener: &mut (impl Listener + ?Sized)) {
         if !self.batch.is_empty() {
-            listener.raised(&self.chart, &self.batch);
+            listener.raised(self.machine.chart(&self.chart), &self.batch);
             self.batch.clear();
         }
     }
@@ -230,11 +236,14 @@ impl<F: Hook> Core<F> {
             let step = self.machine.turn(&self.chart, now, &mut hook);
             first = first.or(Some(step));
             if F::TURNS {
+                if let Some(grown) = self.machine.grown() {
+                    listener.grown(grown);
+                }
                 self.functions.said(&mut self.said);
                 self.said.drain(..).for_each(|said| listener.said(&said));
             }
             match step {
-                Step::Taken | Step::Entered => listener.moved(&self.chart, self.machine.active()),
+                Step::Taken | Step::Entered => listener.moved(self.machine.chart(&self.chart), self.machine.active()),
                 Step::NotEntered => {
                     listener.trouble(&self.chart, Trouble::NotEntered);
                     return step;

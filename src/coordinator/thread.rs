@@ -8,7 +8,7 @@ use crate::model::names::EventName;
 use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
 use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 
 /// A running coordinator. Cloning makes another handle of the same one; it ends when it is told to, not when the handles
 /// are gone.
@@ -20,6 +20,8 @@ pub struct Coordinator {
 struct Shared {
     clock: Clock,
     chart: Arc<Chart>,
+    /// The chart, once a model with functions has added to it.
+    grown: OnceLock<Mutex<Arc<Chart>>>,
     inbox: Mutex<Inbox>,
     bell: Signal,
     /// Index of the active leaf plus one; 0 before the chart was entered. The leaf tells the whole active configuration.
@@ -83,6 +85,7 @@ impl Coordinator {
         let shared = Arc::new(Shared {
             clock: clock.clone(),
             chart,
+            grown: OnceLock::new(),
             inbox: Mutex::new(Inbox::new()),
             bell: clock.signal(),
             leaf: AtomicUsize::new(0),
@@ -103,9 +106,9 @@ impl Coordinator {
         coordinator
     }
 
-    /// The chart it runs.
-    pub fn chart(&self) -> &Arc<Chart> {
-        &self.shared.chart
+    /// The chart it runs. It is the one it was started with, but for a model that adds to its own.
+    pub fn chart(&self) -> Arc<Chart> {
+        self.shared.chart()
     }
 
     /// Puts an event into the inbox. Never waits.
@@ -121,23 +124,23 @@ impl Coordinator {
         Ok(())
     }
 
-    /// The active leaf; none before the chart was entered. Takes no lock.
+    /// The active leaf; none before the chart was entered. Takes no lock (but for a model that has added to its chart).
     pub fn leaf(&self) -> Option<NodeId> {
         self.shared.leaf()
     }
 
-    /// Full names of the active states, from the root to the leaf; empty before the chart was entered. Takes no lock.
+    /// Full names of the active states, from the root to the leaf; empty before the chart was entered.
     pub fn active(&self) -> Vec<String> {
-        let chart = &self.shared.chart;
+        let chart = &self.shared.chart();
         let mut names: Vec<String> =
             std::iter::successors(self.leaf(), |n| chart.parent(*n)).map(|n| chart.fqn(n).to_string()).collect();
         names.reverse();
         names
     }
 
-    /// Whether a state is active. Takes no lock.
+    /// Whether a state is active.
     pub fn is_active(&self, state: NodeId) -> bool {
-        self.leaf().is_some_and(|leaf| self.shared.chart.is_inside(leaf, state))
+        self.leaf().is_some_and(|leaf| self.shared.chart().is_inside(leaf, state))
     }
 
     /// Waits until `state` is active: now, or after any step until the deadline, however short it stays so.
@@ -228,7 +231,11 @@ impl std::fmt::Debug for Coordinator {
 impl Shared {
     fn leaf(&self) -> Option<NodeId> {
         let number = self.leaf.load(Ordering::SeqCst).checked_sub(1)?;
-        self.chart.node(number)
+        self.chart.node(number).or_else(|| self.chart().node(number))
+    }
+
+    fn chart(&self) -> Arc<Chart> {
+        self.grown.get().map_or_else(|| self.chart.clone(), |grown| lock(grown).clone())
     }
 
     fn run<F: Hook>(&self, mut listener: impl Listener, open: impl FnOnce() -> Result<F, String>) {
@@ -355,6 +362,13 @@ impl<L: Listener> Listener for Told<'_, L> {
 
     fn unmatched(&mut self, event: EventName) {
         self.tell(|listener| listener.unmatched(event));
+    }
+
+    fn grown(&mut self, chart: &Arc<Chart>) {
+        let mut known = lock(self.shared.grown.get_or_init(|| Mutex::new(chart.clone())));
+        if !Arc::ptr_eq(&known, chart) {
+            known.clone_from(chart);
+        }
     }
 
     fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {

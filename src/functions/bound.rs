@@ -1,13 +1,12 @@
-//! A machine with its tables: which function, state and transition of the chart is which in Lua, and what each event is.
+//! A machine with its tables, and what a call may see of it and send to it.
 
 use super::budget::{Budget, message_of, undefined_global};
 use super::host::{Host, Voice};
-use super::lower::{self, Lowered};
+use super::tables::Tables;
 use crate::limits;
-use crate::model::{Finding, Openings, Origin, Severity};
-use crate::statechart::{Chart, EventId, Kind, Machine, NodeId, Printer, View, compile};
+use crate::model::{Finding, Openings};
+use crate::statechart::{EdgeId, EventId, Kind, Machine, NodeId, Printer, View};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
-use rustc_hash::FxHashMap;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
@@ -31,25 +30,13 @@ pub struct Status {
 pub struct Bound {
     pub budget: Rc<Budget>,
     pub voice: Rc<Voice>,
-    pub chart: Rc<Chart>,
+    /// They only grow, and a call that is under way keeps those it began with.
+    pub tables: RefCell<Rc<Tables>>,
+    /// The model has added to them, and the machine is not told yet.
+    pub has_grown: Cell<bool>,
     /// As written, for comparing two runs of one text.
     pub written: crate::model::Statechart,
     pub fsm: Table,
-    /// By node: states and connectors.
-    pub nodes: Vec<Value>,
-    /// By transition.
-    pub edges: Vec<Value>,
-    /// By number.
-    pub functions: Vec<Function>,
-    pub node_of: FxHashMap<usize, NodeId>,
-    /// By number in the chart: what a listed event is in Lua.
-    listed: Vec<Value>,
-    /// By node: the completion's text.
-    done: Vec<Value>,
-    init: Value,
-    known: FxHashMap<Box<[u8]>, EventId>,
-    /// Values of events that are no texts → number in `listed`, 1-based.
-    odd: Table,
     strange: RefCell<Vec<Value>>,
     strange_next: Cell<usize>,
     pub status: RefCell<Status>,
@@ -102,79 +89,16 @@ impl From<mlua::Error> for Refused {
 impl Bound {
     /// Compiles a machine's tables.
     pub fn new(lua: &Lua, host: &Host, fsm: &Table) -> std::result::Result<Self, Refused> {
-        let list = lower::flat(&host.native, fsm)?;
-        // A transition is known by its number; nothing else needs a place here.
-        let mut places = |_: Option<usize>, number: usize, word: &str| {
-            if word.is_empty() { Origin(u32::try_from(number).unwrap_or(0)) } else { Origin::NONE }
-        };
-        let Lowered { chart: written, functions, transitions, values, problems } =
-            lower::lower(&list, &host.native, &mut places)?;
-        if !problems.is_empty() {
-            let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
-            return Err(Refused::Findings(findings.collect()));
-        }
-        let (chart, findings) = compile(&written);
-        let Some(chart) = chart else {
-            return Err(Refused::Findings(findings.into_iter().filter(|f| f.severity == Severity::Error).collect()));
-        };
-        let (nodes, node_of) = nodes(&chart, fsm)?;
-        let mut by_number: FxHashMap<u32, Table> = FxHashMap::default();
-        let mut next = transitions.into_iter();
-        for number in 1..=list.raw_len() {
-            let row: Table = list.raw_get(number)?;
-            if row.raw_get::<LuaString>("what")? == "transition" {
-                by_number.extend(next.next().map(|table| (u32::try_from(number).unwrap_or(0), table)));
-            }
-        }
-        let mut edges = vec![Value::Nil; chart.edge_count()];
-        for node in chart.nodes() {
-            for edge in chart.outgoing(node) {
-                if let Some(table) = by_number.get(&chart.edge_origin(edge).0) {
-                    edges[edge.index()] = Value::Table(table.clone());
-                }
-            }
-        }
-        let mut known: FxHashMap<Box<[u8]>, EventId> = FxHashMap::default();
-        let (mut listed, odd) = (Vec::new(), lua.create_table()?);
-        let mut done = vec![Value::Nil; chart.len()];
-        for node in chart.nodes().filter(|node| chart.kind(*node) == Kind::Leaf) {
-            let text = format!("e_done@{}", chart.fqn(node));
-            known.insert(text.as_bytes().into(), chart.completion(node));
-            done[node.index()] = Value::String(lua.create_string(text)?);
-        }
-        known.insert((*b"e_init_fsm").into(), chart.init_event());
-        for (number, name) in chart.events().iter().enumerate() {
-            let value = values.iter().find(|(_, n)| n == name).map(|(value, _)| value.clone());
-            if value.is_none() {
-                known.insert(name.as_str().as_bytes().into(), chart.event(*name));
-            }
-            match &value {
-                Some(Value::String(text)) => {
-                    known.insert(text.as_bytes().as_ref().into(), chart.event(*name));
-                }
-                Some(odd_one) => odd.raw_set(odd_one.clone(), number + 1)?,
-                None => {}
-            }
-            listed.push(value.map_or_else(|| lua.create_string(name.as_str()).map(Value::String), Ok)?);
-        }
+        let (tables, written) = Tables::new(lua, host, fsm)?;
         let given = |key: &str| -> Result<bool> { Ok(matches!(fsm.raw_get(key)?, Value::Function(_))) };
         let polls = given("_polls")?;
         let word = |text: &str| lua.create_string(text);
-        let machine = Machine::new(&chart);
+        let machine = Machine::new(&tables.chart);
         Ok(Self {
             budget: host.budget.clone(),
             voice: host.voice.clone(),
             written,
             fsm: fsm.clone(),
-            nodes,
-            edges,
-            functions,
-            node_of,
-            listed,
-            done,
-            init: Value::String(word("e_init_fsm")?),
-            known,
-            odd,
             strange: RefCell::default(),
             strange_next: Cell::new(0),
             status: RefCell::new(Status { room: limits::CHART_QUEUE, ..Status::default() }),
@@ -197,8 +121,22 @@ impl Bound {
             machine: RefCell::new(Some(machine)),
             polls,
             idle_hook: given("idle_hook")?,
-            chart: Rc::new(chart),
+            tables: RefCell::new(Rc::new(tables)),
+            has_grown: Cell::new(false),
         })
+    }
+
+    /// The tables as they are now.
+    pub fn tables(&self) -> Rc<Tables> {
+        self.tables.borrow().clone()
+    }
+
+    /// An event as it is known now: what was strange, or a completion that no transition listed, may be listed since.
+    pub fn known_now(&self, event: EventId) -> EventId {
+        match self.value(event) {
+            Value::Nil => event,
+            value => self.event(value),
+        }
     }
 
     /// Looks whether there is a `dbg` printer that wants to hear of what happens; it may come and go between steps.
@@ -209,35 +147,16 @@ impl Bound {
 
     /// What an event is in Lua.
     pub fn value(&self, event: EventId) -> Value {
-        if let Some(number) = event.listed() {
-            return self.listed.get(number).cloned().unwrap_or(Value::Nil);
-        }
         if let Some(number) = event.as_strange() {
             return self.strange.borrow().get(number as usize).cloned().unwrap_or(Value::Nil);
         }
-        if let Some(leaf) = event.as_completion() {
-            return self.done.get(leaf.index()).cloned().unwrap_or(Value::Nil);
-        }
-        if event == EventId::OTHER { Value::Nil } else { self.init.clone() }
+        self.tables.borrow().value(event).unwrap_or(Value::Nil)
     }
 
     /// The event that a Lua value is.
     pub fn event(&self, value: Value) -> EventId {
-        match &value {
-            Value::String(text) => {
-                if let Some(event) = self.known.get(&*text.as_bytes()) {
-                    return *event;
-                }
-            }
-            // A number that is none equals nothing, not even itself.
-            Value::Number(v) if v.is_nan() => {}
-            other => {
-                if let Ok(Some(number)) = self.odd.raw_get::<Option<usize>>(other.clone())
-                    && let Some(event) = self.chart.events().get(number - 1)
-                {
-                    return self.chart.event(*event);
-                }
-            }
+        if let Some(event) = self.tables.borrow().event(&value) {
+            return event;
         }
         let mut strange = self.strange.borrow_mut();
         let number = self.strange_next.get();
@@ -319,7 +238,7 @@ impl Bound {
     }
 
     /// A transition's text as rFSM writes it.
-    pub fn transition_text(&self, edge: usize) -> String {
+    pub fn transition_text(&self, edge: EdgeId) -> String {
         let text = |tr: &Table| -> Result<String> {
             let end = |key| -> Result<String> {
                 Ok(match tr.raw_get::<Value>(key)? {
@@ -337,7 +256,7 @@ impl Bound {
             let events = if events.is_empty() { "{}".to_owned() } else { events.join(", ") };
             Ok(format!("T={{ src='{}', tgt='{}{pn}', events='{events}' }}", end("src")?, end("tgt")?))
         };
-        match &self.edges[edge] {
+        match self.tables.borrow().edge(edge) {
             Value::Table(tr) => text(tr).unwrap_or_default(),
             _ => String::new(),
         }
@@ -349,29 +268,10 @@ impl Bound {
         if !status.active.contains(&node) {
             return "inactive";
         }
-        let settled = self.chart.kind(node) == Kind::Leaf
+        let chart = &self.tables.borrow().chart;
+        let settled = chart.kind(node) == Kind::Leaf
             && status.leaf == Some(node)
-            && (self.chart.doo(node).is_none() || status.through);
+            && (chart.doo(node).is_none() || status.through);
         if settled { "done" } else { "active" }
     }
-}
-
-/// The Lua tables of all nodes of a chart.
-fn nodes(chart: &Chart, fsm: &Table) -> Result<(Vec<Value>, FxHashMap<usize, NodeId>)> {
-    let mut values = vec![Value::Nil; chart.len()];
-    let mut node_of = FxHashMap::default();
-    for node in chart.nodes() {
-        let value = match chart.parent(node) {
-            None => Value::Table(fsm.clone()),
-            Some(parent) => match &values[parent.index()] {
-                Value::Table(parent) => parent.raw_get(chart.name(node).as_str())?,
-                _ => Value::Nil,
-            },
-        };
-        if let Value::Table(table) = &value {
-            node_of.insert(table.to_pointer() as usize, node);
-        }
-        values[node.index()] = value;
-    }
-    Ok((values, node_of))
 }

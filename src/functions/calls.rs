@@ -10,6 +10,7 @@ use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printe
 use mlua::thread::ThreadStatus;
 use mlua::{Lua, LuaString, Result, Table, Value};
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Calls the functions of one machine.
 pub struct Calls {
@@ -21,7 +22,7 @@ pub struct Calls {
 
 impl std::fmt::Debug for Calls {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Functions").field("count", &self.bound.functions.len()).finish()
+        f.debug_struct("Functions").field("count", &self.bound.tables().functions()).finish()
     }
 }
 
@@ -55,14 +56,28 @@ impl Calls {
         }
     }
 
+    /// Tells the model's `err` a text.
+    fn tell_err(&self, text: &str) {
+        let told = self
+            .bound
+            .fsm
+            .raw_get::<mlua::Function>("err")
+            .and_then(|err| self.bound.budget.spend(limits::CALL_INSTRUCTIONS, || err.call::<()>(text)));
+        if told.is_err() {
+            self.bound.voice.say(Printer::Err, text);
+        }
+    }
+
     fn guarded(&self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> Result<Value> {
         let bound = &self.bound;
         let events = bound.events(&self.lua, view)?;
-        bound.calling(view, || bound.functions[function.0 as usize].call((&bound.edges[edge.index()], events)))
+        let tables = bound.tables();
+        bound.calling(view, || tables.function(function).call((tables.edge(edge), events)))
     }
 
     fn resumed(&self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Result<Doo> {
         let bound = &self.bound;
+        let tables = bound.tables();
         if bound.traces.get() && bound.thread.borrow().is_none() {
             tracing::tell_doo(&self.lua, bound, "begins:", state, view);
         }
@@ -71,7 +86,7 @@ impl Calls {
             match &*kept {
                 Some(thread) => thread.clone(),
                 None => {
-                    let thread = self.lua.create_thread(bound.functions[function.0 as usize].clone())?;
+                    let thread = self.lua.create_thread(tables.function(function).clone())?;
                     *kept = Some(thread.clone());
                     thread
                 }
@@ -79,7 +94,7 @@ impl Calls {
         };
         let value: Value = bound.calling(view, || {
             // By Lua's own resume: mlua's clears the stack of a thread that failed, and so closes its variables uncounted.
-            bound.go_on.call((&thread, &bound.fsm, &bound.nodes[state.index()], &bound.words.doo))
+            bound.go_on.call((&thread, &bound.fsm, tables.node(state), &bound.words.doo))
         })?;
         Ok(if thread.status() == ThreadStatus::Resumable {
             Doo::Yielded { idle: !matches!(value, Value::Nil | Value::Boolean(false)) }
@@ -114,11 +129,12 @@ impl Hook for Calls {
 
     fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
         let bound = &self.bound;
-        let seconds = bound.calling(view, || bound.functions[function.0 as usize].call::<f64>(()));
+        let tables = bound.tables();
+        let seconds = bound.calling(view, || tables.function(function).call::<f64>(()));
         match seconds {
             Ok(seconds) => Some(seconds),
             Err(error) => {
-                let text = format!("time of state '{}' failed: ", bound.chart.fqn(state));
+                let text = format!("time of state '{}' failed: ", view.chart.fqn(state));
                 bound.complain("TIMEEVENT", &text, &error);
                 None
             }
@@ -169,16 +185,7 @@ impl Hook for Calls {
     }
 
     fn not_entered(&mut self, _: &Chart) {
-        let error = mlua::Error::runtime("no valid path from root.initial");
-        let text = "ERROR: failed to enter fsm root root, no valid path from root.initial";
-        let told = self
-            .bound
-            .fsm
-            .raw_get::<mlua::Function>("err")
-            .and_then(|err| self.bound.budget.spend(limits::CALL_INSTRUCTIONS, || err.call::<()>(text)));
-        if told.is_err() {
-            self.bound.complain("ENTER", "failed to enter fsm root root: ", &error);
-        }
+        self.tell_err("ERROR: failed to enter fsm root root, no valid path from root.initial");
     }
 
     fn poll(&mut self, queue: &mut Queue) {
@@ -215,7 +222,7 @@ impl Hook for Calls {
         match self.guarded(function, edge, view) {
             Ok(value) => value != Value::Boolean(false),
             Err(error) => {
-                let text = format!("error executing guard of {}: ", self.bound.transition_text(edge.index()));
+                let text = format!("error executing guard of {}: ", self.bound.transition_text(edge));
                 self.bound.complain("GUARD", &text, &error);
                 false
             }
@@ -225,7 +232,8 @@ impl Hook for Calls {
     fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
         let bound = &self.bound;
         let value = bound.value(event);
-        let outcome: Result<Value> = bound.calling(view, || bound.functions[function.0 as usize].call(value));
+        let tables = bound.tables();
+        let outcome: Result<Value> = bound.calling(view, || tables.function(function).call(value));
         match outcome {
             Ok(value) => !matches!(value, Value::Nil | Value::Boolean(false)),
             Err(error) => {
@@ -237,25 +245,26 @@ impl Hook for Calls {
 
     fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
         let bound = &self.bound;
-        let function = &bound.functions[function.0 as usize];
+        let tables = bound.tables();
+        let function = tables.function(function);
         let outcome = match place {
-            Place::Entry(state) => bound
-                .calling(view, || function.call::<()>((&bound.fsm, &bound.nodes[state.index()], &bound.words.entry))),
-            Place::Exit(state) => bound
-                .calling(view, || function.call::<()>((&bound.fsm, &bound.nodes[state.index()], &bound.words.exit))),
+            Place::Entry(state) => {
+                bound.calling(view, || function.call::<()>((&bound.fsm, tables.node(state), &bound.words.entry)))
+            }
+            Place::Exit(state) => {
+                bound.calling(view, || function.call::<()>((&bound.fsm, tables.node(state), &bound.words.exit)))
+            }
             Place::Effect(edge) => bound.events(&self.lua, view).and_then(|events| {
                 let words = &bound.words;
-                bound.calling(view, || {
-                    function.call::<()>((&bound.fsm, &bound.edges[edge.index()], &words.effect, events))
-                })
+                bound.calling(view, || function.call::<()>((&bound.fsm, tables.edge(edge), &words.effect, events)))
             }),
         };
         if let Err(error) = outcome {
             let (tag, text) = match place {
-                Place::Entry(state) => ("ENTRY", format!("error executing entry of {}: ", bound.chart.fqn(state))),
-                Place::Exit(state) => ("EXIT", format!("error executing exit of {}: ", bound.chart.fqn(state))),
+                Place::Entry(state) => ("ENTRY", format!("error executing entry of {}: ", tables.chart.fqn(state))),
+                Place::Exit(state) => ("EXIT", format!("error executing exit of {}: ", tables.chart.fqn(state))),
                 Place::Effect(edge) => {
-                    ("EFFECT", format!("error executing effect of {}: ", bound.transition_text(edge.index())))
+                    ("EFFECT", format!("error executing effect of {}: ", bound.transition_text(edge)))
                 }
             };
             bound.complain(tag, &text, &error);
@@ -280,7 +289,7 @@ impl Hook for Calls {
             Err(error) => {
                 self.bound.status.borrow_mut().through = true;
                 *self.bound.thread.borrow_mut() = None;
-                let text = format!("doo program of state '{}' failed: ", self.bound.chart.fqn(state));
+                let text = format!("doo program of state '{}' failed: ", view.chart.fqn(state));
                 self.bound.complain("DOO", &text, &error);
                 Doo::Failed
             }
@@ -303,6 +312,21 @@ impl Hook for Calls {
                 false
             }
         }
+    }
+
+    fn no_way(&mut self, chart: &Chart, from: NodeId) {
+        let kind = if chart.is_state(from) { "state" } else { "connector" };
+        self.tell_err(&format!("ERROR: node_find_path invalid starting node{}, type{kind}", chart.fqn(from)));
+    }
+
+    fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
+        let bound = &self.bound;
+        if !bound.has_grown.take() {
+            return None;
+        }
+        queue.exchange(|event| bound.known_now(event));
+        // A machine that Lua steps is given the chart anew each time.
+        bound.driven.get().then(|| Arc::new(bound.tables().chart.clone().placed_as(chart)))
     }
 
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {

@@ -83,6 +83,7 @@ const RFSM_KEY: &str = "davit.rfsm";
 
 /// The parts that are written in Lua.
 const RFSM: &str = include_str!("lua/rfsm.lua");
+const MERGE: &str = include_str!("lua/merge.lua");
 const PLUGINS: &str = include_str!("lua/plugins.lua");
 const BASE: &str = include_str!("lua/base.lua");
 
@@ -117,6 +118,7 @@ pub fn state(open: Openings, reader: Reader) -> Result<(Lua, Rc<Host>)> {
     host.budget.spend(limits::LUA_INSTRUCTIONS, || {
         let rfsm: Table = lua.load(RFSM).set_name("=rfsm").into_function()?.call((&host.native, &spot_of))?;
         lua.set_named_registry_value(RFSM_KEY, &rfsm)?;
+        lua.load(MERGE).set_name("=rfsm").into_function()?.call::<()>((&host.native, &rfsm))?;
         let plugins: Table = lua.load(PLUGINS).set_name("=rfsm").into_function()?.call((&host.native, &rfsm))?;
         lua.load(BASE).set_name("=rfsm").into_function()?.call::<()>((&host.native, &rfsm, &plugins))
     })?;

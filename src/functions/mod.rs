@@ -14,9 +14,11 @@ mod calls;
 mod exact;
 mod host;
 mod lower;
+mod merge;
 mod native;
 mod open;
 mod patterns;
+mod tables;
 mod tracing;
 mod values;
 #[cfg(target_os = "linux")]

@@ -4,10 +4,11 @@ use super::bound::{Bound, Refused};
 use super::calls::{Calls, address};
 use super::host::{Host, run};
 use super::lower::Spot;
+use super::merge::merge;
 use super::patterns;
 use super::values::to_json;
 use crate::limits;
-use crate::statechart::{Hook, Machine, NodeId, Printer, Step};
+use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, Step};
 use crate::time::Time;
 use mlua::{Function, Lua, LuaString, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
@@ -80,6 +81,7 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     })?;
     looking(lua, host)?;
     asking(lua, host)?;
+    growing(lua, host)?;
     stepping(lua, host)
 }
 
@@ -176,7 +178,7 @@ fn state_of(host: &Host, state: &Table) -> Result<(Rc<Bound>, NodeId)> {
         }
     }
     let bound = machine_of(host, &root)?;
-    let node = bound.node_of.get(&address(state)).copied();
+    let node = bound.tables().node_of(state);
     node.map(|node| (bound, node)).ok_or_else(|| mlua::Error::runtime("this is no state of its machine"))
 }
 
@@ -185,7 +187,7 @@ fn asking(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let bound = machine_of(host, &fsm)?;
         let leaf = bound.status.borrow().leaf;
         Ok(match leaf {
-            Some(leaf) => Value::String(lua.create_string(bound.chart.fqn(leaf).to_string())?),
+            Some(leaf) => Value::String(lua.create_string(bound.tables().chart.fqn(leaf).to_string())?),
             None => Value::Boolean(false),
         })
     })?;
@@ -197,12 +199,14 @@ fn asking(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     shared(lua, host, "active", |_, host, fsm: Table| {
         let bound = machine_of(host, &fsm)?;
         let active = bound.status.borrow().active.clone();
-        Ok(active.into_iter().map(|node| bound.chart.fqn(node).to_string()).collect::<Vec<_>>())
+        let chart = &bound.tables().chart;
+        Ok(active.into_iter().map(|node| chart.fqn(node).to_string()).collect::<Vec<_>>())
     })?;
     shared(lua, host, "active_states", |_, host, fsm: Table| {
         let bound = machine_of(host, &fsm)?;
         let active = bound.status.borrow().active.clone();
-        Ok(active.into_iter().map(|node| bound.nodes[node.index()].clone()).collect::<Vec<_>>())
+        let tables = bound.tables();
+        Ok(active.into_iter().map(|node| tables.node(node).clone()).collect::<Vec<_>>())
     })?;
     shared(lua, host, "mode", |_, host, state: Table| {
         let (bound, node) = state_of(host, &state)?;
@@ -210,9 +214,54 @@ fn asking(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     })?;
     shared(lua, host, "active_child", |_, host, state: Table| {
         let (bound, node) = state_of(host, &state)?;
-        let status = bound.status.borrow();
-        let child = status.active.iter().find(|n| **n != node && bound.chart.parent(**n) == Some(node));
-        Ok(child.map_or(Value::Boolean(false), |child| bound.nodes[child.index()].clone()))
+        let (status, tables) = (bound.status.borrow(), bound.tables());
+        let child = status.active.iter().find(|n| **n != node && tables.chart.parent(**n) == Some(node));
+        Ok(child.map_or(Value::Boolean(false), |child| tables.node(*child).clone()))
+    })
+}
+
+/// What a model looks for among the transitions, and adds to them (`rfsm.md` §8).
+fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
+    shared(lua, host, "outgoing", |_, host, node: Table| {
+        let (bound, id) = state_of(host, &node)?;
+        let tables = bound.tables();
+        Ok(tables.chart.outgoing(id).map(|edge| tables.edge(edge).clone()).collect::<Vec<_>>())
+    })?;
+    // How a path goes on at a node. Asked of the chart: what became a parent only while the machine ran is a leaf still.
+    shared(lua, host, "ends", |_, host, node: Table| {
+        let (bound, id) = state_of(host, &node)?;
+        let kind = bound.tables().chart.kind(id);
+        Ok(match kind {
+            Kind::Leaf => "leaf",
+            Kind::Composite => "composite",
+            Kind::Connector => "connector",
+        })
+    })?;
+    // Nothing: any event does; else whether the transition lists this one.
+    shared(lua, host, "lists", |_, host, (fsm, transition, event): (Table, Table, Value)| {
+        let bound = machine_of(host, &fsm)?;
+        let tables = bound.tables();
+        let edge =
+            tables.edge_of(&transition).ok_or_else(|| mlua::Error::runtime("this is none of its transitions"))?;
+        let event = tables.event(&event);
+        Ok(tables.chart.triggers(edge).map(|listed| event.is_some_and(|event| listed.contains(&event))))
+    })?;
+    shared(lua, host, "merge", |lua, host, args: (Table, Table, Table, Option<String>)| {
+        let (fsm, parent, object, name) = args;
+        let bound = machine_of(host, &fsm)?;
+        let Some(parent) = bound.tables().node_of(&parent) else {
+            return Ok(Some("its parent is no state of this machine".to_owned()));
+        };
+        let refused = merge(lua, host, &bound, (parent, &object), name.as_deref())?;
+        if refused.is_none() {
+            let mut status = bound.status.borrow_mut();
+            status.outbox.iter_mut().for_each(|event| *event = bound.known_now(*event));
+            match bound.machine.borrow_mut().as_mut() {
+                Some(machine) => machine.exchange(|event| bound.known_now(event)),
+                None => bound.has_grown.set(true), // told after the step that is under way
+            }
+        }
+        Ok(refused)
     })
 }
 
@@ -247,7 +296,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     shared(lua, host, "reset", |_, host, fsm: Table| {
         let bound = own(host, &fsm, "reset")?;
         let mut machine = taken(&bound)?;
-        machine.reset(&bound.chart);
+        machine.reset(&bound.tables().chart);
         *bound.status.borrow_mut() = super::bound::Status { room: limits::CHART_QUEUE, ..Default::default() };
         *bound.thread.borrow_mut() = None;
         *bound.machine.borrow_mut() = Some(machine);
@@ -255,13 +304,15 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     })?;
     shared(lua, host, "exit_state", |lua, host, (fsm, state): (Table, Table)| {
         let bound = own(host, &fsm, "exit_state")?;
-        if state != fsm {
-            return Err(mlua::Error::runtime("rfsm.exit_state: only a whole machine can be left"));
-        }
+        let tables = bound.tables();
+        let Some(node) = tables.node_of(&state).filter(|node| tables.chart.is_state(*node)) else {
+            return Ok(()); // a connector, or nothing of this machine: there is nothing to leave
+        };
         let mut machine = taken(&bound)?;
-        machine.leave(&bound.chart, &mut Calls { lua: lua.clone(), bound: bound.clone(), _host: None });
-        bound.status.borrow_mut().leaf = None;
+        machine.leave(&tables.chart, node, &mut Calls { lua: lua.clone(), bound: bound.clone(), _host: None });
+        bound.status.borrow_mut().leaf = machine.leaf();
         *bound.machine.borrow_mut() = Some(machine);
+        flush(&bound);
         Ok(())
     })?;
     shared(lua, host, "step", |lua, host, (fsm, steps): (Table, f64)| {
@@ -307,7 +358,7 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
     let mut left = steps;
     for _ in 0..limits::CHART_RUN {
         let now = now(host)?;
-        let turn = machine.turn(&bound.chart, now, &mut calls);
+        let turn = machine.turn(&bound.tables().chart, now, &mut calls);
         bound.status.borrow_mut().leaf = machine.leaf();
         if let Some(error) = bound.failed.borrow_mut().take() {
             return Err(error);

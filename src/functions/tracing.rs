@@ -31,7 +31,7 @@ pub fn tell(lua: &Lua, bound: &Bound, what: Trace<'_>, view: &mut View<'_>) {
             ("TRANS_EXIT", vec!["up to".to_owned(), fqn(top), "lca:".to_owned(), fqn(lca)])
         }
         Trace::Left(state) => ("STATE_EXIT", vec![fqn(state)]),
-        Trace::Effect(edge) => ("EFFECT", vec![bound.transition_text(edge.index())]),
+        Trace::Effect(edge) => ("EFFECT", vec![bound.transition_text(edge)]),
         Trace::Entering(edge) => {
             let lca = chart.least_common_ancestor(edge);
             ("TRANS_ENTER", vec!["lca:".to_owned(), fqn(lca), "down to".to_owned(), fqn(chart.ends(edge).1)])

@@ -6,6 +6,7 @@ use super::trace::Trace;
 use super::{EdgeId, EventId};
 use crate::model::names::EventName;
 use crate::model::statechart::FunctionId;
+use std::sync::Arc;
 
 /// A name raised by an entry, an exit or an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -185,6 +186,18 @@ pub trait Hook {
         false
     }
 
+    /// A path ends at a composite state, which only transitions that were added to a running machine do: it is none.
+    fn no_way(&mut self, chart: &Chart, from: NodeId) {
+        let _ = (chart, from);
+    }
+
+    /// After a turn: the chart from now on, if the model has added to it. `chart` is the one of this turn, whose numbers
+    /// stay; events in `queue` that have got a number by it are exchanged.
+    fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
+        let _ = (chart, queue);
+        None
+    }
+
     /// A chain of connectors went round in a circle, held by no guard; no path was found there.
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
         let _ = (chart, connector);
@@ -319,6 +332,14 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
 
     fn go_on(&mut self) -> bool {
         self.functions.go_on()
+    }
+
+    fn no_way(&mut self, chart: &Chart, from: NodeId) {
+        self.functions.no_way(chart, from);
+    }
+
+    fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
+        self.functions.grown(chart, queue)
     }
 
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {

@@ -10,8 +10,9 @@ use super::timers::Armed;
 use super::trace::Trace;
 use crate::limits;
 use crate::time::Time;
+use std::sync::Arc;
 
-/// The state of one run of a chart. All of its methods must be given the chart it was made for.
+/// The state of one run of a chart. All of its methods must be given the chart it was made for (or one that grew from it).
 #[derive(Debug, Clone)]
 pub struct Machine {
     /// Active states from the root inwards; also while a transition is under way.
@@ -28,6 +29,8 @@ pub struct Machine {
     pub(super) timers: Vec<Armed>,
     pub(super) search: Search,
     chain: Vec<NodeId>,
+    /// The chart, once the model has added to the one that is given.
+    grown: Option<Arc<Chart>>,
 }
 
 impl Machine {
@@ -45,9 +48,20 @@ impl Machine {
             timers: chart.timers.iter().map(Armed::at_start).collect(),
             search: Search::new(chart),
             chain: Vec::with_capacity(depth),
+            grown: None,
         };
         machine.queue.push(chart.init);
         machine
+    }
+
+    /// The chart it runs: the one given, or what that has become by what the model added to it.
+    pub fn chart<'a>(&'a self, given: &'a Chart) -> &'a Chart {
+        self.grown.as_deref().unwrap_or(given)
+    }
+
+    /// The chart as it is now, when the model has added to it.
+    pub fn grown(&self) -> Option<&Arc<Chart>> {
+        self.grown.as_ref()
     }
 
     /// Begins anew: no exit action runs, and the next step enters the chart.
@@ -58,13 +72,15 @@ impl Machine {
         self.queue.push(chart.init);
     }
 
-    /// Leaves all active states, innermost first, with their exit actions; the chart is to be entered anew after
-    /// [`reset`](Self::reset).
-    pub fn leave(&mut self, chart: &Chart, hook: &mut impl Hook) {
-        while !self.path.is_empty() {
-            self.exit(chart, NodeId::ROOT, hook);
+    /// Leaves a state and all active ones inside it, innermost first, with their exit actions. What is around it stays
+    /// active, with no leaf; nothing happens if it is not active. Once the root was left, the next step enters the chart.
+    pub fn leave(&mut self, chart: &Chart, state: NodeId, hook: &mut impl Hook) {
+        if self.is_active(chart, state) {
+            while self.path.len() > chart.depth(state) {
+                self.exit(chart, NodeId::ROOT, hook);
+            }
+            self.leaf = None;
         }
-        self.leaf = None;
     }
 
     /// Queues an event; `false`: the queue is full, and the event is dropped and counted.
@@ -75,6 +91,11 @@ impl Machine {
     /// Forgets the events left for the next step.
     pub fn drop_queue(&mut self) {
         self.queue.events.clear();
+    }
+
+    /// Exchanges the events left for the next step.
+    pub fn exchange(&mut self, by: impl FnMut(EventId) -> EventId) {
+        self.queue.exchange(by);
     }
 
     /// The events left for the next step.
@@ -99,7 +120,7 @@ impl Machine {
 
     /// Whether a state is active.
     pub fn is_active(&self, chart: &Chart, state: NodeId) -> bool {
-        self.path.get(chart.depth(state)) == Some(&state)
+        self.path.get(self.chart(chart).depth(state)) == Some(&state)
     }
 
     /// How often a state was entered. While the state is active, this is the number of the present visit.
@@ -207,6 +228,29 @@ impl Machine {
 
     /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
     pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
+        if !H::TURNS {
+            return self.turn_in(chart, now, hook);
+        }
+        let own = self.grown.clone();
+        let chart = own.as_deref().unwrap_or(chart);
+        self.fit(chart);
+        let step = self.turn_in(chart, now, hook);
+        if let Some(grown) = hook.grown(chart, &mut self.queue) {
+            self.fit(&grown);
+            self.grown = Some(grown);
+        }
+        step
+    }
+
+    /// Makes room for the nodes of a chart that has grown.
+    fn fit(&mut self, chart: &Chart) {
+        if self.visits.len() < chart.nodes.len() {
+            self.visits.resize(chart.nodes.len(), 0);
+            self.search.fit(chart);
+        }
+    }
+
+    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
         hook.poll(&mut self.queue);
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);

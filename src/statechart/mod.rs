@@ -12,6 +12,7 @@
 mod chart;
 mod checks;
 mod compile;
+mod grow;
 mod hook;
 mod machine;
 mod order;
@@ -26,6 +27,7 @@ mod trace;
 
 pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
 pub use compile::compile;
+pub use grow::{Addition, NotGrown};
 pub use hook::{Doo, Hook, Nobody, Place, Printer, Raised, Said, View, Watched};
 pub use machine::Machine;
 pub use outcome::{Ended, Mode, Step, Stepped};

@@ -26,6 +26,11 @@ impl Queue {
         room
     }
 
+    /// Exchanges every event for what `by` makes of it.
+    pub fn exchange(&mut self, mut by: impl FnMut(EventId) -> EventId) {
+        self.events.iter_mut().for_each(|event| *event = by(*event));
+    }
+
     /// How many more it takes.
     pub fn room(&self) -> usize {
         limits::CHART_QUEUE.saturating_sub(self.events.len())

@@ -55,7 +55,7 @@ pub(super) enum Straight {
     None,
     /// This one is taken: it leads to a leaf.
     Leaf(u32),
-    /// The first that is enabled leads to a connector: it must be searched.
+    /// The first that is enabled leads to no leaf: it must be searched.
     Unclear,
 }
 
@@ -70,7 +70,7 @@ impl Search {
                 match chart.nodes[row.tgt as usize].kind {
                     Kind::Leaf => return Straight::Leaf(edge),
                     Kind::Connector => return Straight::Unclear,
-                    Kind::Composite => (),
+                    Kind::Composite => return Straight::Unclear,
                 }
             }
         }
@@ -81,6 +81,11 @@ impl Search {
         let memo = if chart.unguarded { vec![(0, NONE); chart.nodes.len()] } else { Vec::new() };
         // One more for the segment that leaves a state: without guards its search stops at the first way.
         Self { ways: Vec::with_capacity(chart.connector_edges as usize + 1), memo, step: 0, work: 0 }
+    }
+
+    /// Makes room for the nodes of a chart that has grown.
+    pub fn fit(&mut self, chart: &Chart) {
+        self.memo.resize(if chart.unguarded { chart.nodes.len() } else { 0 }, (0, NONE));
     }
 
     /// Transitions looked at so far.
@@ -134,7 +139,10 @@ impl Search {
                     NONE => continue,
                     then => then,
                 },
-                Kind::Composite => continue,
+                Kind::Composite => {
+                    hook.no_way(chart, NodeId(node));
+                    continue;
+                }
             };
             let way = u32::try_from(self.ways.len()).expect("fewer ways than ids");
             self.ways.push(Way { edge, then, other: NONE });

@@ -65,9 +65,9 @@ impl<'c, F: Hook> Sim<'c, F> {
         Self { chart, machine: Machine::new(chart), now: Time::default(), functions }
     }
 
-    /// The chart.
-    pub fn chart(&self) -> &'c Chart {
-        self.chart
+    /// The chart, with what the model has added to it.
+    pub fn chart(&self) -> &Chart {
+        self.machine.chart(self.chart)
     }
 
     /// The machine.
@@ -110,7 +110,7 @@ impl<'c, F: Hook> Sim<'c, F> {
             _ => {
                 let names: Vec<EventName> = words.iter().map(|word| EventName::new(word)).collect::<Result<_, _>>()?;
                 let events: Vec<EventId> =
-                    names.into_iter().map(|name| self.functions.event(self.chart, name)).collect();
+                    names.into_iter().map(|name| self.functions.event(self.machine.chart(self.chart), name)).collect();
                 lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
                 let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
                 self.machine.step(self.chart, self.now, 1, &mut hook)
@@ -135,14 +135,14 @@ impl<'c, F: Hook> Sim<'c, F> {
             trace.notes.push(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
         }
         Observation {
-            active: self.machine.active().iter().map(|node| self.chart.fqn(*node).to_string()).collect(),
+            active: self.machine.active().iter().map(|node| self.chart().fqn(*node).to_string()).collect(),
             mode: self.machine.mode(),
             queue: self
                 .machine
                 .queue()
                 .events()
                 .iter()
-                .map(|event| self.functions.event_text(self.chart, *event))
+                .map(|event| self.functions.event_text(self.chart(), *event))
                 .collect(),
             actions: trace.actions,
             transition: stepped.transition,

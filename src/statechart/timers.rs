@@ -30,6 +30,7 @@ impl Machine {
         if chart.timers.is_empty() {
             return None;
         }
+        let chart = self.chart(chart);
         let due = |node: &NodeId| {
             let index = chart.nodes[node.index()].timer;
             let timer = chart.timers.get(index as usize)?;

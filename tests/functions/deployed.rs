@@ -60,7 +60,7 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 }
 
 /// Brings a deployment with this coordinator up, lets `seconds` pass, takes it down; answers what its functions said.
-fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
+pub fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", coordinator)];
     let folder = folder(&files);
     let libraries = davit::runtime::Libraries::new();

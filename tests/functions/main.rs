@@ -8,6 +8,7 @@ mod guide;
 mod lab;
 mod late;
 mod loading;
+mod merge;
 mod purity;
 mod rfsm;
 mod support;

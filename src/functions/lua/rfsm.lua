@@ -415,15 +415,6 @@ function rfsm.get_active_conf(fsm) return native.active(fsm) end
 function rfsm.get_sta_mode(state) return native.mode(state) end
 function rfsm.actchild_get(state) return native.active_child(state) end
 
-function rfsm.node_find_enabled()
-  error("rfsm.node_find_enabled: the search is the engine's and is not lent to models", 2)
-end
-
-function rfsm.fsm_merge(fsm)
-  fsm.err("ERROR: merge failed: ", "a machine that was compiled does not change: add to the template before rfsm.init")
-  return false
-end
-
 -- `f(object, scope, name)` for every object inside `fsm` that `pred` accepts; the results in a list.
 function rfsm.mapfsm(f, fsm, pred, depth)
   local results = {}
