@@ -39,11 +39,23 @@ pub fn run(text: &str) -> Vec<serde_json::Value> {
 
 /// The same, with files that it may load.
 pub fn run_with(files: &[(&str, &str)], text: &str) -> Vec<serde_json::Value> {
+    told_with(files, text).0
+}
+
+/// The same as [`run`]; answers what was printed: the printer and the text.
+pub fn told(text: &str) -> Vec<String> {
+    told_with(&[], text).1
+}
+
+fn told_with(files: &[(&str, &str)], text: &str) -> (Vec<serde_json::Value>, Vec<String>) {
     let files: BTreeMap<String, String> = files.iter().map(|(name, text)| ((*name).into(), (*text).into())).collect();
     let lab = Lab::new(files, Openings::default()).expect("a lab");
     lab.run("preamble", PREAMBLE).expect("the preamble runs");
     match lab.run("test", text) {
-        Ok(values) => values,
+        Ok(values) => {
+            let said = lab.said().into_iter().map(|said| format!("{:?} {}", said.by, said.text));
+            (values, said.collect())
+        }
         Err(failure) => panic!("{failure}\nprinted: {:?}", lab.said()),
     }
 }

@@ -2,7 +2,10 @@
 //! concerned, and the gaps of its own tests. What the engine does without functions is in `tests/statechart/confirmed`.
 
 mod api;
+mod checks;
 mod construction;
 mod enabled;
 mod executing;
+mod plugins;
+mod references;
 mod stepping;
