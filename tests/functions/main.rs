@@ -9,6 +9,7 @@ mod lab;
 mod late;
 mod loading;
 mod merge;
+mod named;
 mod purity;
 mod rfsm;
 mod support;

@@ -141,12 +141,14 @@ mod core {
     #[test]
     fn relative_and_local_refs() {
         run("local fsm = init(S { operational = S {
-                 motors_on = S { moving = S {}, T { src='initial', tgt='moving' } },
-                 T { src='initial', tgt='.motors_on' } }, off = S {},
-               T { src='initial', tgt='off' }, T { src='off', tgt='root.operational.motors_on.moving', events={'e'} },
-               T { src='.operational.motors_on', tgt='off', events={'f'} } })
-             rfsm.run(fsm) rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(leaf(fsm), 'root.operational.motors_on.moving')
-             rfsm.send_events(fsm, 'f') rfsm.run(fsm) eq(leaf(fsm), 'root.off')");
+                 motors_on = S { moving = S {}, stopped = S {}, T { src='initial', tgt='moving' }, T { src='moving', tgt='stopped', events={'stop'} } },
+                 motors_off = S {}, T { src='motors_on', tgt='motors_off', events={'off'} }, T { src='.motors_on.stopped', tgt='.motors_on.moving', events={'go'} } },
+               off = S {}, T { src='initial', tgt='.operational.motors_on.moving' },
+               T { src='.operational.motors_off', tgt='off', events={'end'} }, T { src='off', tgt='operational.motors_on', events={'begin'} } })
+             local function go(e) rfsm.send_events(fsm, e) rfsm.run(fsm) return leaf(fsm) end
+             rfsm.run(fsm) eq(leaf(fsm), 'root.operational.motors_on.moving', 'refined') eq(go 'stop', 'root.operational.motors_on.stopped')
+             eq(go 'go', 'root.operational.motors_on.moving') eq(go 'off', 'root.operational.motors_off') eq(go 'end', 'root.off')
+             eq(go 'begin', 'root.operational.motors_on.moving')");
     }
 }
 
@@ -204,24 +206,35 @@ mod composite {
         run(&format!("{NESTED} go 'on' go 'faster' go 'off' eq(go 'on', 'root.on.slow')"));
     }
 
-    /// The shapes of rFSM's shipped examples, composed of files.
+    /// Nine, as many as rFSM ships: of one file and of several, of old dialect and new, with all that a model can have.
     #[test]
     fn example_models_load() {
         let leaf = "return rfsm.simple_state { doo = function(fsm) rfsm.yield(true) end }";
         let sub = "return rfsm.composite_state { dbg = true, inner = rfsm.load('leaf.lua'),
             rfsm.transition { src='initial', tgt='inner' } }";
+        let old = "require 'rfsm_timeevent' rfsm_timeevent.set_gettime_hook(function() return 1, 0 end)
+            return rfsm.composite_state:new { on = rfsm.simple_state:new { entry = function() end }, off = rfsm.sista:new {},
+              rfsm.trans:new { src='initial', tgt='off' }, rfsm.trans:new { src='off', tgt='on', events={ 'e_after(1)' } } }";
         run_with(
-            &[("leaf.lua", leaf), ("sub.lua", sub)],
-            "local models = {
-               rfsm.load('leaf.lua') and rfsm.load('sub.lua'),
+            &[("leaf.lua", leaf), ("sub.lua", sub), ("old.lua", old)],
+            "local function leafed(parts) parts.a, parts[#parts + 1] = parts.a or S {}, T { src='initial', tgt='a' } return S(parts) end
+             local models = {
+               rfsm.load('sub.lua'),
                S { a = rfsm.load('sub.lua'), b = rfsm.load('sub.lua'), T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} } },
-               rfsm.csta { hit = rfsm.sista { entry = function() end }, rfsm.connector and T { src='initial', tgt='hit' } },
+               rfsm.csta { hit = rfsm.sista { entry = function() end }, rfsm.transition { src='initial', tgt='hit' } },
+               rfsm.load('old.lua'),
+               leafed { b = S {}, k = C {}, T { src='a', tgt='k', events={'x'} }, T { src='k', tgt='a', events={'y'} }, T { src='k', tgt='b', events={'z'} } },
+               leafed { T { src='a', tgt='a', events={'e'}, guard=function() return true end, effect=function() end, pn=3 } },
+               leafed { a = require('rfsm.ext').gen_monitor_state { montab = { e = function() return false end } } },
+               leafed { a = S { idle = S {}, rfsm.trans { src='initial', tgt='idle', events={} } }, idle_hook = false },
+               leafed { a = S { doo = function() for i = 1, 3 do rfsm.yield() end end }, b = S {}, T { src='a', tgt='b', events={'e_done'} } },
              }
              models[2].a.extra = S {}
              table.insert(models[2].a, T { src='inner', tgt='extra', events={'more'} })
-             for _, m in ipairs(models) do
+             eq(#models, 9)
+             for i, m in ipairs(models) do
                m.dbg = false
-               local fsm = init(m) assert(fsm) assert(rfsm.run(fsm)) assert(leaf(fsm))
+               local fsm = init(m) assert(fsm, i) rfsm.step(fsm, 5) assert(leaf(fsm), i)
              end
              local fsm = init(models[2]) rfsm.run(fsm) rfsm.send_events(fsm, 'more') rfsm.run(fsm)
              eq(leaf(fsm), 'root.a.extra')

@@ -85,7 +85,7 @@ end
 
 modules.await = function()
   local function names(text)
-    local inside = text:match("^%s*await%s*%((.*)%)%s*$")
+    local inside = text:match("await%s*%((.-)%)")
     if not inside then return nil end
     local list = {}
     for piece in inside:gsub("['\"]", ""):gmatch("[^,]+") do
@@ -96,20 +96,21 @@ modules.await = function()
   table.insert(rfsm.preproc, function(fsm)
     local specs = {}
     for _, tr in ipairs(fsm._transitions) do
-      local events, seen = {}, nil
+      local events, all, seen = {}, {}, nil
       for _, event in ipairs(tr.events or {}) do
         local awaited = type(event) == "string" and names(event)
         if awaited then
           seen = seen or {}
           for _, name in ipairs(awaited) do
+            if seen[name] == nil then all[#all + 1] = name end
             seen[name] = false
-            events[#events + 1] = name
           end
         else
           events[#events + 1] = event
         end
       end
       if seen then
+        table.move(all, 1, #all, #events + 1, events)
         tr.events = events
         local own = rawget(tr, "guard")
         tr.guard = function(t, e)
@@ -261,10 +262,8 @@ modules.ext = function()
         fsm.post_step_hook = function(machine, events)
           if own then own(machine, events) end
           if #events == 0 then return end
-          for _, name in ipairs(order) do
-            rfsm.send_events(subs[name], table.unpack(events))
-            rfsm.step(subs[name])
-          end
+          for _, name in ipairs(order) do rfsm.send_events(subs[name], table.unpack(events)) end
+          for _, name in ipairs(order) do rfsm.step(subs[name]) end
         end
       end,
       doo = function()
@@ -388,7 +387,7 @@ end
 modules.marsh = function()
   local marsh = {}
   local function model(node)
-    local out = { id = node._id, type = rfsm.is_conn(node) and "connection" or "state", transitions = {}, subnodes = {} }
+    local out = { id = node._id, type = node:type(), transitions = {}, subnodes = {} }
     for _, part in ipairs(native.parts(node)) do
       if part.kind == "transition" then
         local tr = part.value

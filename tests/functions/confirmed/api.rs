@@ -20,10 +20,35 @@ fn constructors_mark_and_return_their_argument() {
 }
 
 #[test]
-fn likely_targets_prepare_themselves() {
-    run("require 'rfsm.preview' local soon = false
-         local fsm = init(S { a = S {}, b = S { prepare = function() say 'prepared' end }, T { src='initial', tgt='a' },
-           T { src='a', tgt='b', events={'e'}, likely=function() return soon end } })
-         rfsm.run(fsm) lines = {} rfsm.step(fsm) eq(lines, {}) soon = true rfsm.step(fsm) eq(lines, {'prepared'})
-         eq(pcall(init, S { a = S { prepare = 1 }, T { src='initial', tgt='a' } }), false)");
+fn mapfsm_goes_from_the_outside_in_with_object_scope_and_name() {
+    run("local fsm = init(S { a = S { x = S {}, T { src='initial', tgt='x' } }, T { src='initial', tgt='a' } })
+         local seen = {} local function note(o, scope, name) seen[#seen + 1] = scope._fqn .. '/' .. tostring(name) return o end
+         local all = rfsm.mapfsm(note, fsm, rfsm.is_node) table.sort(seen)
+         eq(seen, { 'root.a/initial', 'root.a/x', 'root/a', 'root/initial' }) eq(#all, 4)
+         local at = {} rfsm.mapfsm(function(o) at[#at + 1] = o._id end, fsm, rfsm.is_state) eq(at, {'a', 'x'}, 'a state before what is in it')
+         seen = {} rfsm.mapfsm(note, fsm, rfsm.is_node, 1) table.sort(seen) eq(seen, { 'root/a', 'root/initial' }, 'one level')
+         eq(#rfsm.mapfsm(note, fsm, rfsm.is_trans), 2)");
+}
+
+#[test]
+fn step_hooks_stand_in_lists_and_the_runner_is_gone_with_the_last() {
+    run("local fsm = init(S { a = S {}, T { src='initial', tgt='a' } })
+         for _, which in ipairs { 'pre', 'post' } do
+           local function one() say(which, 1) end local function two() say(which, 2) end
+           local add, rm, list = rfsm[which .. '_step_hook_add'], rfsm[which .. '_step_hook_rm'], '_' .. which .. '_step_hooks'
+           eq(fsm[which .. '_step_hook'], nil) add(fsm, one) add(fsm, two, 'before') eq(#fsm[list], 2) assert(fsm[list][1] == two and fsm[list][2] == one)
+           local three = function() say(which, 3) end add(fsm, three, 'after')
+           lines = {} rfsm.send_events(fsm, 'x') rfsm.step(fsm) eq(lines[1] .. lines[2] .. lines[3], which .. 2 .. which .. 1 .. which .. 3)
+           eq(type(fsm[which .. '_step_hook']), 'function') eq(rm(fsm, two), true) eq(rm(fsm, two), false) rm(fsm, one) rm(fsm, three)
+           eq(fsm[which .. '_step_hook'], nil) lines = {} rfsm.step(fsm) eq(lines, {})
+         end");
+}
+
+#[test]
+fn every_state_has_the_fields_of_its_class() {
+    run("local s = S {} eq(s.type, S.type) eq(s.new, S.new) eq(s.rfsm, true) eq(rawget(s, 'type'), nil)
+         for _, name in ipairs { 'state', 'sista', 'simple_state', 'csta', 'composite_state' } do assert(rawequal(rfsm[name], rfsm.state), name) eq(rfsm[name]:new({}):type(), 'state') end
+         for _, name in ipairs { 'trans', 'transition' } do assert(rawequal(rfsm[name], rfsm.trans), name) eq(rfsm[name]{}:type(), 'transition') end
+         for _, name in ipairs { 'conn', 'connector', 'junc' } do assert(rawequal(rfsm[name], rfsm.conn), name) eq(rfsm[name]{}:type(), 'connector') end
+         assert(rfsm.is_leaf(rfsm.composite_state {}) and rfsm.is_composite(rfsm.simple_state { c = rfsm.conn {} }), 'what is in it decides, a connector is enough')");
 }

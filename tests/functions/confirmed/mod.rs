@@ -6,6 +6,8 @@ mod checks;
 mod construction;
 mod enabled;
 mod executing;
+mod ext;
 mod plugins;
 mod references;
 mod stepping;
+mod timeevent;

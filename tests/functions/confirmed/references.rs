@@ -53,5 +53,7 @@ fn a_reference_to_a_field_that_is_no_node_makes_no_machine() {
                T {{ src='initial', tgt='a' }}, T {{ src='a', tgt='{tgt}', events={{'e'}} }} }}), false) assert(#lines > 0)"
         ));
     }
-    run("eq(init(S { a = S {}, T { src='initial', tgt='a' }, T { src='.', tgt='a', events={'e'} } }), false, 'nor one of the root')");
+    run(
+        "eq(init(S { a = S {}, T { src='initial', tgt='a' }, T { src='.', tgt='a', events={'e'} } }), false, 'nor one of the root')",
+    );
 }

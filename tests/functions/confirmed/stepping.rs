@@ -82,3 +82,77 @@ fn only_the_last_of_two_time_events_of_a_state_comes() {
          local fsm = init(S { a = S {}, b = S {}, c = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={ te.e_after(1) } }, T { src='a', tgt='c', events={ te.e_after(3) } } })
          rfsm.run(fsm) now = 2e9 rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.a') now = 4e9 rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.c')");
 }
+
+#[test]
+fn a_step_takes_all_that_waits_and_keeps_nothing() {
+    run("local sets, outside = {}, {}
+         local fsm = init(S { getevents = function() local e = outside outside = {} return e end, a = S {}, b = S {}, c = S {}, T { src='initial', tgt='a' },
+           T { src='a', tgt='b', events={'e1'} }, T { src='b', tgt='c', events={'e2'} } })
+         rfsm.pre_step_hook_add(fsm, function(f, e) sets[#sets+1] = table.concat(e, ',') end)
+         rfsm.run(fsm) sets = {} outside = { 'e2', 'x', nil, 'y' } rfsm.send_events(fsm, 'own', 'e1') eq(rfsm.step(fsm), false)
+         eq(sets, {'own,e1,e2,x'}, 'the inside first; outside up to the first nil') eq(leaf(fsm), 'root.b', 'one transition')
+         rfsm.run(fsm) eq(leaf(fsm), 'root.b', 'e2 was not kept')");
+}
+
+/// What `check_events` found outside waits inside for the next step.
+#[test]
+fn a_second_look_outside_keeps_what_it_finds() {
+    run("local answers = { {}, { 'e' } }
+         local fsm = init(S { a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} },
+           getevents = function() return table.remove(answers, 1) or {} end })
+         answers = {} rfsm.run(fsm) answers = { {}, { 'e' } } eq(rfsm.step(fsm), false, 'not idle') eq(leaf(fsm), 'root.a')
+         rfsm.step(fsm) eq(leaf(fsm), 'root.b')");
+}
+
+#[test]
+fn an_unmatched_event_goes_on_into_the_doo() {
+    run("local n = 0
+         local fsm = init(S { a = S { doo = function() while true do n = n + 1 rfsm.yield(n == 2) end end }, T { src='initial', tgt='a' } })
+         rfsm.step(fsm) eq(n, 0) rfsm.send_events(fsm, 'other') eq(rfsm.step(fsm), false, 'busy') eq(n, 1)
+         rfsm.send_events(fsm, 'other') eq(rfsm.step(fsm), true, 'idle') eq(n, 2)");
+}
+
+#[test]
+fn hooks_are_called_in_every_turn_with_its_set() {
+    run("local fsm = init(S { a = S {}, T { src='initial', tgt='a' } })
+         rfsm.pre_step_hook_add(fsm, function(f, e) say('pre', f == fsm, ' ', table.concat(e, ',')) end)
+         rfsm.post_step_hook_add(fsm, function(f, e) say('post', f == fsm, ' ', table.concat(e, ',')) end)
+         lines = {} rfsm.run(fsm)
+         eq(lines, { 'pretrue e_init_fsm', 'posttrue e_init_fsm', 'pretrue e_done@root.a', 'posttrue e_done@root.a', 'pretrue ', 'posttrue ' })");
+}
+
+#[test]
+fn what_a_doo_yields_says_whether_it_rests() {
+    for (yields, idle) in [("true", true), ("'x'", true), ("0", true), ("", false), ("nil", false), ("false", false)] {
+        run(&format!(
+            "local fsm = init(S {{ a = S {{ doo = function() while true do rfsm.yield({yields}) end end }}, T {{ src='initial', tgt='a' }} }})
+             rfsm.step(fsm) eq(rfsm.step(fsm), {idle}) eq(rfsm.step(fsm, 3), {idle}) eq(rfsm.get_sta_mode(fsm.a), 'active')"
+        ));
+    }
+    // One that returns is through, whatever it returns, and its completion keeps the step from being idle.
+    run("local n = 0 local fsm = init(S { a = S { doo = function() n = n + 1 return true end }, T { src='initial', tgt='a' } })
+         rfsm.step(fsm) eq(rfsm.step(fsm), false) eq(rfsm.get_sta_mode(fsm.a), 'done') eq(rfsm.check_events(fsm), 1) eq(rfsm.run(fsm), true) eq(n, 1)");
+}
+
+#[test]
+fn modes_of_composites_know_no_done() {
+    run("local fsm = init(S { a = S { x = S {}, T { src='initial', tgt='x' } }, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} } })
+         local function modes() return { rfsm.get_sta_mode(fsm), rfsm.get_sta_mode(fsm.a), rfsm.get_sta_mode(fsm.a.x), rfsm.get_sta_mode(fsm.b) } end
+         eq(modes(), { 'inactive', 'inactive', 'inactive', 'inactive' }) rfsm.run(fsm) eq(modes(), { 'active', 'active', 'done', 'inactive' })
+         rfsm.send_events(fsm, 'e') rfsm.run(fsm) eq(modes(), { 'active', 'inactive', 'inactive', 'done' })
+         rfsm.reset(fsm) eq(modes(), { 'inactive', 'inactive', 'inactive', 'inactive' })");
+}
+
+#[test]
+fn a_reset_drops_the_activity_and_begins_it_cold() {
+    run("local begun = 0
+         local fsm = init(S { a = S { doo = function() begun = begun + 1 while true do rfsm.yield(true) end end }, T { src='initial', tgt='a' } })
+         rfsm.run(fsm) rfsm.run(fsm) eq(begun, 1) rfsm.reset(fsm) eq(rfsm.get_active_conf(fsm), {}) eq(leaf(fsm), false) rfsm.run(fsm) eq(begun, 2)");
+}
+
+#[test]
+fn completion_from_a_connector_never_comes() {
+    run("local fsm = init(S { a = S {}, b = S {}, k = C {}, T { src='initial', tgt='a' }, T { src='a', tgt='k', events={'e', 'e_done'} }, T { src='k', tgt='b', events={'e_done'} } })
+         rfsm.run(fsm) eq(leaf(fsm), 'root.a') rfsm.send_events(fsm, 'e', 'e_done') rfsm.run(fsm) eq(leaf(fsm), 'root.a')
+         rfsm.send_events(fsm, 'e', 'e_done@root.k') rfsm.run(fsm) eq(leaf(fsm), 'root.b', 'but may be sent')");
+}

@@ -77,3 +77,15 @@ fn a_dot_alone_is_the_scope_itself() {
 fn internal_transitions_are_rejected() {
     refused(vec![s("a", vec![]), t("initial", "a", ""), t("a", "internal", "e")], "chart::internal_transition");
 }
+
+/// Where a transition stands and where it starts are two things: rFSM does not ask for an `initial` of the own scope.
+#[test]
+fn a_transition_from_an_initial_connector_further_in_may_stand_outside() {
+    let chart = compiled(vec![
+        s("a", vec![c("initial"), s("x", vec![]), s("y", vec![])]),
+        t("initial", "a", ""),
+        t(".a.initial", ".a.y", ""),
+    ]);
+    let mut sim = Sim::new(&chart);
+    assert_eq!(leaf_after(&mut sim, ""), "root.a.y");
+}

@@ -129,3 +129,42 @@ fn the_event_of_the_first_entry_can_be_waited_for() {
     let mut sim = Sim::new(&chart);
     assert_eq!(leaf_after(&mut sim, ""), "root.a");
 }
+
+#[test]
+fn completion_from_a_connector_never_comes() {
+    let parts = || {
+        vec![
+            s("a", vec![]),
+            s("b", vec![]),
+            c("k"),
+            t("initial", "a", ""),
+            t("a", "k", "e e_done"),
+            t("k", "b", "e_done"),
+        ]
+    };
+    let chart = compiled(parts());
+    let mut sim = Sim::new(&chart);
+    assert_eq!(leaf_after(&mut sim, "run"), "root.a");
+    assert_eq!(leaf_after(&mut sim, "e e_done e_done@root.a"), "root.a");
+    assert_eq!(leaf_after(&mut sim, "e e_done@root.k"), "root.b", "but it may be sent");
+    doubted(parts(), "chart::never_done");
+}
+
+/// The whole queue is one set, in the order in which it was sent; the engine's own completion is a part of it.
+#[test]
+fn all_that_waits_is_one_set() {
+    let chart = compiled(vec![
+        s("a", vec![]),
+        s("b", vec![]),
+        c("k"),
+        t("initial", "a", ""),
+        t("a", "k", "e_done"),
+        t("k", "b", "e"),
+    ]);
+    let mut sim = Sim::new(&chart);
+    line(&mut sim, "");
+    assert_eq!(leaf_after(&mut sim, "e"), "root.b", "the completion of `a` waited inside");
+    let mut sim = Sim::new(&chart);
+    line(&mut sim, "run");
+    assert_eq!(leaf_after(&mut sim, "e"), "root.a", "and was gone after a step of its own");
+}
