@@ -270,7 +270,9 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
 fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
     let session = session(host)?;
     let known = session.events();
-    let event = EventName::new(name).ok().filter(|e| known.contains(e)).ok_or_else(|| {
+    // Functions see every event, also one that no transition lists.
+    let heard = |e: &EventName| known.contains(e) || session.sees_all_events();
+    let event = EventName::new(name).ok().filter(heard).ok_or_else(|| {
         let help = did_you_mean(name, "events", known.iter().map(EventName::as_str));
         error(format!("the coordinator knows no event `{name}`: {help}"))
     })?;

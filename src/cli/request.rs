@@ -38,6 +38,9 @@ impl Run for EventArgs {
         } else {
             context.out.line(format!("{} raised", self.event));
         }
+        if let Some(note) = answer["note"].as_str().filter(|_| !self.json) {
+            context.out.error(format!("note: {note}\n"));
+        }
         Ok(Exit::Done)
     }
 }

@@ -13,7 +13,7 @@ use ustr::Ustr;
 
 /// Why a text is not a name of the wanted kind.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not a {kind}: {reason}")]
+#[error("`{text}` is not {} {kind}: {reason}", self.article())]
 pub struct NameError {
     /// The refused text.
     pub text: String,
@@ -21,6 +21,13 @@ pub struct NameError {
     pub kind: &'static str,
     /// What is wrong with it.
     pub reason: &'static str,
+}
+
+impl NameError {
+    /// The article of the kind.
+    pub fn article(&self) -> &'static str {
+        if self.kind.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" }
+    }
 }
 
 fn is_plain(text: &str) -> bool {

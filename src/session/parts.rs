@@ -20,6 +20,8 @@ pub(super) struct Part {
     pub coordinator: Coordinator,
     pub up: Option<NodeId>,
     pub down: Option<NodeId>,
+    /// It has functions: they see every event, also one that no transition lists.
+    pub sees_all: bool,
     failed: Vec<(NodeId, String)>,
 }
 
@@ -47,6 +49,7 @@ impl Part {
                 scoped: scoped(&chart),
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
+            let sees_all = functions.is_some();
             let coordinator = match functions {
                 None => Coordinator::start(&thread, chart.clone(), clock, listener),
                 Some(opener) => {
@@ -65,6 +68,7 @@ impl Part {
                 name,
                 up: state(up),
                 down: state(down),
+                sees_all,
                 failed: failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
                 chart: chart.clone(),
                 coordinator,

@@ -104,18 +104,24 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
     let wait_for: Option<String> = optional(params, "wait_for")?;
     let within = within(params)?;
     let known = session.events();
-    let event = EventName::new(&name).ok().filter(|e| known.contains(e)).ok_or_else(|| {
-        refused(
-            format!("the coordinator knows no event `{name}`"),
-            did_you_mean(&name, "events", known.iter().map(EventName::as_str)),
-        )
-    })?;
+    let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
+    let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
+    let mut answer = json!({ "accepted": true });
+    if !known.contains(&event) {
+        if !session.sees_all_events() {
+            return Err(refused(format!("the coordinator knows no event `{name}`"), near()));
+        }
+        answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
+    }
     let since = session.hub().heard();
     session.raise(event, "operator");
-    let Some(wait_for) = wait_for else { return Ok(json!({ "accepted": true })) };
+    let Some(wait_for) = wait_for else { return Ok(answer) };
     let heard = |hub: &Hub| hub.heard_since(&wait_for, since);
     match session.hub().wait_outside(within, heard) {
-        Some(_) => Ok(json!({ "accepted": true, "heard": wait_for })),
+        Some(_) => {
+            answer["heard"] = json!(wait_for);
+            Ok(answer)
+        }
         None => Err(RpcError::new(TIMED_OUT, format!("`{wait_for}` was not heard in time"))),
     }
 }

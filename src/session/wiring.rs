@@ -129,6 +129,11 @@ impl Session {
         events
     }
 
+    /// Whether a coordinator has functions, which see every event, also one that no transition lists.
+    pub fn sees_all_events(&self) -> bool {
+        self.parts.iter().any(|part| part.sees_all)
+    }
+
     /// Gives an event to all coordinators, in the name of `from`.
     pub fn raise(&self, event: EventName, from: &str) {
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });

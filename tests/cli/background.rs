@@ -54,6 +54,46 @@ fn deployed_switched_undone_and_shut_down() {
 }
 
 #[test]
+fn an_event_that_no_transition_lists_reaches_functions_and_is_remarked_on() {
+    let demo = Deployed(Demo::new());
+    let run = |args: &[&str]| demo.0.run(args);
+    let coordinator = "
+return rfsm.state {
+  idle = rfsm.state {}, on = rfsm.state {}, seen = rfsm.state {},
+  rfsm.trans { src = 'initial', tgt = 'idle' },
+  rfsm.trans { src = 'idle', tgt = 'on', events = { 'e_start' } },
+  rfsm.trans { src = 'on', tgt = 'seen', events = { function(event) return event:match('^e_odd') end },
+               effect = 'seen' },
+  rfsm.trans { src = 'seen', tgt = 'idle', events = { 'e_stop' } },
+  rfsm.trans { src = 'on', tgt = 'idle', events = { 'e_stop' } },
+}
+";
+    let deployment = "
+davit: 1
+name: demo
+platform: simulated
+libraries: [standard]
+configurations: []
+emits: [seen]
+coordinator: c.lua
+trusted: true
+deploy: { event: e_start, up: on, within_s: 20 }
+shutdown: { event: e_stop, down: idle, within_s: 20 }
+";
+    demo.0.write("c.lua", coordinator);
+    demo.0.write("seen.yaml", deployment);
+    let up = run(&["deploy", "seen.yaml", "--detach"]);
+    assert_eq!(up.code, 0, "{}{}", up.out, up.err);
+    let event = run(&["event", "e_odd_one", "--wait", "seen"]);
+    assert_eq!(event.code, 0, "{}{}", event.out, event.err);
+    assert!(event.err.contains("no transition lists `e_odd_one`"), "{}", event.err);
+    assert_eq!(run(&["status", "--json"]).json()["coordinator"], serde_json::json!(["root", "root.seen"]));
+    let known = run(&["event", "e_stop", "--json"]).json();
+    assert_eq!(known, serde_json::json!({ "accepted": true }));
+    assert_eq!(run(&["shutdown"]).code, 0);
+}
+
+#[test]
 fn a_running_deployments_active_states_are_marked() {
     let demo = Deployed(Demo::new());
     let run = |args: &[&str]| demo.0.run(args);

@@ -36,7 +36,7 @@ fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
     let origin = cx.place(node);
     let shown: String = error.text.chars().take(60).collect();
     cx.report(
-        Finding::error(codes::TEXT_BAD_NAME, format!("`{shown}` is not a {}", error.kind))
+        Finding::error(codes::TEXT_BAD_NAME, format!("`{shown}` is not {} {}", error.article(), error.kind))
             .at(origin)
             .labelled(error.reason)
             .help(format!("write it like `{example}`")),
