@@ -218,6 +218,11 @@ impl<F: Hook> Core<F> {
         wants.then(|| now + limits::DOO_IDLE)
     }
 
+    /// Whether a turn left nothing to do.
+    fn is_idle(&self, step: Step) -> bool {
+        step == Step::Quiet { idle: true } && self.machine.queue().events().is_empty()
+    }
+
     /// Hands on what the step raised.
     fn tell(&mut self, listener: &mut (impl Listener + ?Sized)) {
         if !self.batch.is_empty() {
@@ -235,6 +240,7 @@ impl<F: Hook> Core<F> {
             let mut hook = Watched { watcher: &mut collect, functions: &mut self.functions };
             let step = self.machine.turn(&self.chart, now, &mut hook);
             first = first.or(Some(step));
+            let goes_on = F::TURNS && self.is_idle(step) && self.functions.go_on();
             if F::TURNS {
                 if let Some(grown) = self.machine.grown() {
                     listener.grown(grown);
@@ -254,7 +260,7 @@ impl<F: Hook> Core<F> {
             let rests = match step {
                 Step::Taken | Step::Entered => self.machine.rest::<Watched<'_, Collect<'_>, F>>(&self.chart),
                 // A time event that came due in an idle turn waits inside for the next one.
-                Step::Quiet { .. } if !self.machine.queue().events().is_empty() => false,
+                Step::Quiet { .. } if goes_on || !self.machine.queue().events().is_empty() => false,
                 Step::Quiet { idle } => {
                     if F::TURNS {
                         self.again = self.turn_after(idle, now);

@@ -27,33 +27,46 @@ impl std::fmt::Debug for Calls {
 }
 
 impl Calls {
-    /// Calls a step hook with the step's events; answers the events it appended.
-    fn step_hook(&self, field: &LuaString, view: &mut View<'_>, added: Option<&mut Vec<EventId>>) {
+    /// Calls a step hook with the table of the step's events. `false`: it raised an error that ends the step.
+    fn step_hook(&self, field: &LuaString, view: &mut View<'_>) -> bool {
         let bound = &self.bound;
-        let Ok(Value::Function(hook)) = bound.fsm.raw_get(field) else { return };
-        let before = view.events.len();
-        let outcome = bound.events(&self.lua, view).and_then(|events| {
-            bound.calling(view, || hook.call::<()>((&bound.fsm, &events)))?;
-            Ok(events)
-        });
-        match outcome {
-            Ok(events) => {
-                let Some(added) = added else { return };
-                let most = limits::CHART_QUEUE.saturating_sub(before);
-                for i in before + 1..=events.raw_len().min(before + most) {
-                    if let Ok(value) = events.raw_get::<Value>(i) {
-                        added.push(bound.event(value));
-                    }
-                }
-            }
-            // rFSM lets it end the step; who steps by himself is told, who is stepped reads of it.
-            Err(error) if bound.driven.get() => {
-                bound.complain("HOOK", &format!("error executing {}: ", field.to_string_lossy()), &error);
-            }
-            Err(error) => {
-                bound.failed.borrow_mut().get_or_insert(error);
-            }
+        let Ok(Value::Function(hook)) = bound.fsm.raw_get(field) else { return true };
+        let outcome = bound
+            .events(&self.lua, view)
+            .and_then(|events| bound.calling(view, || hook.call::<()>((&bound.fsm, &events))));
+        let Err(error) = outcome else { return true };
+        self.failed(error, "HOOK", &field.to_string_lossy());
+        bound.driven.get()
+    }
+
+    /// rFSM lets an error of a hook end the step: who steps his machines himself reads of it, of a machine that Davit steps
+    /// `err` is told.
+    fn failed(&self, error: mlua::Error, tag: &str, what: &str) {
+        let bound = &self.bound;
+        if bound.driven.get() {
+            bound.complain(tag, &format!("error executing {what}: "), &error);
+        } else {
+            bound.failed.borrow_mut().get_or_insert(error);
         }
+    }
+
+    /// What a hook left in the table of a step's events.
+    fn left_in_table(&self, was: &mut Vec<EventId>) {
+        let bound = &self.bound;
+        let Some(table) = bound.events.borrow().clone() else { return };
+        let mut count = 0;
+        while count < limits::CHART_QUEUE
+            && let Ok(value) = table.raw_get::<Value>(count + 1)
+            && !value.is_nil()
+        {
+            match was.get(count) {
+                Some(event) if bound.value(*event) == value => {}
+                Some(_) => was[count] = bound.event(value),
+                None => was.push(bound.event(value)),
+            }
+            count += 1;
+        }
+        was.truncate(count);
     }
 
     /// Tells the model's `err` a text.
@@ -106,7 +119,7 @@ impl Calls {
     fn polled(&self) -> Result<Vec<Value>> {
         let bound = &self.bound;
         let Value::Function(getevents) = bound.fsm.raw_get("getevents")? else { return Ok(Vec::new()) };
-        let events: Value = bound.budget.spend(limits::CALL_INSTRUCTIONS, || getevents.call(&bound.fsm))?;
+        let events: Value = bound.budget.spend(limits::CALL_INSTRUCTIONS, || getevents.call(()))?;
         let Value::Table(list) = events else { return Ok(Vec::new()) };
         list.sequence_values().collect()
     }
@@ -188,9 +201,13 @@ impl Hook for Calls {
         self.tell_err("ERROR: failed to enter fsm root root, no valid path from root.initial");
     }
 
-    fn poll(&mut self, queue: &mut Queue) {
+    fn poll(&mut self, queue: &mut Queue) -> bool {
+        // What was sent between two turns.
+        for event in self.bound.status.borrow_mut().outbox.drain(..) {
+            queue.push(event);
+        }
         if !self.bound.polls {
-            return;
+            return true;
         }
         match self.polled() {
             Ok(values) => {
@@ -201,19 +218,27 @@ impl Hook for Calls {
                         queue.push(self.bound.event(value));
                     }
                 }
+                true
             }
-            Err(error) => self.bound.complain("GETEVENTS", "error executing getevents: ", &error),
+            Err(error) => {
+                self.failed(error, "GETEVENTS", "getevents");
+                self.bound.driven.get()
+            }
         }
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
+    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
         *self.bound.events.borrow_mut() = None;
         self.bound.look_for_dbg();
-        self.step_hook(&self.bound.words.pre_step, view, Some(added));
+        let goes_on = self.step_hook(&self.bound.words.pre_step, view);
+        self.left_in_table(events);
+        goes_on
     }
 
     fn after_step(&mut self, view: &mut View<'_>) {
-        self.step_hook(&self.bound.words.post_step, view, None);
+        if self.bound.failed.borrow().is_none() {
+            self.step_hook(&self.bound.words.post_step, view);
+        }
         let mut status = self.bound.status.borrow_mut();
         status.leaf = view.leaf;
     }
@@ -298,17 +323,22 @@ impl Hook for Calls {
 
     fn go_on(&mut self) -> bool {
         let bound = &self.bound;
-        if !bound.idle_hook || bound.driven.get() {
+        if !bound.idle_hook {
             if bound.traces.get() {
                 tracing::tell_idle(&self.lua, bound);
             }
             return false;
         }
         let Ok(Value::Function(hook)) = bound.fsm.raw_get("idle_hook") else { return false };
+        {
+            let mut status = bound.status.borrow_mut();
+            (status.waiting, status.room) = (0, limits::CHART_QUEUE);
+        }
         match bound.budget.spend(limits::CALL_INSTRUCTIONS, || hook.call::<()>(&bound.fsm)) {
-            Ok(()) => true,
+            // Davit does not go on at once but when there is something to go on with; it asks again a little later.
+            Ok(()) => !bound.driven.get() || !bound.status.borrow().outbox.is_empty(),
             Err(error) => {
-                bound.failed.borrow_mut().get_or_insert(error);
+                self.failed(error, "HOOK", "idle_hook");
                 false
             }
         }

@@ -235,7 +235,19 @@ impl Lowering<'_, '_> {
                 }
             }
         }
+        // `init` writes out whose completion `e_done` is; the chart has it as it is written in a text.
+        let done = match table.raw_get::<Value>("src")? {
+            Value::Table(src) => src.raw_get::<Option<String>>("_fqn")?.map(|fqn| format!("e_done@{fqn}")),
+            _ => None,
+        };
         for value in one_or_more(table.raw_get("events")?)? {
+            let is_own_done =
+                matches!((&value, &done), (Value::String(text), Some(done)) if text.as_bytes() == done.as_bytes());
+            if is_own_done {
+                let place = (self.places)(spot, number, "e_done");
+                out.events.push((Trigger::parse("e_done").expect("an event"), place));
+                continue;
+            }
             let place = self.place(spot, number, &value);
             let trigger = self.trigger(value, place)?;
             out.events.extend(trigger.map(|trigger| (trigger, place)));

@@ -281,7 +281,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         if bound.polls
             && let Value::Function(getevents) = fsm.raw_get("getevents")?
         {
-            let events: Value = getevents.call(&fsm)?;
+            let events: Value = getevents.call(())?;
             if let Value::Table(list) = events {
                 let values: Result<Vec<Value>> = list.sequence_values().collect();
                 bound.send(values?);

@@ -37,6 +37,7 @@ pub fn tell(lua: &Lua, bound: &Bound, what: Trace<'_>, view: &mut View<'_>) {
             ("TRANS_ENTER", vec!["lca:".to_owned(), fqn(lca), "down to".to_owned(), fqn(chart.ends(edge).1)])
         }
         Trace::Entered(state) => ("STATE_ENTER", vec![fqn(state)]),
+        Trace::Due(event) => ("TIMEEVENT", vec!["is due:".to_owned(), text(bound, chart, event)]),
         Trace::Raised(event) => ("RAISED", vec![text(bound, chart, event)]),
     };
     let told = bound.calling(view, || call(lua, bound, tag, &words));

@@ -138,14 +138,17 @@ pub trait Hook {
         let _ = chart;
     }
 
-    /// Adds the events that wait outside (rFSM's `getevents`).
-    fn poll(&mut self, queue: &mut Queue) {
+    /// Adds the events that wait outside (rFSM's `getevents`). `false`: it failed, and the turn ends there.
+    fn poll(&mut self, queue: &mut Queue) -> bool {
         let _ = queue;
+        true
     }
 
-    /// Before a step, with its events; more may be added.
-    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
-        let _ = (view, added);
+    /// Before a step. `events` are those of the step; what the hook leaves in there the step uses. `false`: it failed, and
+    /// the turn ends there.
+    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
+        let _ = (view, events);
+        true
     }
 
     /// After a step.
@@ -298,12 +301,12 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.not_entered(chart);
     }
 
-    fn poll(&mut self, queue: &mut Queue) {
-        self.functions.poll(queue);
+    fn poll(&mut self, queue: &mut Queue) -> bool {
+        self.functions.poll(queue)
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, added: &mut Vec<EventId>) {
-        self.functions.before_step(view, added);
+    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
+        self.functions.before_step(view, events)
     }
 
     fn after_step(&mut self, view: &mut View<'_>) {

@@ -22,7 +22,8 @@ pub struct Machine {
     pub(super) mode: Mode,
     pub(super) queue: Queue,
     events: Vec<EventId>,
-    added: Vec<EventId>,
+    /// What a hook made of the events of a step.
+    changed: Vec<EventId>,
     /// By node: how often it was entered.
     pub(super) visits: Vec<u32>,
     /// By time event.
@@ -43,7 +44,7 @@ impl Machine {
             mode: Mode::Done,
             queue: Queue::new(),
             events: Vec::with_capacity(limits::CHART_QUEUE),
-            added: Vec::new(),
+            changed: Vec::new(),
             visits: vec![0; chart.nodes.len()],
             timers: chart.timers.iter().map(Armed::at_start).collect(),
             search: Search::new(chart),
@@ -251,14 +252,18 @@ impl Machine {
     }
 
     fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
-        hook.poll(&mut self.queue);
+        if !hook.poll(&mut self.queue) {
+            return Step::Unmatched;
+        }
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);
         if H::TURNS {
-            let mut added = std::mem::take(&mut self.added);
-            hook.before_step(&mut self.view(chart), &mut added);
-            self.events.append(&mut added);
-            self.added = added;
+            let mut changed = std::mem::take(&mut self.changed);
+            changed.clone_from(&self.events);
+            if !hook.before_step(&mut self.view(chart), &mut changed) {
+                return Step::Unmatched;
+            }
+            self.changed = std::mem::replace(&mut self.events, changed);
         }
 
         let step = if self.path.is_empty() {
@@ -363,8 +368,7 @@ impl Machine {
             }
         }
         if idle {
-            hook.poll(&mut self.queue);
-            idle = self.queue.events.is_empty();
+            idle = hook.poll(&mut self.queue) && self.queue.events.is_empty();
         }
         Step::Quiet { idle }
     }

@@ -69,6 +69,7 @@ impl Machine {
             let since = if timer.relative { armed.entered } else { Time::default() };
             if !armed.raised && now >= first_after(since, armed.nanos) {
                 armed.raised = true;
+                self.trace(chart, Trace::Due(timer.event), hook);
                 self.trace(chart, Trace::Raised(timer.event), hook);
                 self.queue.push(timer.event);
             }

@@ -29,6 +29,8 @@ pub enum Trace<'a> {
     Entering(EdgeId),
     /// A state was entered; its entry has run (`STATE_ENTER`).
     Entered(NodeId),
+    /// A time event is due (`TIMEEVENT`); that it is raised is told next.
+    Due(EventId),
     /// The engine itself raised an event: a completion, or a time event (`RAISED`).
     Raised(EventId),
 }

@@ -115,8 +115,11 @@ fn tags_can_be_chosen_and_a_dbg_that_fails_is_told() {
     let seen = told(&model("function(tag) if tag == 'EFFECT' then error('no', 0) end end"), &["run"]);
     assert_eq!(seen[0], ["error: DBG error executing dbg: no"]);
     // What it sends is an event like any other, and it may not step the machine.
-    let seen = told(&model("function(tag) if tag == 'EFFECT' then rfsm.run(fsm) end end"), &["run"]);
-    assert!(seen[0][0].starts_with("error: DBG"), "{seen:?}");
+    let steps = "local machine return rfsm.state { entry = function(fsm) machine = fsm end,
+        dbg = function(tag) if tag == 'EFFECT' then rfsm.run(machine) end end,
+        a = rfsm.state {}, rfsm.trans { src='initial', tgt='a' } }";
+    let seen = told(&Model::new(steps), &["run"]);
+    assert!(seen[0][0].starts_with("error: DBG") && seen[0][0].contains("stepped by Davit"), "{seen:?}");
 }
 
 #[test]

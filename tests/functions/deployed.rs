@@ -121,6 +121,22 @@ fn time_events_and_getevents_run_on_the_projects_clock() {
     assert!((2..=6).contains(&count("info: tick")) && count("info: later") >= 3, "{said:?}");
 }
 
+/// Called at every rest, and again ten milliseconds later; what it sends is taken at once, what goes wrong is told.
+#[test]
+fn an_idle_hook_is_called_whenever_there_is_nothing_to_do() {
+    let text = COORDINATOR
+        .replace("return rfsm.state {", "local n, told = 0 return rfsm.state { idle_hook = function(fsm) n = n + 1 if n == 50 then rfsm.send_events(fsm, 'e_tick') end if n == 60 then error('oh', 0) end end,")
+        .replace("doo = function", "not_doo = function")
+        .replace(
+            "rfsm.trans { src = 'fault'",
+            "rfsm.trans { src = 'operational', tgt = 'operational', events = { 'e_tick' }, effect = function() print('tick') end },
+             rfsm.trans { src = 'fault'",
+        );
+    let said = said_by(&text, 1);
+    let tick = said.iter().position(|s| s == "info: tick").unwrap_or_else(|| panic!("{said:?}"));
+    assert!(said[tick..].contains(&"err: HOOK error executing idle_hook: oh".to_owned()), "{said:?}");
+}
+
 #[test]
 fn a_deployment_with_functions_comes_up_and_goes_down() {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)];

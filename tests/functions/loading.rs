@@ -165,7 +165,9 @@ fn a_chart_that_asks_its_host_for_events_is_not_taken_for_a_pure_one() {
     assert_eq!(seen[1].active.last().unwrap(), "root.b", "{seen:?}");
     let idle =
         Model::new(&text("idle_hook = function(fsm) n = n + 1 if n == 1 then rfsm.send_events(fsm, 'e') end end"));
-    assert!(!idle.is_pure());
+    let mut sim = idle.sim();
+    let seen = sim.line("run").unwrap();
+    assert_eq!(seen.active.last().unwrap(), "root.b", "it is called when there is nothing to do: {seen:?}");
     // These printers only tell, and of what goes wrong in functions.
     let printers = "err = function() end, warn = function() end, info = function() end";
     assert!(Model::new(&text(printers)).is_pure());

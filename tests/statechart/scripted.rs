@@ -59,15 +59,17 @@ impl Hook for Scripted {
         self.log.push(raised.name.to_string());
     }
 
-    fn poll(&mut self, queue: &mut Queue) {
+    fn poll(&mut self, queue: &mut Queue) -> bool {
         self.polled += 1;
         for event in self.outside.pop_front().unwrap_or_default() {
             queue.push(event);
         }
+        true
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, _: &mut Vec<EventId>) {
+    fn before_step(&mut self, view: &mut View<'_>, _: &mut Vec<EventId>) -> bool {
         self.sets.push(view.events.iter().map(|e| view.chart.event_text(*e)).collect());
+        true
     }
 
     fn guard(&mut self, function: FunctionId, _: EdgeId, view: &mut View<'_>) -> bool {

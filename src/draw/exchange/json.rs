@@ -2,7 +2,7 @@
 
 use crate::model::Statechart;
 use crate::model::outline::Outline;
-use crate::model::statechart::{Action, INITIAL};
+use crate::model::statechart::{Action, INITIAL, Trigger};
 use serde_json::{Value, json};
 
 /// The JSON object, one line. `active` are the active states from the root to the leaf; empty: not known, or not entered.
@@ -42,7 +42,14 @@ fn node(outline: &Outline<'_>, at: usize) -> Value {
         .iter()
         .filter(|link| link.src == at)
         .map(|link| {
-            let events: Vec<String> = link.transition.events.iter().map(|(t, _)| t.to_string()).collect();
+            // By their whole names, as `init` writes them out.
+            let src = fqn(link.src);
+            let whole = |trigger: &Trigger| match trigger {
+                Trigger::Event(name) if name.as_str() == "e_done" => format!("e_done@{src}"),
+                Trigger::Timed(timed) => timed.event_of(&src),
+                other => other.to_string(),
+            };
+            let events: Vec<String> = link.transition.events.iter().map(|(t, _)| whole(t)).collect();
             let mut value = json!({
                 "type": "transition",
                 "src": fqn(link.src),
@@ -92,6 +99,9 @@ mod tests {
         assert_eq!(of("fork")["transitions"][0]["tgt"], "root.on.initial");
         assert_eq!(of("idle")["transitions"][0]["pn"], 2.0);
         assert_eq!(of("idle")["transitions"][0]["effect"], json!(["e_gone"]));
+        let low =
+            &of("on")["subnodes"].as_array().unwrap().iter().find(|n| n["id"] == "low").unwrap()["transitions"][0];
+        assert_eq!(low["events"], json!(["e_done@root.on.low", "e_after(1)@root.on.low"]));
         assert_eq!(of("on")["config"], json!(["power"]));
         assert_eq!(of("on")["subnodes"][0]["entry"], json!(["e_low"]));
         let unknown: Value = serde_json::from_str(&coordinator_json(&sample(), &[])).unwrap();

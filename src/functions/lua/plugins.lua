@@ -44,7 +44,9 @@ local function timed(since)
       error(since .. " takes a number of seconds or a function that answers one", 2)
     end
     if id == nil then id = type(x) == "number" and tostring(x) or "f" .. native.serial() end
-    return setmetatable({ since = since, x = x, id = tostring(id) }, Timed)
+    local seconds = x
+    if type(x) == "function" then seconds = function() return x(id) end end
+    return setmetatable({ since = since, x = seconds, id = tostring(id) }, Timed)
   end
 end
 
@@ -193,8 +195,8 @@ modules.preview = function()
     rfsm.post_step_hook_add(fsm, function(machine)
       for _, state in ipairs(active_states(machine)) do
         if state ~= machine then
-          for _, tr in ipairs(machine._transitions) do
-            if tr.src == state and tr.likely and tr.likely(machine) and rawget(tr.tgt, "prepare") then
+          for _, tr in ipairs(native.outgoing(state)) do
+            if tr.likely and tr.likely(machine) and rawget(tr.tgt, "prepare") then
               tr.tgt.prepare(machine)
             end
           end
@@ -378,9 +380,13 @@ local function need_initialized(fsm, what)
   if not rfsm.is_initialized_root(fsm) then error(what .. ": the machine must be initialized by rfsm.init", 3) end
 end
 
+-- The events of a transition by their whole names.
 local function events_of(tr)
   local list = {}
-  for i, event in ipairs(tr.events or {}) do list[i] = tostring(event) end
+  for i, event in ipairs(tr.events or {}) do
+    local text = tostring(event)
+    list[i] = text:match("^e_%a+%b()$") and text:match("^e_a[ft]") and text .. "@" .. tr.src._fqn or text
+  end
   return list
 end
 

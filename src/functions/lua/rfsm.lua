@@ -325,6 +325,11 @@ local function tables(template)
   for _, node in ipairs(nodes) do
     if not leaves[node] then fsm.warn("WARNING: no outgoing transitions from node '" .. node._fqn .. "'") end
   end
+  for _, tr in ipairs(transitions) do
+    local events = {}
+    for i, event in ipairs(tr.events or {}) do events[i] = event == "e_done" and "e_done@" .. tr.src._fqn or event end
+    if tr.events then tr.events = events end
+  end
   fsm._transitions, fsm._nodes = transitions, nodes
   for _, hook in ipairs(preprocess) do hook(fsm) end
   return fsm
@@ -391,7 +396,7 @@ function rfsm.step(fsm, n)
   return native.step(fsm, n or 1)
 end
 
-function rfsm.run(fsm) return native.step(fsm, math.huge) end
+function rfsm.run(fsm) return rfsm.step(fsm, math.huge) end
 
 function rfsm.send_events(fsm, ...)
   if not rfsm.is_initialized_root(fsm) then error("ERROR send_events: invalid fsm argument", 2) end

@@ -92,3 +92,13 @@ fn preview_prepares_from_the_outside_and_no_composite() {
            eq(pcall(init, bad), false)
          end");
 }
+
+/// In the order in which the engine tries them.
+#[test]
+fn preview_follows_the_priorities() {
+    run("require 'rfsm.preview'
+         local function p(name) return S { prepare = function() say(name) end } end local function yes() return true end
+         local fsm = init(S { a = S {}, b = p 'b', c = p 'c', d = p 'd', T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'}, likely=yes, pn=1 },
+           T { src='a', tgt='c', events={'e'}, likely=yes, pn=3 }, T { src='a', tgt='d', events={'e'}, likely=yes, pn=2 } })
+         lines = {} rfsm.step(fsm) eq(lines, { 'c', 'd', 'b' })");
+}

@@ -1,11 +1,70 @@
 //! `step`, `run`, `send_events`, `getevents`, hooks, and activities (rfsm.md §6, §7).
 
-use crate::lab::run;
+use crate::lab::{run, told};
 
 #[test]
 fn hooks_may_append_events_to_the_set() {
     run("local fsm = init(S { a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'extra'} } })
          rfsm.run(fsm) rfsm.pre_step_hook_add(fsm, function(f, e) e[#e+1] = 'extra' end) rfsm.step(fsm) eq(leaf(fsm), 'root.b')");
+}
+
+/// The table is the set itself: what a hook takes out or puts in its place is gone or there.
+#[test]
+fn hooks_may_change_the_set_in_any_way() {
+    run("local change
+         local fsm = init(S { a = S {}, b = S {}, c = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} }, T { src='a', tgt='c', events={'f'},
+           effect=function(f, tr, w, e) say(table.concat(e, ',')) end } })
+         rfsm.pre_step_hook_add(fsm, function(f, e) if change then change(e) end end)
+         rfsm.post_step_hook_add(fsm, function(f, e) if change then say('post ', table.concat(e, ',')) end end)
+         rfsm.run(fsm)
+         local function go(how, ...) change = how lines = {} rfsm.send_events(fsm, ...) rfsm.step(fsm) change = nil return leaf(fsm) end
+         eq(go(function(e) table.remove(e, 1) end, 'e'), 'root.a', 'taken out: nothing to do') eq(lines, {'post '})
+         eq(go(function(e) e[1] = 'x' end, 'e'), 'root.a') eq(lines[1], 'post x')
+         eq(go(function(e) table.insert(e, 1, 'f') e[3] = nil e[2] = 'y' end, 'e', 'z'), 'root.c') eq(lines, {'f,y', 'post f,y'})");
+}
+
+/// Nothing of the step is done.
+#[test]
+fn an_error_before_the_step_leaves_the_state_as_it_was() {
+    run("local fails = false
+         local fsm = init(S { getevents = function(...) eq(select('#', ...), 0) if fails == 'out' then error('outside', 0) end return {} end, a = S {}, b = S {},
+           T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} } })
+         rfsm.pre_step_hook_add(fsm, function() if fails == 'hook' then error('hook', 0) end end)
+         rfsm.post_step_hook_add(fsm, function() say 'post' end)
+         rfsm.run(fsm)
+         for _, which in ipairs { 'hook', 'out' } do
+           fails = which lines = {} rfsm.send_events(fsm, 'e') local ok, why = pcall(rfsm.step, fsm)
+           eq(ok, false) assert(tostring(why):find(which), tostring(why)) eq(leaf(fsm), 'root.a') eq(lines, {}, which)
+           eq(pcall(rfsm.check_events, fsm), which == 'hook') fails = false rfsm.reset(fsm) rfsm.run(fsm)
+         end");
+}
+
+#[test]
+fn stepping_what_is_no_machine_is_told() {
+    for call in ["rfsm.step(S {})", "rfsm.run(S {})", "rfsm.run(S { a = S {}, T { src='initial', tgt='a' } })"] {
+        let said = told(&format!("eq(pcall(function() {call} end), false)"));
+        assert_eq!(said, ["Err ERROR step: invalid fsm"], "{call}");
+    }
+}
+
+/// `init` writes out whose completion it is.
+#[test]
+fn a_literal_completion_is_that_of_the_source() {
+    run("local shared = { 'e_done', 'e' }
+         local fsm = init(S { a = S { x = S {}, T { src='initial', tgt='x' } }, b = S {}, k = C {}, T { src='initial', tgt='a' }, T { src='a', tgt='k', events=shared },
+           T { src='k', tgt='b', events='e_done' }, T { src='b', tgt='a', events={'e_done@root.a', 'f'}, guard=function(tr) say(tr.events[1]) end }, T { src='.a.x', tgt='b', events=shared } })
+         local seen = {} for i, tr in ipairs(fsm._transitions) do seen[i] = table.concat(tr.events or {}, ' ') end table.sort(seen)
+         eq(table.concat(seen, ', '), ', , e_done@root.a e, e_done@root.a f, e_done@root.a.x e, e_done@root.k')
+         eq(shared[1], 'e_done', 'the template is as it was') rfsm.run(fsm) eq(leaf(fsm), 'root.b')
+         eq(require('rfsm.marsh').model2tab(fsm).transitions[3].events, { 'e_done@root.k' })");
+}
+
+/// What it sends is there at once.
+#[test]
+fn an_idle_hook_may_send() {
+    run("local fsm fsm = init(S { idle_hook = function(f) eq(f, fsm) rfsm.send_events(f, 'e') if leaf(f) == 'root.b' then error('enough', 0) end end,
+           a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b', events={'e'} } })
+         eq(pcall(rfsm.run, fsm), false) eq(leaf(fsm), 'root.b')");
 }
 
 #[test]

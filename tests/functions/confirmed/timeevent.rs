@@ -95,3 +95,19 @@ fn e_at_counts_from_the_clocks_beginning() {
          eq(leaf(fsm), 'root.b', 'long past')"
     ));
 }
+
+#[test]
+fn a_function_that_says_the_time_is_given_the_id() {
+    run(&format!(
+        "{CLOCK} local fsm = made {{ te.e_after(function(...) say(select('#', ...), ...) return 2 end, 'warm') }} lines = {{}} rfsm.run(fsm)
+         eq(lines[1], '1warm') tick(2.5) rfsm.run(fsm) rfsm.run(fsm) eq(leaf(fsm), 'root.b')"
+    ));
+}
+
+#[test]
+fn dbg_is_told_of_a_time_event() {
+    run(&format!(
+        "{CLOCK} local fsm = made {{ te.e_after(2) }} rfsm.run(fsm) tick(3) fsm.dbg = function(tag, ...) say(tag, ' ', ...) end lines = {{}} rfsm.run(fsm)
+         assert(lines[1]:find('^TIMEEVENT .*e_after%(2%)@root.a$') and lines[2] == 'RAISED e_after(2)@root.a', table.concat(lines, '|'))"
+    ));
+}
