@@ -2,7 +2,7 @@
 
 use super::bank::Sample;
 use super::grade::Grade;
-use super::ring::Ring;
+use super::ring::{Ring, grain};
 use super::window::{Since, Window};
 use crate::model::monitor::Comparison;
 
@@ -57,6 +57,14 @@ impl Number {
     }
 }
 
+/// Samples of one moment, or of some that lie close together.
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    first: u64,
+    at: u64,
+    count: u64,
+}
+
 /// Counts samples in the time before now.
 #[derive(Debug, Clone)]
 pub struct Rate {
@@ -67,8 +75,8 @@ pub struct Rate {
     start: Option<u64>,
     /// Of the input, when last looked at.
     writes: u64,
-    /// Where, and how many; old to new.
-    counts: Ring<(u64, u64)>,
+    /// Old to new.
+    counts: Ring<Moment>,
     total: u64,
     most: usize,
     merged: u64,
@@ -106,42 +114,43 @@ impl Rate {
             if at >= start && new > 0 {
                 self.total += new;
                 match self.counts.back_mut() {
-                    Some((newest, count)) if *newest >= at => *count += new,
+                    Some(newest) if newest.at >= at => newest.count += new,
                     _ => {
                         if self.counts.len() == self.most {
-                            self.halve();
+                            self.expire(position);
                         }
-                        self.counts.push_back((at, new));
+                        if self.counts.len() == self.most {
+                            self.merge();
+                        }
+                        self.counts.push_back(Moment { first: at, at, count: new });
                     }
                 }
             }
         }
-        while let Some((at, count)) = self.counts.front().copied()
-            && at.saturating_add(self.window) <= position
-        {
-            self.counts.pop_front();
-            self.total -= count;
-        }
+        self.expire(position);
         if position < start.saturating_add(self.window) { f64::NAN } else { self.total as f64 / self.seconds }
     }
 
-    fn halve(&mut self) {
-        let pairs = self.counts.len() / 2;
-        for i in 0..pairs {
-            let (old, new) = (self.counts[2 * i], self.counts[2 * i + 1]);
-            self.counts[i] = (new.0, old.1 + new.1);
+    fn expire(&mut self, position: u64) {
+        while let Some(moment) = self.counts.front().copied()
+            && moment.at.saturating_add(self.window) <= position
+        {
+            self.counts.pop_front();
+            self.total -= moment.count;
         }
-        let odd = self.counts.len() % 2 == 1;
-        if odd {
-            self.counts[pairs] = self.counts[2 * pairs];
-        }
-        self.counts.truncate(pairs + usize::from(odd));
-        self.merged += pairs as u64;
+    }
+
+    /// Counts moments that lie close together at the newest of them.
+    fn merge(&mut self) {
+        let grain = grain(self.window, self.most);
+        let one = |old: Moment, new: Moment| Moment { first: old.first, at: new.at, count: old.count + new.count };
+        let joined = |old: Moment, new: Moment| (new.at - old.first <= grain).then(|| one(old, new));
+        self.merged += self.counts.join(joined, one) as u64;
     }
 
     fn next(&self, position: u64) -> u64 {
         let full = self.start.map_or(u64::MAX, |start| start.saturating_add(self.window));
-        let leaves = self.counts.front().map_or(u64::MAX, |(at, _)| at.saturating_add(self.window));
+        let leaves = self.counts.front().map_or(u64::MAX, |moment| moment.at.saturating_add(self.window));
         leaves.min(if full > position { full } else { u64::MAX })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::grade::Grade;
 use super::pieces::Pieces;
-use super::ring::Ring;
+use super::ring::{Ring, grain};
 
 /// The largest value that a condition had from `oldest` to `newest` positions ago.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ impl Window {
             half_open,
             open: None,
             waiting: Ring::new(if newest == 0 { 0 } else { most }),
-            pieces: Pieces::new(most, upward),
+            pieces: Pieces::new(most, oldest, upward),
             most,
             upward,
             merged: 0,
@@ -100,18 +100,13 @@ impl Window {
 
     fn wait(&mut self, start: u64, end: u64, value: Grade) {
         if self.waiting.len() == self.most {
-            let pairs = self.most / 2;
-            for i in 0..pairs {
-                let (old, new) = (self.waiting[2 * i], self.waiting[2 * i + 1]);
-                let value = if self.upward { old.2.or(new.2) } else { old.2.and(new.2) };
-                self.waiting[i] = (old.0, new.1, value);
-            }
-            let odd = self.most % 2 == 1;
-            if odd {
-                self.waiting[pairs] = self.waiting[2 * pairs];
-            }
-            self.waiting.truncate(pairs + usize::from(odd));
-            self.merged += pairs as u64;
+            let (grain, upward) = (grain(self.newest, self.most), self.upward);
+            let one = |old: (u64, u64, Grade), new: (u64, u64, Grade)| {
+                (old.0, new.1, if upward { old.2.or(new.2) } else { old.2.and(new.2) })
+            };
+            let joined =
+                |old: (u64, u64, Grade), new: (u64, u64, Grade)| (new.1 - old.0 <= grain).then(|| one(old, new));
+            self.merged += self.waiting.join(joined, one) as u64;
         }
         self.waiting.push_back((start, end, value));
     }
@@ -140,7 +135,7 @@ impl Since {
     /// An interval from now to `oldest` positions ago (`u64::MAX`: to the beginning). `most` and `upward` as in
     /// [`Pieces::new`].
     pub fn new(oldest: u64, most: usize, upward: bool) -> Self {
-        Self { oldest, open: None, pieces: Pieces::new(most, upward) }
+        Self { oldest, open: None, pieces: Pieces::new(most, oldest, upward) }
     }
 
     /// Forgets the history.

@@ -326,6 +326,74 @@ fn memory_is_bounded_and_merging_raises_nothing() {
     }
 }
 
+/// However long it lasts, what was merged again and again lies within a bounded time of what it was: the verdict is that
+/// of a window whose ends lie that much further in; what waits to enter a window counts as its least in that time.
+#[test]
+fn merging_shifts_the_ends_of_windows_by_a_bounded_time() {
+    const MEMORY: u64 = 64;
+    let past = |from: u64, to: u64| {
+        c(ConditionKind::Once {
+            condition: boxed(above("A.x", 0.0)),
+            interval: Interval { from: ms(from), to: Some(ms(to)) },
+        })
+    };
+    // Four parts in `MEMORY` of what the older end lies back; and of what the newer one does, in which the signal below
+    // changes by no more than nine a millisecond.
+    let waits = 4 * 500 / MEMORY + 1;
+    let cases = [
+        (within_last(above("A.x", 0.0), 1000), within_last(above("A.x", 0.0), 1000 - 4 * 1000 / MEMORY - 1), 0.0),
+        (past(500, 1000), past(500, 1000 - 4 * 1000 / MEMORY - 1), (9 * waits) as f64),
+    ];
+    for (full, short, slack) in cases {
+        let (full, short) = ([monitor(full)], [monitor(short)]);
+        let memory = usize::try_from(MEMORY).unwrap();
+        let (mut exact, mut shorter, mut small) =
+            (Rig::new(&full), Rig::new(&short), Rig::of(Bank::with_memory(&full, memory)));
+        for i in 0..20_000_u64 {
+            let phase = i % 5000;
+            let v = if phase < 4500 { -(phase as f64) } else { (phase as f64 - 4500.0) * 9.0 - 4500.0 };
+            for rig in [&mut exact, &mut shorter, &mut small] {
+                rig.write("A.x", i * MS, v);
+                rig.step(i * MS);
+            }
+            let robustness = |rig: &Rig| rig.bank.robustness(0).unwrap();
+            let (most, least, is) = (robustness(&exact), robustness(&shorter), robustness(&small));
+            assert!(least - slack <= is && is <= most, "at {i} ms: {is} is not from {least} to {most}");
+        }
+        assert!(small.bank.troubles().merged > 1000);
+    }
+}
+
+/// A sample rate counts each sample, and none for longer than four parts in its memory of its time.
+#[test]
+fn a_sample_rate_with_little_memory_counts_a_bounded_time_too_long() {
+    let rate = |seconds: u64| {
+        let rate = Signal::new(SignalKind::Rate { port: MemberRef::new("A.x").unwrap(), over: ms(seconds * 1000) });
+        [monitor(compare(rate, Comparison::Above, 0.0))]
+    };
+    let big = |monitors: &[Monitor]| Rig::of(Bank::with_memory(monitors, 1 << 16));
+    // 34 s: 32 s and four parts in 64 of it.
+    let (short, long) = (rate(32), rate(34));
+    let (mut exact, mut longer, mut small) = (big(&short), big(&long), Rig::of(Bank::with_memory(&short, 64)));
+    for i in 0..100_000_u64 {
+        // 1,000 a second, 10 a second after the 60th.
+        if i < 60_000 || i % 100 == 0 {
+            for rig in [&mut exact, &mut longer, &mut small] {
+                rig.write("A.x", i * MS, 0.0);
+            }
+        }
+        for rig in [&mut exact, &mut longer, &mut small] {
+            rig.step(i * MS);
+        }
+        if i > 34_000 {
+            let count = |rig: &Rig, seconds: f64| (rig.bank.robustness(0).unwrap() * seconds).round();
+            let (least, most, is) = (count(&exact, 32.0), count(&longer, 34.0), count(&small, 32.0));
+            assert!(least <= is && is <= most, "at {i} ms: {is} is not from {least} to {most}");
+        }
+    }
+    assert!(small.bank.troubles().merged > 1000);
+}
+
 /// Where a condition holds at an instant only, what must hold since begins right behind it.
 #[test]
 fn since_an_instant() {
