@@ -252,7 +252,7 @@ pub const CHECK_INBOX: usize = 6;
 pub const FORCED_SHOWN: usize = 8;
 
 /// Pieces of a signal that one operator over time of a monitor keeps; past it neighbours are merged. A window keeps the
-/// extremes still to come, a few dozen for a signal that goes up and down; this many pieces are 100 kB.
+/// extremes still to come, a few dozen for a signal that goes up and down; this many pieces are 130 kB.
 pub const MONITOR_PIECES: usize = 4096;
 
 /// Conditions and signals of a monitor within each other. People write five levels; each is two levels of YAML, which must

@@ -9,7 +9,8 @@ use crate::diagnostics::{SourceMap, to_json};
 use crate::lang::{self, Sources};
 use crate::limits::{SAMPLES_LINE, SAMPLES_WAKES};
 use crate::model::codes::{
-    CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MISSING, SAMPLES_NAN, SAMPLES_UNREADABLE, SAMPLES_UNUSED,
+    CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MERGED, SAMPLES_MISSING, SAMPLES_NAN,
+    SAMPLES_UNREADABLE, SAMPLES_UNUSED,
 };
 use crate::model::finding::{did_you_mean, has_errors};
 use crate::model::{Finding, Findings, Monitor};
@@ -189,7 +190,7 @@ impl Args {
         }
         let ok = problem.is_none();
         findings.extend(problem);
-        findings.extend(notes(&replay));
+        findings.extend(notes(&monitors, &replay));
         if self.json {
             context.out.json_line(&summary(&monitors, &replay, ok, &to_json(&findings, &sources)));
         } else {
@@ -273,14 +274,27 @@ fn summary(monitors: &[Monitor], replay: &Replay, ok: bool, findings: &Value) ->
 }
 
 /// What is worth saying of the recording as a whole.
-fn notes(replay: &Replay) -> Findings {
+fn notes(monitors: &[Monitor], replay: &Replay) -> Findings {
     let mut findings = Vec::new();
     let nan = replay.troubles().not_numbers;
     if nan > 0 {
+        let first = replay.first_nan();
+        let first = first.map(|(column, at)| format!(", the first in column `{column}` at {} s", decimal(at)));
         findings.push(
-            Finding::warning(SAMPLES_NAN, format!("{nan} samples are NaN"))
+            Finding::warning(SAMPLES_NAN, format!("{nan} samples are NaN{}", first.unwrap_or_default()))
                 .help("comparisons with them are false; look at what produced them"),
         );
+    }
+    let merged: Vec<String> = monitors
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| replay.merged(*i) > 0)
+        .map(|(_, monitor)| format!("`{}`", monitor.name))
+        .collect();
+    if !merged.is_empty() {
+        let message = format!("{}: more changes in a time than are remembered one by one", merged.join(", "));
+        let help = "what lies within a thousandth of the time of each other counts as one; a shorter time needs less";
+        findings.push(Finding::info(SAMPLES_MERGED, message).help(help));
     }
     if replay.jumped() {
         let message = format!("a gap between two lines is longer than {SAMPLES_WAKES} evaluations");

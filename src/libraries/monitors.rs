@@ -6,7 +6,7 @@
 
 use crate::model::monitor::{Counter, MONITORS_TYPE, Part};
 use crate::model::{Monitor, RunState};
-use crate::monitor::{Bank, Input, Sample, state_value};
+use crate::monitor::{Bank, Input, Sample, Troubles, state_value};
 use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Wanted};
 use std::sync::Arc;
 
@@ -74,6 +74,10 @@ struct Monitors {
     events: EventOut,
     verdicts: Vec<Out<bool>>,
     robustness: Vec<Out<f64>>,
+    troubles: Troubles,
+    not_numbers: Out<i64>,
+    went_backwards: Out<i64>,
+    merged: Out<i64>,
     /// Begins anew with the next update.
     fresh: bool,
 }
@@ -126,6 +130,14 @@ impl Component for Monitors {
                 robustness.write(margin);
             }
         }
+        let troubles = self.bank.troubles();
+        if troubles != self.troubles {
+            let count = |n: u64| i64::try_from(n).unwrap_or(i64::MAX);
+            self.not_numbers.write(count(troubles.not_numbers));
+            self.went_backwards.write(count(troubles.backwards));
+            self.merged.write(count(troubles.merged));
+            self.troubles = troubles;
+        }
     }
 }
 
@@ -152,6 +164,15 @@ impl Monitors {
             robustness
                 .push(b.doc("How far the condition is from changing: positive while it is true.").output(&margin));
         }
+        let not_numbers =
+            b.doc("Samples so far that were no number: comparisons with them are false.").output("not_numbers");
+        let went_backwards =
+            b.doc("Times so far that went backwards; the time before was taken.").output("went_backwards");
+        let merged = b
+            .doc(
+                "Changes so far that were told apart no more, because the memory of a condition over time was used up.",
+            )
+            .output("merged");
         let probes = b.probes(plan.wanted.clone());
         Self {
             plan: plan.clone(),
@@ -163,6 +184,10 @@ impl Monitors {
             events,
             verdicts,
             robustness,
+            troubles: Troubles::default(),
+            not_numbers,
+            went_backwards,
+            merged,
             fresh: true,
         }
     }

@@ -146,6 +146,9 @@ codes! {
          `connect(from, to, policy)`, `disconnect(from, to)`, `property_set(property, value)`, `port_write(port, \
          value)`, `operation_call(operation, …):undo(operation, …)`; `Configuration`, `ConfiguratorConf`, `state`, \
          `trans` and `conn` take one table.";
+    LUA_LOGIC = "lua::logic", "Lua's own `and`, `or` or `not` stands between conditions of monitors",
+        "Lua gives `and`, `or` and `not` the same meaning for every value: of two conditions, `p and q` is q, `p or q` is p, \
+         and `not p` is false. Write `all { p, q }`, `any { p, q }` and `no(p)`.";
     LUA_UNUSED = "lua::unused", "a change stands in no configuration",
         "A Lua file makes a change that no configuration holds, so it would silently never happen. Put it inside the \
          braces of a `Configuration`, or remove it.";
@@ -650,6 +653,11 @@ codes! {
     SAMPLES_NAN = "samples::nan", "samples that are not a number",
         "The recording holds NaN. A comparison with it is false, whichever it is, and its robustness is minus infinity: \
          nothing can be said of a value that is none. Look at what produced it.";
+    SAMPLES_MERGED = "samples::merged", "a condition over time saw more changes than it remembers one by one",
+        "A condition over time remembers 4096 changes of its signal that may still matter; a signal that only falls (or \
+         only rises) for as many samples needs more, and so does a sample rate over a time with more samples. Changes \
+         that lie within 4/4096 of the time of each other are then told apart no more: its ends lie up to that much \
+         further in, and a sample rate counts samples up to that much longer. docs/monitors.md says it exactly.";
     SAMPLES_BAD_TIME = "samples::bad_time", "a time of a file of samples is no time",
         "The column `time` holds seconds, 0 or more, in every line. A line without a time cannot be put anywhere.";
     SAMPLES_GAP = "samples::gap", "a gap between samples is too long to go through step by step",

@@ -277,6 +277,14 @@ impl Bank {
         times.min().filter(|wake| *wake != Time::NEVER).map(|wake| wake.max(self.last))
     }
 
+    /// How many pieces of signals one monitor has merged so far.
+    ///
+    /// # Panics
+    /// When there is no monitor of that index.
+    pub fn merged(&self, monitor: usize) -> u64 {
+        self.watches[monitor].program.merged()
+    }
+
     /// What was not as it should be.
     pub fn troubles(&self) -> Troubles {
         let merged = self.watches.iter().map(|w| w.program.merged()).sum();

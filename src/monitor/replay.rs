@@ -22,6 +22,7 @@ pub struct Replay {
     now: Option<Time>,
     lines: u64,
     jumped: bool,
+    first_nan: Option<(usize, Time)>,
 }
 
 /// What a monitor said over a recording.
@@ -86,7 +87,10 @@ impl Replay {
         let samples = vec![Sample::default(); bank.inputs().len()];
         let tallies = vec![Tally::default(); monitors.len()];
         let touched = vec![0; samples.len()];
-        (Self { bank, columns, feeds, wanted, samples, touched, tallies, now: None, lines: 0, jumped: false }, missing)
+        let (now, first_nan) = (None, None);
+        let replay =
+            Self { bank, columns, feeds, wanted, samples, touched, tallies, now, lines: 0, jumped: false, first_nan };
+        (replay, missing)
     }
 
     /// Columns that nothing looks at.
@@ -116,6 +120,9 @@ impl Replay {
         }
         self.lines += 1;
         for (column, value) in fresh {
+            if value.is_nan() {
+                self.first_nan.get_or_insert((column, at));
+            }
             for input in &self.feeds[column] {
                 let sample = &mut self.samples[*input];
                 // Several columns of one port in one line are one sample of it.
@@ -169,6 +176,16 @@ impl Replay {
     /// Whether part of a gap was passed in one step.
     pub fn jumped(&self) -> bool {
         self.jumped
+    }
+
+    /// The column and the time of the first sample that is no number.
+    pub fn first_nan(&self) -> Option<(&str, Time)> {
+        self.first_nan.map(|(column, at)| (self.columns.names()[column].as_str(), at))
+    }
+
+    /// How many pieces of signals a monitor has merged so far.
+    pub fn merged(&self, monitor: usize) -> u64 {
+        self.bank.merged(monitor)
     }
 
     /// What was not as it should be.

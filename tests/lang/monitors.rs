@@ -230,3 +230,35 @@ fn hostile_conditions_end_in_a_finding() {
     let found: Vec<_> = read("m.yaml", &nested).findings.iter().map(|f| f.code.0).collect();
     assert_eq!(found, ["monitor::too_deep"]);
 }
+
+#[test]
+fn luas_own_logic_between_conditions_is_told() {
+    let text = |when: &str| {
+        format!(
+            "-- x and y: no code\nlocal x = above('A.x', 1)\nlocal y = below(\"A.y\", 2):once {{ 0, 1 }}\n\
+             local strict = false -- [[ x or y ]]\nlocal text = [[x and y]] .. 'x and y' .. \"not x\"\n\
+             Monitors {{ m = monitor {{ when = {when}, event = 'e' }}, n = monitor {{ when = all {{ x, y }} }} }}"
+        )
+    };
+    for (when, word) in [
+        ("x and y", "and"),
+        ("x or y", "or"),
+        ("(not x) and x or y", "not"),
+        ("x:for_at_least(1) and y", "and"),
+        ("above(age('A.x'), { 1 }[1]) and y", "and"),
+        ("any { x }:within_last(2) or y", "or"),
+        ("all { no(x and y), y }", "and"),
+    ] {
+        let loaded = read("m.lua", &text(when));
+        let found: Vec<_> = loaded.findings.iter().filter(|f| f.code.to_string() == "lua::logic").collect();
+        assert!(!found.is_empty(), "{when}: {}", shown(&loaded.findings, &loaded.sources));
+        let place = loaded.sources.locate(found[0].origin).expect("a place");
+        let line = text(when).lines().nth(5).unwrap().to_owned();
+        let column = line.find(when).unwrap() + when.find(&format!("{word} ")).unwrap();
+        assert_eq!((place.line, place.column as usize), (6, column + 1), "{when}");
+    }
+    // A choice by a parameter is none of it.
+    for when in ["strict and x or y", "all { x, (strict and y or x) }", "not strict and x or y", "x"] {
+        good("m.lua", &text(when));
+    }
+}

@@ -5,6 +5,7 @@
 mod constructors;
 mod convert;
 mod loading;
+mod logic;
 mod monitors;
 mod recorder;
 mod sandbox;
@@ -69,6 +70,7 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, load
         }
     };
     let made = ran.map(|returned| recorder.assemble(returned, stem));
+    logic::check(&mut recorder, &text);
     // Putting conditions into their places is bounded as well.
     if let Some(exhausted) = recorder.exhausted.take() {
         recorder.report_exhausted(&exhausted);
