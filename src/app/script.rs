@@ -76,8 +76,9 @@ struct Host {
     options: Options,
     folder: PathBuf,
     session: Option<Arc<Session>>,
-    /// Answers and events after this one are news for `wait_answer`.
+    /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
     mark: u64,
+    taken: Vec<u64>,
     refused: Option<(PathBuf, Box<Refused>)>,
     ended: Option<Ended>,
 }
@@ -95,7 +96,15 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
     let clock = options.clock.clone();
     let _participant = clock.enter();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let host = Rc::new(RefCell::new(Host { options, folder, session: None, mark: 0, refused: None, ended: None }));
+    let host = Rc::new(RefCell::new(Host {
+        options,
+        folder,
+        session: None,
+        mark: 0,
+        taken: Vec::new(),
+        refused: None,
+        ended: None,
+    }));
     let failure = execute(path, &text, &host).err();
     let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
     if let Some(session) = host.session.take() {
@@ -252,6 +261,7 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
         Ok(()) => {
             let mut host = host.borrow_mut();
             host.mark = 0;
+            host.taken.clear();
             host.session = Some(session);
             Ok(())
         }
@@ -276,9 +286,16 @@ fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
         let help = did_you_mean(name, "events", known.iter().map(EventName::as_str));
         error(format!("the coordinator knows no event `{name}`: {help}"))
     })?;
-    host.borrow_mut().mark = session.hub().heard();
+    listen_anew(host, &session);
     session.raise(event, "script");
     Ok(())
+}
+
+/// From now on only what comes is news.
+fn listen_anew(host: &Shared, session: &Session) {
+    let mut host = host.borrow_mut();
+    host.mark = session.hub().heard();
+    host.taken.clear();
 }
 
 fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::Result<()> {
@@ -293,7 +310,7 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::R
             })?)
         }
     };
-    host.borrow_mut().mark = session.hub().heard();
+    listen_anew(host, &session);
     session.request(ask, "operator");
     Ok(())
 }
@@ -318,7 +335,6 @@ fn wait_until<T>(
 }
 
 fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
-    let mark = session(host)?.hub().heard();
     if !session(host)?.knows_state(state) {
         return Err(error(format!("the coordinator has no state `{state}`")));
     }
@@ -326,23 +342,16 @@ fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
         host,
         seconds,
         |s| s.in_state(state).then_some(()),
-        |hub| {
-            let active = hub.active();
-            let at = active.last().map_or("no state", String::as_str);
-            format!("not in `{state}` after {seconds} s: the coordinator is in `{at}`")
-        },
-    )?;
-    let mut host = host.borrow_mut();
-    host.mark = host.mark.min(mark);
-    Ok(())
+        |hub| format!("not in `{state}` after {seconds} s: {}", hub.whereabouts()),
+    )
 }
 
 fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
-    let mark = host.borrow().mark;
+    let (mark, taken) = (host.borrow().mark, host.borrow().taken.clone());
     let number = wait_until(
         host,
         seconds,
-        |s| s.hub().heard_since(event, mark),
+        |s| s.hub().heard_but(event, mark, &taken),
         |hub| {
             let waiting = hub.outstanding();
             let waiting =
@@ -350,7 +359,7 @@ fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
             format!("`{event}` was not heard in {seconds} s{waiting}")
         },
     )?;
-    host.borrow_mut().mark = number;
+    host.borrow_mut().taken.push(number);
     Ok(())
 }
 

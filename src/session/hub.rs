@@ -10,7 +10,7 @@ use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId};
 use crate::time::{Clock, Signal, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -46,7 +46,8 @@ struct State {
     dropped_told: Option<Time>,
     /// The newest answers.
     answers: VecDeque<Answered>,
-    active: Vec<String>,
+    /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
+    active: BTreeMap<String, Vec<String>>,
     epoch: u64,
 }
 
@@ -94,7 +95,7 @@ impl Hub {
                 dropped: 0,
                 dropped_told: None,
                 answers: VecDeque::new(),
-                active: Vec::new(),
+                active: BTreeMap::new(),
                 epoch: 0,
             }),
             untold: AtomicBool::new(false),
@@ -171,7 +172,8 @@ impl Hub {
                 }
                 Happening::Answered(answered) => Some(answered.answer.clone()),
                 Happening::State { active } => {
-                    state.active.clone_from(active);
+                    let of = active.first().and_then(|root| root.split_once(':')).map_or("", |(name, _)| name);
+                    state.active.insert(of.to_owned(), active.clone());
                     None
                 }
                 _ => None,
@@ -303,9 +305,22 @@ impl Hub {
         self.lock().log.last(last)
     }
 
-    /// The active states, root to leaf, as last published.
+    /// The active states, root to leaf, as last published; of several coordinators those of each, with its name before
+    /// (`arm:root.on`).
     pub fn active(&self) -> Vec<String> {
-        self.lock().active.clone()
+        self.lock().active.values().flatten().cloned().collect()
+    }
+
+    /// Where the coordinators are: the innermost active state of each, for a sentence.
+    pub fn whereabouts(&self) -> String {
+        let state = self.lock();
+        let leaves: Vec<String> =
+            state.active.values().filter_map(|a| a.last()).map(|leaf| format!("`{leaf}`")).collect();
+        match leaves[..] {
+            [] => "the coordinator is in `no state`".to_owned(),
+            [ref leaf] => format!("the coordinator is in {leaf}"),
+            _ => format!("the coordinators are in {}", leaves.join(" and ")),
+        }
     }
 
     /// How many events and answers were heard so far: where a wait for the next one begins.
@@ -315,7 +330,14 @@ impl Hub {
 
     /// Whether `event` was heard after the `since`-th; answers its number.
     pub fn heard_since(&self, event: &str, since: u64) -> Option<u64> {
-        self.lock().heard.iter().find(|(number, text)| *number > since && *text == event).map(|(number, _)| number)
+        self.heard_but(event, since, &[])
+    }
+
+    /// The same, leaving out those of some numbers.
+    pub fn heard_but(&self, event: &str, since: u64, but: &[u64]) -> Option<u64> {
+        let state = self.lock();
+        let mut news = state.heard.iter().filter(|(number, text)| *number > since && *text == event);
+        news.find(|(number, _)| !but.contains(number)).map(|(number, _)| number)
     }
 
     /// The answer to a request, if it has come (and is not long ago).

@@ -64,12 +64,11 @@ impl Session {
             }
             if self.clock().now() >= deadline {
                 let waiting = hub.outstanding();
-                let active = hub.active();
-                let at = active.last().map_or("no state", String::as_str);
                 break (
                     format!(
-                        "not up after {} s: the coordinator is in `{at}`{}",
+                        "not up after {} s: {}{}",
                         bring_up.within.as_secs_f64(),
+                        hub.whereabouts(),
                         if waiting.is_empty() {
                             String::new()
                         } else {

@@ -245,7 +245,7 @@ fn luas_own_logic_between_conditions_is_told() {
         ("x or y", "or"),
         ("(not x) and x or y", "not"),
         ("x:for_at_least(1) and y", "and"),
-        ("above(age('A.x'), { 1 }[1]) and y", "and"),
+        ("above(age('A.x'), ({ 1 })[1]) and y", "and"),
         ("any { x }:within_last(2) or y", "or"),
         ("all { no(x and y), y }", "and"),
     ] {

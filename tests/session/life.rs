@@ -161,6 +161,59 @@ fn a_script_that_fails_leaves_nothing_behind() {
 }
 
 #[test]
+fn answers_may_be_waited_for_in_any_order_each_once() {
+    let (failure, clean) = run_text(
+        "deploy('@generic_arm.yaml') raise('e_5dof') wait(1) \
+         wait_answer('five_DOF.ok', 0) wait_answer('e_5dof', 0) wait_answer('five_DOF.ok', 0.1)",
+    );
+    // Heard in the order of the last, then the first; the third wait finds no second one.
+    assert!(failure.clone().is_some_and(|text| text.contains("`five_DOF.ok` was not heard in 0.1 s")), "{failure:?}");
+    assert_eq!(clean, Some(true));
+    let (failure, _) = run_text(
+        "deploy('@generic_arm.yaml') raise('e_5dof') wait_answer('five_DOF.ok', 1) wait_answer('e_5dof', 0) \
+         undo() wait_answer('undo.done', 1) local ok = pcall(wait_answer, 'five_DOF.ok', 0.1) assert(not ok)",
+    );
+    assert_eq!(failure, None);
+}
+
+#[test]
+fn a_script_sees_all_coordinators() {
+    let folder = tempfile::tempdir().unwrap();
+    let coordinator = |on: &str| {
+        format!(
+            "return state {{ off = state {{}}, on = state {{ {on} = state {{}}, trans {{ src = 'initial', tgt = '{on}' }} }}, \
+             trans {{ src = 'initial', tgt = 'off' }}, trans {{ src = 'off', tgt = 'on', events = {{ 'e_start' }} }}, \
+             trans {{ src = 'on', tgt = 'off', events = {{ 'e_stop' }} }} }}"
+        )
+    };
+    let deployment = "
+davit: 1
+name: two
+platform: simulated
+libraries: [standard]
+configurations: []
+coordinators: { arm: arm.lua, grip: grip.lua }
+deploy: { event: e_start, up: [arm:on, grip:on], within_s: 5 }
+shutdown: { event: e_stop, down: off, within_s: 5 }
+";
+    let script = "
+deploy('two.yaml')
+local names = table.concat(active(), ' ')
+assert(names == 'arm:root arm:root.on arm:root.on.x grip:root grip:root.on grip:root.on.y', names)
+wait_state('arm:x', 1)
+local ok, why = pcall(wait_state, 'arm:off', 0.1)
+assert(tostring(why):find('the coordinators are in `arm:root.on.x` and `grip:root.on.y`', 1, true), tostring(why))
+";
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("arm.lua", &coordinator("x"));
+    write("grip.lua", &coordinator("y"));
+    write("two.yaml", deployment);
+    let (failure, clean) = run_text(&script.replace("two.yaml", folder.path().join("two.yaml").to_str().unwrap()));
+    assert_eq!(failure, None);
+    assert_eq!(clean, Some(true));
+}
+
+#[test]
 fn an_operator_pushes_and_undoes() {
     let clock = Clock::simulated();
     let _me = clock.enter();
