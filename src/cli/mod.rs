@@ -181,12 +181,15 @@ pub fn main(libraries: Libraries) -> ExitCode {
         }
     };
     let context = Context { out: Output::new(cli.color), libraries };
+    // Their help promises one object a line.
+    let streams = matches!(cli.command, Command::Sim(_) | Command::Monitor(_));
     match cli.command.run(&context) {
         Ok(exit) => exit.into(),
         Err(failure) => {
             if failure.json {
                 let findings = to_json(&failure.findings, &failure.sources);
-                context.out.json(&serde_json::json!({ "ok": false, "findings": findings }));
+                let answer = serde_json::json!({ "ok": false, "findings": findings });
+                if streams { context.out.json_line(&answer) } else { context.out.json(&answer) }
             } else {
                 context.out.findings(&failure.findings, &failure.sources);
             }

@@ -9,11 +9,11 @@ use crate::diagnostics::{SourceMap, to_json};
 use crate::lang::{self, Sources};
 use crate::limits::{SAMPLES_LINE, SAMPLES_WAKES};
 use crate::model::codes::{
-    CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MERGED, SAMPLES_MISSING, SAMPLES_NAN,
+    CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MERGED, SAMPLES_MISSING, SAMPLES_NAN, SAMPLES_RENAMED,
     SAMPLES_UNREADABLE, SAMPLES_UNUSED,
 };
 use crate::model::finding::{did_you_mean, has_errors};
-use crate::model::{Finding, Findings, Monitor};
+use crate::model::{Finding, Findings, Monitor, Origin};
 use crate::monitor::replay::{Raised, Replay, Tally};
 use crate::monitor::table::{Columns, Problem, decimal, empty, is_blank};
 use crate::time::Time;
@@ -151,8 +151,12 @@ impl Args {
         let (mut replay, missing) = Replay::new(&monitors, columns, &renamed);
         let header = sources.add_excerpt(name.as_str(), lines.text.trim_end(), 1);
         let header = sources.whole_file(header);
+        findings.extend(misnamed(&renamed, &replay, &known, header));
         for input in &missing {
             let input = input.to_string();
+            if renamed.iter().any(|(signal, _)| *signal == input) {
+                continue; // said already
+            }
             let near = did_you_mean(&input, "columns", known.iter().map(String::as_str));
             findings.push(
                 Finding::error(SAMPLES_MISSING, format!("the recording has no column `{input}`"))
@@ -171,7 +175,7 @@ impl Args {
                     .help("nothing needs to be done, unless one of them was meant to be looked at"),
             );
         }
-        if !missing.is_empty() {
+        if !missing.is_empty() || findings.iter().any(|f| f.code == SAMPLES_RENAMED) {
             return Err(refused(findings, sources));
         }
         let mut raised = |raised: Raised| self.event(context, &monitors, raised);
@@ -273,6 +277,25 @@ fn summary(monitors: &[Monitor], replay: &Replay, ok: bool, findings: &Value) ->
     })
 }
 
+/// What `--column` names that is not there: a signal that no monitor looks at, a column that the recording does not have.
+fn misnamed(renamed: &[(String, String)], replay: &Replay, known: &[String], header: Origin) -> Findings {
+    let mut findings = Vec::new();
+    let signals = replay.signals();
+    for (signal, column) in renamed {
+        let option = format!("`--column {signal}={column}`");
+        if !signals.contains(signal) {
+            let near = did_you_mean(signal, "signals", signals.iter().map(String::as_str));
+            let message = format!("{option}: no monitor looks at `{signal}`");
+            findings.push(Finding::error(SAMPLES_RENAMED, message).help(near));
+        } else if !known.contains(column) {
+            let near = did_you_mean(column, "columns", known.iter().map(String::as_str));
+            let message = format!("{option}: the recording has no column `{column}`");
+            findings.push(Finding::error(SAMPLES_RENAMED, message).at(header).help(near));
+        }
+    }
+    findings
+}
+
 /// What is worth saying of the recording as a whole.
 fn notes(monitors: &[Monitor], replay: &Replay) -> Findings {
     let mut findings = Vec::new();
@@ -281,7 +304,7 @@ fn notes(monitors: &[Monitor], replay: &Replay) -> Findings {
         let first = replay.first_nan();
         let first = first.map(|(column, at)| format!(", the first in column `{column}` at {} s", decimal(at)));
         findings.push(
-            Finding::warning(SAMPLES_NAN, format!("{nan} samples are NaN{}", first.unwrap_or_default()))
+            Finding::warning(SAMPLES_NAN, format!("samples that are NaN: {nan}{}", first.unwrap_or_default()))
                 .help("comparisons with them are false; look at what produced them"),
         );
     }

@@ -609,6 +609,9 @@ codes! {
         "Answers of the configurator, such as `engage.ok`, and the events of the statechart itself, such as \
          `e_done@root.a`, tell the coordinator what has happened. If a monitor raised one, the coordinator would be told \
          what has not. Give the monitor's event another name.";
+    MONITOR_NOTHING_REPEATED = "monitor::nothing_repeated", "a monitor repeats an event that it does not have",
+        "`repeat_every` raises `event` again and again while the condition stays true. Without `event` there is nothing to \
+         repeat; `cleared` is raised once.";
     MONITOR_NOT_RUN = "monitor::not_run", "the monitors of a deployment never run",
         "A deployment's monitors are a component of it, of the type `davit.Monitors`: they watch while it runs, in the \
          rounds of its activity. No configuration creates one, so nothing is watched. Create it where the other \
@@ -644,6 +647,9 @@ codes! {
         "Every port, run state and counter that the monitors look at needs a column in the file of samples: without it, \
          their conditions would be false throughout, which says nothing. Record it, rename the column with \
          `--column SIGNAL=COLUMN`, or look at some of the monitors only.";
+    SAMPLES_RENAMED = "samples::renamed", "`--column` names something that is not there",
+        "`--column SIGNAL=COLUMN` takes a signal that the monitors look at from a column of another name. The signal is \
+         spelt as the monitors spell it, the column as the first line of the recording does.";
     SAMPLES_UNUSED = "samples::unused", "columns of a file of samples that no monitor looks at",
         "A recording may hold more than the monitors need. If a monitor was meant to look at the column, its name is \
          spelt in another way there.";

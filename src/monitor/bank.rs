@@ -277,6 +277,11 @@ impl Bank {
         times.min().filter(|wake| *wake != Time::NEVER).map(|wake| wake.max(self.last))
     }
 
+    /// Whether a monitor that is enabled looks at an input.
+    pub fn is_watched(&self, input: usize) -> bool {
+        self.watches.iter().any(|watch| watch.enabled && watch.slots.contains(&input))
+    }
+
     /// How many pieces of signals one monitor has merged so far.
     ///
     /// # Panics

@@ -55,7 +55,8 @@ pub struct Raised {
 
 impl Replay {
     /// Monitors over a recording with these columns; `names` gives columns other names than they have in the file
-    /// (signal, column). The inputs that no column feeds are answered beside it: their conditions would see nothing.
+    /// (signal, column). The inputs that no column feeds are answered beside it: their conditions would see
+    /// nothing. What only monitors look at that are not enabled is not missed.
     pub fn new(monitors: &[Monitor], columns: Columns, names: &[(String, String)]) -> (Self, Vec<Input>) {
         let bank = Bank::new(monitors);
         let mut feeds = vec![Vec::new(); columns.names().len()];
@@ -78,7 +79,7 @@ impl Replay {
                 }
                 _ => Vec::new(),
             };
-            if parts.is_empty() {
+            if parts.is_empty() && bank.is_watched(i) {
                 missing.push(input.clone());
             }
             parts.into_iter().for_each(|c| feeds[c].push(i));
@@ -91,6 +92,11 @@ impl Replay {
         let replay =
             Self { bank, columns, feeds, wanted, samples, touched, tallies, now, lines: 0, jumped: false, first_nan };
         (replay, missing)
+    }
+
+    /// Everything that the monitors look at, as columns name it.
+    pub fn signals(&self) -> Vec<String> {
+        self.bank.inputs().iter().map(ToString::to_string).collect()
     }
 
     /// Columns that nothing looks at.

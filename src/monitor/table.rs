@@ -127,7 +127,13 @@ impl Columns {
                     } else {
                         format!("`{shown}` is not a time")
                     };
-                    problem(SAMPLES_BAD_TIME, line, &c, message, "write seconds, 0 or more, such as `0.125`")
+                    let help = if c.text.parse().is_ok_and(|t: f64| t.is_finite() && t > 0.0) {
+                        "times are seconds, and this is more than a hundred years: if the recording counts milliseconds, \
+                         microseconds or nanoseconds, divide its column `time`"
+                    } else {
+                        "write seconds, 0 or more, such as `0.125`"
+                    };
+                    problem(SAMPLES_BAD_TIME, line, &c, message, help)
                 })?;
                 if let Some(last) = self.last
                     && time < last

@@ -46,7 +46,8 @@ impl Time {
     /// Seconds since the clock's start.
     #[allow(clippy::cast_precision_loss)]
     pub fn as_secs_f64(self) -> f64 {
-        self.0 as f64 * 1e-9
+        // Not times 1e-9, which is no number of a computer: 0.6 s would read 0.6000000000000001.
+        self.0 as f64 / 1e9
     }
 
     /// The time from `earlier` to `self`, zero if it is later.

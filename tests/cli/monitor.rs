@@ -92,7 +92,56 @@ fn the_file_of_the_logger_is_read_with_its_columns_named() {
     let ran = demo.run(&[&args[..], &["--column", "Dynamics.f_raw_norm=u1"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert!(ran.out.contains("0.1 s  e_misaligned") && ran.out.contains("0.3 s  e_calm"), "{}", ran.out);
-    assert!(ran.err.contains("samples::nan") && ran.err.contains("1 samples"), "{}", ran.err);
+    assert!(ran.err.contains("samples::nan"), "{}", ran.err);
+    assert!(ran.err.contains("samples that are NaN: 1, the first in column `u1` at 0.3 s"), "{}", ran.err);
+}
+
+#[test]
+fn what_column_names_must_be_there() {
+    let demo = demo("time,Dynamics.f_raw_norm,u1\n0,9,\n0.1,9,\n");
+    let run = |column: &str| demo.run(&["monitor", "m.lua", "--samples", "s.csv", "--column", column]);
+    for (column, wrong, near) in [
+        ("Dynamics.f_raw_norn=u1", "no monitor looks at `Dynamics.f_raw_norn`", "`Dynamics.f_raw_norm`"),
+        ("Dynamics.f_raw_norm=u2", "the recording has no column `u2`", "`u1`"),
+    ] {
+        let ran = run(column);
+        assert_eq!(ran.code, 1, "{column}: {}", ran.out);
+        assert!(ran.err.contains(wrong) && ran.err.contains(near), "{column}: {}", ran.err);
+        assert_eq!(
+            ran.err.matches("samples::").count(),
+            ran.err.matches("samples::renamed").count() + usize::from(ran.err.contains("samples::unused")),
+            "{}",
+            ran.err
+        );
+    }
+    // `lost` is not enabled, so nobody misses its column; asked for, it is missed.
+    assert_eq!(run("Dynamics.f_raw_norm=u1").code, 0);
+    let asked = demo.run(&["monitor", "m.lua", "--samples", "s.csv", "--only", "lost", "--json"]);
+    assert_eq!(asked.code, 1);
+    assert_eq!(asked.out.lines().count(), 1, "also a refusal is one object a line: {}", asked.out);
+    assert_eq!(asked.json()["findings"][0]["code"], "samples::missing");
+}
+
+#[test]
+fn merging_and_times_that_are_no_seconds_are_told() {
+    let mut samples = "time,A.x\n".to_owned();
+    for i in 0..6000 {
+        samples.push_str(&format!("{}.{:03},{}\n", i / 1000, i % 1000, -i));
+    }
+    let demo = demo(&samples);
+    demo.write(
+        "m.lua",
+        "Monitors { high = monitor { when = above('A.x', 0):within_last(10), event = 'e' },
+                    still = monitor { when = above('A.x', 0), repeat_every = 1 } }",
+    );
+    let ran = demo.run(&["monitor", "m.lua", "--samples", "s.csv"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.err.contains("samples::merged") && ran.err.contains("`high`:"), "{}", ran.err);
+    assert!(ran.err.contains("monitor::nothing_repeated"), "{}", ran.err);
+    demo.write("s.csv", "time,A.x\n1732200000000000000,1\n");
+    let ran = demo.run(&["monitor", "m.lua", "--samples", "s.csv"]);
+    assert_eq!(ran.code, 1);
+    assert!(ran.err.contains("nanoseconds"), "{}", ran.err);
 }
 
 #[test]

@@ -136,6 +136,14 @@ pub enum Unit {
     Milliseconds,
 }
 
+/// An example with another number in place of its last one.
+fn with_number(example: &str, number: f64) -> String {
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    let Some(last) = example.rfind(|c: char| c.is_ascii_digit()) else { return example.to_owned() };
+    let start = example[..last].rfind(|c| !is_part(c)).map_or(0, |at| at + 1);
+    format!("{}{number}{}", &example[..start], &example[last + 1..])
+}
+
 /// Longest time that is not taken for a mistake in the unit: a day.
 const LONGEST: f64 = 86_400.0;
 
@@ -153,8 +161,7 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
     if let Kind::Str(text) = &node.kind {
         let help = match parse_time(text) {
             Some(seconds) => {
-                let key = example.rsplit_once(' ').map_or("", |(key, _)| key);
-                format!("write the number alone: `{key} {}`", seconds / factor)
+                format!("write the number alone: `{}`", with_number(example, seconds / factor))
             }
             None => format!("write it like `{example}`"),
         };

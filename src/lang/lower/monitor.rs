@@ -57,7 +57,13 @@ fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
         let node = fields.take(key)?;
         time(cx, &node, &format!("`{key}`"), Unit::Seconds, example)
     };
-    let repeat = seconds(cx, "repeat_every", "repeat_every = 1.0");
+    let repeats = seconds(cx, "repeat_every", "repeat_every = 1.0");
+    let repeat = repeats.filter(|_| raise.is_some());
+    if repeats.is_some() && repeat.is_none() {
+        let finding =
+            Finding::warning(codes::MONITOR_NOTHING_REPEATED, "`repeat_every` repeats nothing: there is no `event`");
+        cx.report(finding.at(origin).help("name the event that is to be repeated, or leave `repeat_every` out"));
+    }
     let every = seconds(cx, "every", "every = 0.01");
     let enabled = fields.take("enabled").and_then(|node| truth(cx, &node, "`enabled`", "enabled = false"));
     let description = fields.take("description");
