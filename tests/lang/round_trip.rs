@@ -287,7 +287,8 @@ fn monitors() -> impl Strategy<Value = Vec<Monitor>> {
             when,
             raise,
             cleared,
-            repeat,
+            // Without an event there is nothing to repeat, which is told.
+            repeat: repeat.filter(|_| raise.is_some()),
             sampling,
             enabled,
             description,
