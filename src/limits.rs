@@ -40,7 +40,7 @@ pub const CHART_QUEUE: usize = 1024;
 /// return from one that does not.
 pub const CHART_RUN: u64 = 10_000;
 
-/// Reactions of a statechart that are worked out when it is compiled, with all they enter and raise: about 10 MB at most. A
+/// Reactions of a statechart that are worked out when it is compiled, with all they enter and raise: about 40 MB at most. A
 /// chart past it is stepped by searching, which takes longer but not the more the larger it is.
 pub const CHART_REACTIONS: usize = 1 << 20;
 

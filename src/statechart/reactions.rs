@@ -23,6 +23,11 @@ struct Reaction {
     leaf: NodeId,
     /// How many states from the root inwards stay active.
     keep: u32,
+    /// It leaves one leaf for another of the same state, and at most that one raises something, one name; the chart has no
+    /// time events. So nearly all reactions of nearly all machines: the rows below need not be looked at.
+    simple: bool,
+    /// What a simple one raises.
+    name: Option<EventName>,
     /// The states entered before the leaf, outermost first.
     around: Span,
     /// What is raised, in order, with its owner.
@@ -42,7 +47,15 @@ impl Known {
     /// Nothing is known.
     const NONE: Self = {
         let none = Span { start: 0, len: 0 };
-        let first = Reaction { event: EventId::NEVER, leaf: NodeId::ROOT, keep: 0, around: none, raised: none };
+        let first = Reaction {
+            event: EventId::NEVER,
+            leaf: NodeId::ROOT,
+            keep: 0,
+            simple: false,
+            name: None,
+            around: none,
+            raised: none,
+        };
         Self { first, more: none }
     };
 }
@@ -94,6 +107,25 @@ impl Machine {
             row
         };
         self.search.looked_at(1);
+        if row.simple
+            && let Some(innermost) = self.path.get_mut(row.keep as usize)
+            && let Some(visits) = self.visits.get_mut(row.leaf.index())
+        {
+            *innermost = row.leaf;
+            *visits = visits.wrapping_add(1);
+            (self.leaf, self.mode) = (Some(row.leaf), Mode::Done);
+            if let Some(name) = row.name {
+                hook.raised(chart, Raised { name, owner: row.leaf, visit: *visits });
+            }
+            return AtOnce::Rests;
+        }
+        self.play(chart, *row, now, hook)
+    }
+
+    /// What a row says, step by step.
+    #[inline(never)]
+    fn play<H: Hook>(&mut self, chart: &Chart, row: Reaction, now: Time, hook: &mut H) -> AtOnce {
+        let all = &chart.reactions;
         self.path.truncate(row.keep as usize);
         for state in row.around.of(&all.around) {
             self.visit_next(*state);
@@ -104,7 +136,7 @@ impl Machine {
         for (name, owner) in row.raised.of(&all.raised) {
             hook.raised(chart, Raised { name: *name, owner: *owner, visit: self.visits[owner.index()] });
         }
-        if chart.timers.is_empty() { AtOnce::Rests } else { self.time_after(chart, *row, now) }
+        if chart.timers.is_empty() { AtOnce::Rests } else { self.time_after(chart, row, now) }
     }
 
     #[inline]
@@ -136,12 +168,18 @@ impl Machine {
     pub fn react<H: Hook>(&mut self, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
         match self.at_once(chart, event, now, hook) {
             AtOnce::Rests => Stepped { idle: true, transition: true, ended: Ended::Idle },
-            AtOnce::Goes => Stepped { transition: true, ..self.run(chart, now, hook) },
-            AtOnce::No => {
-                self.send(event);
-                self.run(chart, now, hook)
-            }
+            begun => self.react_on(begun, chart, event, now, hook),
         }
+    }
+
+    /// The rest of a reaction that does not rest at once. Apart, so that the short way needs no registers for it.
+    #[inline(never)]
+    fn react_on<H: Hook>(&mut self, begun: AtOnce, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
+        if begun == AtOnce::Goes {
+            return Stepped { transition: true, ..self.run(chart, now, hook) };
+        }
+        self.send(event);
+        self.run(chart, now, hook)
     }
 }
 
@@ -178,7 +216,7 @@ impl Reactions {
                 machine.send(*event);
                 let step = machine.turn(chart, Time::default(), &mut notes);
                 if step == Step::Taken && notes.plain && machine.rest::<Notes>(chart) {
-                    let row = reactions.row(*event, &machine, &notes);
+                    let row = reactions.row(chart, leaf, *event, &machine, &notes);
                     if let Some(row) = row
                         && first.is_some()
                     {
@@ -199,8 +237,15 @@ impl Reactions {
         reactions
     }
 
-    /// What the machine just did, as a row.
-    fn row(&mut self, event: EventId, machine: &Machine, notes: &Notes) -> Option<Reaction> {
+    /// What the machine just did, as a row; it was in the leaf `from`.
+    fn row(
+        &mut self,
+        chart: &Chart,
+        from: NodeId,
+        event: EventId,
+        machine: &Machine,
+        notes: &Notes,
+    ) -> Option<Reaction> {
         let leaf = machine.leaf?;
         let (entered, around) = notes.entered.split_last()?;
         debug_assert_eq!(*entered, leaf, "a transition ends in the leaf it enters last");
@@ -208,10 +253,18 @@ impl Reactions {
         self.around.extend_from_slice(around);
         self.raised.extend_from_slice(&notes.raised);
         let keep = machine.path.len() - notes.entered.len();
+        let name = match notes.raised[..] {
+            [] => Some(None),
+            [(name, owner)] if owner == leaf => Some(Some(name)),
+            _ => None,
+        };
+        let simple = around.is_empty() && chart.depth(from) == keep && name.is_some() && chart.timers.is_empty();
         Some(Reaction {
             event,
             leaf,
             keep: u32::try_from(keep).expect("less deep than ids are many"),
+            simple,
+            name: name.flatten(),
             around: span(starts.0, self.around.len()),
             raised: span(starts.1, self.raised.len()),
         })
