@@ -4,14 +4,19 @@ use super::exit::Exit;
 use super::input::{Parameters, is_deployment};
 use super::{Answer, Context, Failure, Run, write_output};
 use crate::diagnostics::Language;
-use crate::lang::{self, Sources};
+use crate::lang::{self, LoadOptions, Sources};
+use crate::model::Finding;
+use crate::model::codes::CONVERT_FUNCTIONS;
 use std::path::PathBuf;
 
-/// Write the same model in the other language.
+/// Write the same model in another language.
 ///
 /// A file of configurations, of monitors, or a coordinator's file becomes one text. Of a deployment, all files are written: with `-o
 /// DIR` into that directory, else one after the other, each below a comment with its name. Comments, loops and parameters
 /// of the original are not part of the model.
+///
+/// A coordinator with functions of Lua cannot be written in another language. Of a deployment it stays the file that it is,
+/// with the files that it loads; alone it is written in SCXML only, without its functions and with a warning for each place.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Configurations, monitors, a coordinator, or a deployment.
@@ -23,6 +28,9 @@ pub struct Args {
     /// Write to this file (of a deployment: into this directory) instead of printing.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Stand in for the host of a coordinator with functions: run this Lua file before it. May be given again.
+    #[arg(long, value_name = "FILE")]
+    host: Vec<PathBuf>,
     #[command(flatten)]
     parameters: Parameters,
 }
@@ -34,7 +42,7 @@ enum To {
     Lua,
     /// YAML.
     Yaml,
-    /// SCXML, for coordinators. The outermost state wins here, the innermost there; functions are left out.
+    /// SCXML, for coordinators. The outermost state wins here, the innermost there; functions are left out, with warnings.
     Scxml,
 }
 
@@ -52,9 +60,22 @@ impl Run for Args {
                 return Err(Failure { exit, findings: loaded.findings, sources: loaded.sources, ..Failure::default() });
             };
             context.out.findings(&loaded.findings, &loaded.sources);
+            for (name, file) in lang::print::kept(&deployment) {
+                let message = format!("the coordinator `{name}` has functions: it stays Lua as it is, in `{file}`");
+                let help = "a coordinator with functions cannot be written in another language; docs/from-rfsm.md says how to make it pure";
+                let finding = Finding::info(CONVERT_FUNCTIONS, message).help(help);
+                context.out.findings(&[finding], &loaded.sources);
+            }
             for (name, text) in lang::print::deployment(&deployment, language) {
                 match &self.output {
-                    Some(directory) => write_output(context, Some(&directory.join(&name)), &text)?,
+                    Some(directory) => {
+                        let path = directory.join(&name);
+                        // Files of a coordinator that is kept lie in folders.
+                        if let Some(folder) = path.parent().filter(|folder| *folder != directory) {
+                            _ = std::fs::create_dir_all(folder);
+                        }
+                        write_output(context, Some(&path), &text)?;
+                    }
                     None => {
                         let comment = if name.ends_with(".lua") { "--" } else { "#" };
                         context.out.text(format!("{comment} {name}\n{text}\n"));
@@ -63,7 +84,8 @@ impl Run for Args {
             }
             return Ok(Exit::Done);
         }
-        let converted = lang::convert(&Sources::Disk, &self.file, language, &self.parameters.options()?);
+        let options = LoadOptions { trusted: true, host: self.host, ..self.parameters.options()? };
+        let converted = lang::convert(&Sources::Disk, &self.file, language, &options);
         let Some(text) = converted.text else {
             let exit = if converted.unreadable { Exit::Usage } else { Exit::No };
             return Err(Failure {

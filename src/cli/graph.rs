@@ -11,6 +11,7 @@ use crate::draw;
 use crate::lang;
 use crate::model::Findings;
 use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
+use crate::model::program::Beside;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -81,11 +82,19 @@ impl Run for Args {
         let picture = if what == What::Coordinator {
             let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &[])?;
             let active = if self.live { self.active(&read)? } else { Vec::new() };
-            let title = format!("{}: coordinator", read.name);
+            context.out.findings(&read.findings, &read.sources);
+            let asks = |beside: &Beside| beside.plugin.as_deref() != Some("checkevents");
+            let hidden = read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks));
+            let mark = if hidden { " (functions are not verified)" } else { "" };
+            let title = format!("{}: coordinator{mark}", read.name);
             let text = match self.format {
                 Format::Plantuml => draw::coordinator_plantuml(&title, &read.chart, &active),
                 Format::Json => draw::coordinator_json(&read.chart, &active) + "\n",
-                Format::Scxml => lang::print::coordinator(&read.chart, Language::Scxml),
+                Format::Scxml => {
+                    let left_out = lang::functions_left_out(&read.chart, read.program.as_deref());
+                    context.out.findings(&left_out, &read.sources);
+                    lang::print::coordinator(&read.chart, Language::Scxml)
+                }
                 _ => return self.write(context, &draw::coordinator(&title, &read.chart, &active)),
             };
             write_output(context, self.output.as_deref(), &text)?;

@@ -8,6 +8,7 @@
 //! What is absent: stepping (the engine's), places in texts (`lang` makes them of lines), threads, and files: all texts
 //! are given, so that what was checked is what runs.
 
+mod aside;
 mod bound;
 mod budget;
 mod calls;
@@ -20,10 +21,12 @@ mod open;
 mod patterns;
 mod tables;
 mod tracing;
+mod unset;
 mod values;
 #[cfg(target_os = "linux")]
 mod watch;
 
+pub use aside::Field;
 pub use budget::message_of;
 pub use lower::{Problem, Spot};
 pub use open::{Functions, Lab, NotOpened, Opener, Reads, read};

@@ -1,11 +1,13 @@
 //! From a program to its chart, and from a program to functions that can be called.
 
+use super::aside::{self, Field};
 use super::budget::{message_of, undefined_global};
 use super::calls::{Calls, address};
 use super::host::{Host, Reader, run, run_program, state};
 use super::lower::{self, Problem, Spot};
+use super::unset::Watch;
 use crate::limits;
-use crate::model::program::{Openings, Program};
+use crate::model::program::{Beside, Openings, Program};
 use crate::model::{Origin, Statechart};
 use crate::statechart::{Printer, Said};
 use crate::time::Clock;
@@ -63,6 +65,12 @@ pub struct Reads {
     pub runs_lua: bool,
     /// What was printed.
     pub said: Vec<Said>,
+    /// Fields that mean nothing.
+    pub fields: Vec<Field>,
+    /// Functions that are called beside those of the chart.
+    pub beside: Vec<Beside>,
+    /// Globals that it read and that nobody has set, and where.
+    pub unset: Vec<(String, Spot)>,
 }
 
 /// Runs a program and answers its chart. `place` gives places: where a constructor was called, and a word in it (empty:
@@ -77,10 +85,13 @@ pub fn read(
 ) -> Result<Reads, NotOpened> {
     let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
     let (lua, host) = state(program.open, reader).map_err(failed)?;
-    let template = template(&lua, &host, program)?;
+    let watch = Watch::begin(&lua, &host.native).map_err(failed)?;
+    let template = template(&lua, &host, program);
+    let unset = watch.end(&host.native).map_err(failed)?;
+    let template = template?;
     let tells = template.raw_get::<Value>("dbg").map_err(failed)?.is_function();
     let tables: Function = host.native.raw_get("tables").map_err(failed)?;
-    let fsm: Table = host.budget.spend(limits::LUA_INSTRUCTIONS, || tables.call(template)).map_err(failed)?;
+    let fsm: Table = host.budget.spend(limits::LUA_INSTRUCTIONS, || tables.call(&template)).map_err(failed)?;
     let list = host.budget.spend(limits::LUA_INSTRUCTIONS, || lower::flat(&host.native, &fsm)).map_err(failed)?;
     let spots = host.spots.borrow().clone();
     let mut places = |spot: Option<usize>, _: usize, word: &str| {
@@ -91,9 +102,11 @@ pub fn read(
     for key in ["pre_step_hook", "post_step_hook", "getevents", "idle_hook"] {
         runs_lua |= matches!(fsm.raw_get(key).map_err(failed)?, Value::Function(_));
     }
+    let fields = aside::fields(&list, &host.native, &mut places).map_err(failed)?;
+    let beside = aside::beside(&template, &list, &host.native, &mut places).map_err(failed)?;
     let mut said = Vec::new();
     host.voice.drain(&mut said);
-    Ok(Reads { chart: lowered.chart, problems: lowered.problems, runs_lua, said })
+    Ok(Reads { chart: lowered.chart, problems: lowered.problems, runs_lua, said, fields, beside, unset })
 }
 
 /// Runs a program to the template it returns.

@@ -1,6 +1,7 @@
 //! One file in the other language.
 
 use super::files::Sources;
+use super::left_out;
 use super::load::{self, Content, LoadOptions};
 use super::print;
 use crate::diagnostics::{Language, SourceMap};
@@ -21,7 +22,8 @@ pub struct Converted {
 }
 
 /// A file of configurations, of monitors, or a coordinator's file, in the language given. The model is the same; comments, loops,
-/// parameters and the layout of the text are not part of it.
+/// parameters and the layout of the text are not part of it. A
+/// coordinator with functions is written in SCXML only, where they are left out, each with a warning.
 pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions) -> Converted {
     let (content, mut findings, sources, unreadable) = load::load_any(from, path, options);
     let text = match content {
@@ -33,7 +35,18 @@ pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions)
         }
         Some(Content::Configurations(list)) => Some(print::configurations(&list, to)),
         Some(Content::Monitors(list)) => Some(print::monitors(&list, to)),
-        Some(Content::Coordinator(chart)) => Some(print::coordinator(&chart, to)),
+        Some(Content::Coordinator(chart, program)) => {
+            let refused = match (&program, to) {
+                (Some(program), Language::Lua | Language::Yaml) => left_out::refused(&chart, program),
+                _ => None,
+            };
+            if to == Language::Scxml {
+                findings.extend(left_out::warnings(&chart, program.as_deref()));
+            }
+            let text = refused.is_none().then(|| print::coordinator(&chart, to));
+            findings.extend(refused);
+            text
+        }
         None => None,
     };
     Converted { text, findings, sources, unreadable }

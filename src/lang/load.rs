@@ -150,7 +150,7 @@ pub enum Content {
     /// Configurations.
     Configurations(Vec<Configuration>),
     /// A coordinator.
-    Coordinator(Statechart),
+    Coordinator(Statechart, Option<Arc<Program>>),
     /// Monitors.
     Monitors(Vec<Monitor>),
 }
@@ -163,19 +163,31 @@ pub(super) fn load_any(
 ) -> (Option<Content>, Findings, SourceMap, bool) {
     let mut cx = Cx::default();
     let mut params = Params::new(&mut cx, Vec::new(), &options.set);
-    let content = any(&mut cx, from, path, &mut params);
+    let content = any(&mut cx, from, path, &mut params, options);
     params.finish(&mut cx);
     (content, cx.findings, cx.sources, cx.unreadable)
 }
 
-fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<Content> {
+fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params, options: &LoadOptions) -> Option<Content> {
     let (reading, language) = open(cx, from, path, Origin::NONE)?;
     let (configurations, chart, monitors) = match language {
         Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)))?;
+            let before = cx.findings.len();
+            let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)));
+            let other = made
+                .as_ref()
+                .is_some_and(|made| made.chart.is_none() && (made.configurations.is_some() || made.monitors.is_some()));
+            if options.trusted && !other && !cx.unreadable && !made_of_others(cx, reading) {
+                cx.findings.truncate(before);
+                let host = host_files(&options.host);
+                let trust = Trust { host, tell_fields: true, ..Trust::default() };
+                let read = trusted::read(cx, from, path, reading, params, &trust, &stem(path));
+                return read.map(|(chart, program)| Content::Coordinator(chart, program));
+            }
+            let made = made?;
             (made.configurations, made.chart, made.monitors)
         }
-        Language::Scxml => return scxml::read(cx, reading).map(Content::Coordinator),
+        Language::Scxml => return scxml::read(cx, reading).map(|chart| Content::Coordinator(chart, None)),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             let is = |key: &str| matches!(&node.kind, Kind::Map(entries) if entries.iter().any(|e| e.key == key));
@@ -196,7 +208,7 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
         }
     };
     match (configurations, chart, monitors) {
-        (_, Some(node), _) => chart::statechart(cx, node).map(Content::Coordinator),
+        (_, Some(node), _) => chart::statechart(cx, node).map(|chart| Content::Coordinator(chart, None)),
         (None, None, Some(node)) => {
             let mut list = monitor::monitors(cx, node);
             monitor::unique(cx, &mut list);
@@ -217,6 +229,12 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params) -> Option<
             None
         }
     }
+}
+
+/// Whether a text makes configurations or monitors, by the constructors it names.
+fn made_of_others(cx: &Cx, reading: Reading) -> bool {
+    let text = &cx.sources.file(reading.file).text;
+    ["ConfiguratorConf", "Configuration", "Monitors"].iter().any(|name| trusted::mentions(text, name))
 }
 
 /// Reads a text into the source map. `named_at` is the place that named the file.
@@ -407,7 +425,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
     let (mut charts, mut programs) = (Vec::new(), BTreeMap::new());
     let trust = draft.trusted.map(|open| {
         let named = draft.host.iter().map(|(file, origin)| (folder.join(file), *origin));
-        Trust { open, host: named.chain(host_files(&options.host)).collect() }
+        Trust { open, host: named.chain(host_files(&options.host)).collect(), tell_fields: false }
     });
     for (name, file, named_at) in &draft.coordinators {
         if let Some((chart, program)) =

@@ -8,12 +8,14 @@
 mod concern;
 mod convert;
 mod files;
+mod left_out;
 mod load;
 mod lower;
 mod lua;
 mod params;
 pub mod print;
 mod scxml;
+mod slips;
 mod tree;
 mod trusted;
 mod words;
@@ -21,6 +23,7 @@ mod yaml;
 
 pub use convert::{Converted, convert};
 pub use files::Sources;
+pub use left_out::warnings as functions_left_out;
 pub use load::{
     LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations,
     load_coordinator, load_from, load_monitors,

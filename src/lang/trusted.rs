@@ -9,9 +9,11 @@ use super::files::Sources;
 use super::lower::chart;
 use super::lua;
 use super::params::Params;
+use super::print;
+use super::slips;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::diagnostics::{FileId, Language};
-use crate::functions::{self, NotOpened, Spot};
+use crate::functions::{self, Field, NotOpened, Spot};
 use crate::model::finding::nearest;
 use crate::model::program::{Openings, Program};
 use crate::model::{Code, Finding, Findings, Origin, Statechart, codes};
@@ -30,6 +32,8 @@ pub struct Trust {
     pub open: Openings,
     /// Files that stand in for its host, and where they are named.
     pub host: Vec<(PathBuf, Origin)>,
+    /// Each field of its own is told: it will be left out.
+    pub tell_fields: bool,
 }
 
 /// A coordinator with the program that has its functions, if it has any.
@@ -70,7 +74,9 @@ pub fn read(
         return strict.map(|chart| (chart, None));
     }
     if cx.unreadable || !errors().all(|f| MAY_GO.contains(&f.code)) {
-        cx.findings.extend(strict_findings);
+        // It is trusted: that it has functions is not what is wrong, nor what is only wrong where there are none.
+        let rich = strict_findings.iter().any(|f| f.code == codes::CHART_FUNCTION);
+        cx.findings.extend(strict_findings.into_iter().filter(|f| !rich || !MAY_GO.contains(&f.code)));
         return None;
     }
     open(cx, from, path, reading, params, trust)
@@ -118,11 +124,10 @@ fn open(
         return None;
     }
     let mut with = Vec::new();
-    for param in &mut params.0 {
-        param.used |= mentions(&text, &param.name);
+    for param in &params.0 {
         with.push((param.name.clone(), json(&param.value)));
     }
-    let mut program = Program { file, text, host, files: BTreeMap::new(), with, open: trust.open };
+    let mut program = Program { file, text, host, files: BTreeMap::new(), with, open: trust.open, beside: Vec::new() };
     // Files that the model loads are found out by running it.
     let loaded: Rc<RefCell<BTreeMap<String, (String, Arc<str>)>>> = Rc::default();
     let reader = {
@@ -145,6 +150,9 @@ fn open(
     for (shown, text) in program.files.values() {
         let id = cx.sources.add_file(shown.clone(), text.clone(), Language::Lua);
         ids.insert(shown.clone(), id);
+    }
+    for param in &mut params.0 {
+        param.used |= print::program_texts(&program).any(|text| mentions(text, &param.name));
     }
     let reads = match outcome {
         Ok(reads) => reads,
@@ -178,13 +186,32 @@ fn open(
     if broken {
         return None;
     }
+    for field in &reads.fields {
+        let place = at(field.origin);
+        let left_out = trust.tell_fields.then(|| {
+            let Field { of, key, .. } = field;
+            let message = format!("`{key}` is a field of your own in {of}: it is left out");
+            let finding = Finding::warning(codes::CONVERT_LEFT_OUT, message).at(place);
+            finding.help("a pure coordinator has no fields of one's own: keep it in a comment or in `doc`")
+        });
+        slips::field(field, place).or(left_out).into_iter().for_each(|finding| cx.report(finding));
+    }
+    for (name, spot) in &reads.unset {
+        let Some(id) = ids.get(&spot.file).copied() else { continue };
+        let text: Arc<str> = cx.sources.file(id).text.clone();
+        let line = cx.sources.exact_line(id, spot.line);
+        let finding = slips::unset(cx, line, &text, spot.line, name);
+        finding.into_iter().for_each(|finding| cx.report(finding));
+    }
+    program.beside = reads.beside;
+    program.beside.iter_mut().for_each(|beside| beside.origin = at(beside.origin));
     let mut chart = reads.chart;
     chart.root.places(&mut |origin| *origin = at(*origin));
     Some((chart, reads.runs_lua.then(|| Arc::new(program))))
 }
 
 /// Whether a text has a word in it.
-fn mentions(text: &str, word: &str) -> bool {
+pub fn mentions(text: &str, word: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || c == '_';
     text.match_indices(word).any(|(at, _)| {
         !text[..at].chars().next_back().is_some_and(part) && !text[at + word.len()..].chars().next().is_some_and(part)

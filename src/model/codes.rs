@@ -430,6 +430,18 @@ codes! {
          to a state that knows what to do: try again, go back, or stop. The same holds for `ID.reverted` of a configuration that \
          must be confirmed (`confirm`). `ID.cancelled` needs no transition: it comes only when the request was taken back by \
          its own undo.";
+    CHART_SLIP = "chart::slip", "a field of a trusted coordinator means nothing, and was hardly meant so",
+        "A coordinator that is trusted is read as rFSM reads it: fields of your own are legal everywhere, and a global that \
+         nobody has set is nil. So `evnts = {…}`, `gaurd = function …` and `entry = do_it` are no errors, but the transition is \
+         taken on any event, without a condition, and nothing is done on entry. Correct the name; a field of your own that only \
+         looks like one of rFSM's can be called otherwise, or begin with `_`.";
+    CONVERT_FUNCTIONS = "convert::functions", "functions cannot be written in another language",
+        "A function of a coordinator is a piece of Lua. In YAML there is no word for it, and its text cannot be taken out of \
+         its file, which may define what it uses anywhere. A deployment is converted all the same: such a coordinator stays \
+         the file that it is, beside those that it loads. To write it in another language make it pure (docs/from-rfsm.md).";
+    CONVERT_LEFT_OUT = "convert::left_out", "something cannot be written in the language asked for",
+        "A field of your own has no place in a pure coordinator, and a function has none in SCXML, where a comment or a \
+         condition that is not defined stands for it. What is written says less than what was read.";
     COORD_NOT_PURE = "coord::not_pure", "the coordinator has functions",
         "A coordinator of states, transitions and names of events can be verified in full. Functions can do anything, so \
          what `check` says about requests, failures and shutdown holds only as far as no function is involved. Names of \

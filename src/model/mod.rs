@@ -6,6 +6,7 @@ pub mod configuration;
 pub mod deployment;
 pub mod event;
 pub mod finding;
+pub mod functions;
 pub mod monitor;
 pub mod names;
 pub mod outline;

@@ -1,5 +1,6 @@
 //! The texts of a coordinator that has functions.
 
+use super::finding::Origin;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -19,6 +20,21 @@ pub struct Program {
     pub with: Vec<(String, serde_json::Value)>,
     /// What is open to it.
     pub open: Openings,
+    /// Functions that are called beside those of its chart.
+    pub beside: Vec<Beside>,
+}
+
+/// A function that is called beside those of the chart: `getevents`, a printer, a step hook.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beside {
+    /// What it belongs to, as findings name it: `` `root` ``, `` `a` → `b` ``.
+    pub place: String,
+    /// The key it stands under.
+    pub part: String,
+    /// The plugin that added it; none: the model.
+    pub plugin: Option<String>,
+    /// Where it stands.
+    pub origin: Origin,
 }
 
 /// What of Lua is open to a trusted model beyond the language and its harmless libraries.

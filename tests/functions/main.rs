@@ -1,6 +1,7 @@
 //! Coordinators with functions: what they may do, what they are given, and what becomes of those that misbehave.
 
 mod confirmed;
+mod convert;
 mod dbg;
 mod deployed;
 mod faults;
@@ -12,4 +13,5 @@ mod merge;
 mod named;
 mod purity;
 mod rfsm;
+mod slips;
 mod support;

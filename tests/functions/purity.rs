@@ -82,10 +82,7 @@ fn functions_of_plugins_are_not_the_models_own() {
     assert!(labels.contains("added by the plugin `await`, here and in another place"), "{labels}");
     let own = "exit = function() end";
     let (message, labels) = said(&model("require 'rfsm_emem'", own, "'e_start'")).expect("said");
-    assert!(
-        message.contains("functions in 1 states and 0 transitions, beside those of the plugin `emem`"),
-        "{message}"
-    );
+    assert!(message.contains("functions in 1 state and 0 transitions, beside those of the plugin `emem`"), "{message}");
     assert!(labels.contains("`root.idle`: exit") && labels.contains("added by the plugin `emem`"), "{labels}");
 }
 
@@ -100,4 +97,58 @@ fn a_pure_file_that_gets_a_function_need_not_be_rewritten() {
     assert!(pure.coordinator.is_some(), "{:?}", pure.findings);
     let model = Model::of(&[("model.lua", &text("entry = function() print('in') end"))], &[]);
     assert_eq!(model.notes(&["run"]), ["in"]);
+}
+
+/// Functions that are called beside the chart: of the root, of step hooks, of the plugin `preview`.
+#[test]
+fn functions_beside_the_chart_are_told() {
+    let said = |coordinator: &str| {
+        let from = Sources::memory([
+            ("d.yaml", super::deployed::DEPLOYMENT),
+            ("configurations.lua", super::deployed::CONFIGURATIONS),
+            ("coordinator.lua", coordinator),
+        ]);
+        let loaded = load_from(&from, Path::new("d.yaml"), &LoadOptions::default());
+        let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:?}", loaded.findings));
+        let mut catalogue = davit::model::Catalogue::default();
+        deployment.types.iter().for_each(|ty| _ = catalogue.insert(ty.clone()));
+        let report = davit::check::run(deployment, &catalogue);
+        let finding = report.findings.into_iter().find(|f| f.code == codes::COORD_NOT_PURE);
+        finding.map(|f| (f.message, f.labels.into_iter().map(|label| label.text).collect::<Vec<_>>().join("; ")))
+    };
+    let model = |before: &str, root: &str, state: &str, transition: &str| {
+        format!(
+            "{before} return rfsm.state {{ {root}
+              idle = rfsm.state {{}}, operational = rfsm.state {{ {state} }},
+              rfsm.trans {{ src = 'initial', tgt = 'idle' }},
+              rfsm.trans {{ src = 'idle', tgt = 'operational', events = {{ 'e_start' }}, {transition} }},
+              rfsm.trans {{ src = 'operational', tgt = 'idle', events = {{ 'e_stop' }} }} }}"
+        )
+    };
+    let (message, labels) =
+        said(&model("", "getevents = function() return {} end, idle_hook = function() end,", "", "")).expect("said");
+    assert!(message.contains("functions in 1 state and 0 transitions"), "{message}");
+    assert!(labels.contains("`root`: getevents, idle_hook — which events come"), "{labels}");
+    let (_, labels) = said(&model("", "dbg = function() end, err = function() end,", "", "")).expect("said");
+    assert!(labels.contains("`root`: dbg, err"), "{labels}");
+    let (message, labels) = said(&model(
+        "require 'rfsm.await' require 'rfsm.preview'",
+        "",
+        "prepare = function() end",
+        "likely = function() end",
+    ))
+    .expect("said");
+    assert!(
+        message.contains("functions in 1 state and 1 transition, beside those of the plugin `preview`"),
+        "{message}"
+    );
+    assert!(
+        labels.contains("`root.operational`: prepare") && labels.contains("`idle` → `operational`: likely"),
+        "{labels}"
+    );
+    assert_eq!(said(&model("require 'rfsm.checkevents'", "", "", "")), None, "it only tells");
+    let hooked =
+        "local m = {} require('rfsm').preproc[1] = function(fsm) rfsm.post_step_hook_add(fsm, function() end) end";
+    let (_, labels) = said(&model(hooked, "", "", "")).expect("said");
+    assert!(labels.contains("`root`: post_step_hook"), "{labels}");
 }

@@ -242,6 +242,7 @@ raw_setmetatable(globals, {
   __index = function(_, name)
     local part = part_of[name]
     if part then return module(part) end
+    if native.unset then native.unset(name) end
     return nil
   end,
 })

@@ -78,7 +78,7 @@ modules.emem = function()
         after_exit(node, "emem", emem.emem_reset)
       end
     end
-    rfsm.pre_step_hook_add(fsm, count)
+    rfsm.pre_step_hook_add(fsm, by("emem", count))
   end)
   return emem
 end
@@ -132,7 +132,7 @@ modules.await = function()
       end
     end
     if #specs > 0 then
-      rfsm.pre_step_hook_add(fsm, function(machine, events)
+      rfsm.pre_step_hook_add(fsm, by("await", function(machine, events)
         for _, spec in ipairs(specs) do
           if rfsm.get_sta_mode(spec.src) ~= "inactive" then
             for _, event in ipairs(events) do
@@ -143,7 +143,7 @@ modules.await = function()
             end
           end
         end
-      end)
+      end))
     end
   end)
   return {}
@@ -169,11 +169,11 @@ modules.checkevents = function()
         end
       end
     end
-    rfsm.pre_step_hook_add(fsm, function(machine, events)
+    rfsm.pre_step_hook_add(fsm, by("checkevents", function(machine, events)
       for _, event in ipairs(events) do
         if not known[event] then machine.warn("WARNING: undeclared event " .. tostring(event) .. " received") end
       end
-    end)
+    end))
   end)
   return {}
 end
@@ -192,7 +192,8 @@ modules.preview = function()
         error("preview: 'prepare' of " .. node._fqn .. " is not a function", 0)
       end
     end
-    rfsm.post_step_hook_add(fsm, function(machine)
+    native.previews = true
+    rfsm.post_step_hook_add(fsm, by("preview", function(machine)
       for _, state in ipairs(active_states(machine)) do
         if state ~= machine then
           for _, tr in ipairs(native.outgoing(state)) do
@@ -202,7 +203,7 @@ modules.preview = function()
           end
         end
       end
-    end)
+    end))
   end)
   return {}
 end

@@ -1,17 +1,20 @@
 //! Model → text, in both languages. What is printed reads back as the same model, to the last digit; comments and the
 //! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
 
+mod kept;
 mod lua;
 mod monitor;
 pub mod scxml;
 mod yaml;
 
+pub use kept::texts as program_texts;
 pub use lua::{configurations_lua, coordinator_lua};
 pub use monitor::monitors;
 pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
 
 use crate::diagnostics::Language;
 use crate::model::{Configuration, Deployment, Ident, Statechart};
+use kept::Kept;
 use std::time::Duration;
 
 /// Configurations in a language; YAML for SCXML, which has no word for them.
@@ -33,31 +36,44 @@ pub fn coordinator(chart: &Statechart, language: Language) -> String {
 }
 
 /// A deployment as files, by name: itself first (always YAML), then its configurations, its coordinators and its
-/// monitors, where it has any, in the language given.
+/// monitors, where it has any, in the language given. A coordinator with functions stays the text that it is, with the files
+/// that belong to it.
 pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, String)> {
     let (ending, other) = match language {
         Language::Lua => ("lua", "lua"),
         Language::Yaml => ("yaml", "yaml"),
         Language::Scxml => ("scxml", "yaml"),
     };
+    let kept = Kept::of(deployment);
     let c = format!("configurations.{other}");
     let one = deployment.first.is_none() && deployment.beside.is_empty();
-    let file =
-        |name: &Ident| if one { format!("coordinator.{ending}") } else { format!("{name}.coordinator.{ending}") };
-    let coordinators: Vec<String> = deployment.coordinators().iter().map(file).collect();
-    let texts: Vec<String> = std::iter::once(&deployment.coordinator)
-        .chain(deployment.beside.iter().map(|b| &b.chart))
-        .map(|chart| coordinator(chart, language))
-        .collect();
+    let names = deployment.coordinators();
+    let file = |name: &Ident| match kept.coordinators.get(name) {
+        Some(file) => file.clone(),
+        None if one => format!("coordinator.{ending}"),
+        None => format!("{name}.coordinator.{ending}"),
+    };
+    let coordinators: Vec<String> = names.iter().map(file).collect();
+    let charts = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
     let m = (!deployment.monitors.is_empty()).then(|| format!("monitors.{other}"));
-    let main = deployment_yaml(deployment, &[&c], &coordinators, m.as_deref());
+    let main = deployment_yaml(deployment, &[&c], &coordinators, m.as_deref(), &kept.keys);
     let mut files = vec![
         (format!("{}.deployment.yaml", deployment.name), main),
         (c, configurations(&deployment.configurations, language)),
     ];
-    files.extend(coordinators.into_iter().zip(texts));
+    for ((name, file), chart) in names.iter().zip(&coordinators).zip(charts) {
+        if !kept.coordinators.contains_key(name) {
+            files.push((file.clone(), coordinator(chart, language)));
+        }
+    }
+    files.extend(kept.files);
     files.extend(m.map(|m| (m, monitors(&deployment.monitors, language))));
     files
+}
+
+/// The files of the coordinators that have functions, and so stay what they are.
+pub fn kept(deployment: &Deployment) -> Vec<(Ident, String)> {
+    Kept::of(deployment).coordinators.into_iter().collect()
 }
 
 /// A float that reads back as the same float, and as a float in every reader of YAML: with a point.

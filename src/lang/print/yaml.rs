@@ -318,6 +318,7 @@ pub fn deployment_yaml(
     configurations: &[&str],
     coordinators: &[String],
     monitors: Option<&str>,
+    trusted: &str,
 ) -> String {
     let mut out = format!("davit: 1\nname: {}\nplatform: {}\n", t(&d.name), t(&d.platform));
     _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
@@ -354,6 +355,7 @@ pub fn deployment_yaml(
     if !named.is_empty() {
         _ = writeln!(out, "coordinators: {{ {} }}", named.join(", "));
     }
+    out.push_str(trusted);
     if let Some(monitors) = monitors {
         _ = writeln!(out, "monitors: {}", list([text(monitors)]));
     }
