@@ -87,6 +87,10 @@ pub const TEXT_DEPTH: usize = 64;
 /// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
 pub const TEXT_NODES: usize = 1_000_000;
 
+/// Names that one event of a foreign SCXML document is taken to mean beside itself (those that begin with it); past it a warning
+/// says that they are not all.
+pub const SCXML_NAMES: usize = 100;
+
 /// Findings collected from the texts of one deployment; past it reading stops, since the rest follows from the first.
 pub const FINDINGS: usize = 1_000;
 

@@ -296,7 +296,7 @@ codes! {
     SCXML_PRIORITY = "scxml::priority", "SCXML would take another transition",
         "Two active states, one inside the other, wait for the same event. In SCXML the inner one wins, in rFSM's semantics (and here) the outer one. Give the two transitions different events, or change the chart so that only one of them can be meant.";
     SCXML_PREFIX = "scxml::prefix", "SCXML compares only the beginning of an event's name",
-        "In SCXML `e` also means `e.x` and `e.y`; here names are compared whole. List every event that is meant.";
+        "In SCXML `e` also means `e.x` and `e.y`, and so does `e.*`; here names are compared whole. The names of the document that begin so are added; others, that come from outside only, are not meant. List every event that is meant.";
     SCXML_SENT_HOME = "scxml::sent_home", "an event would come back to the chart in SCXML",
         "A `<send>` without a target puts the event into the chart's own queue. Here a name that is raised leaves the coordinator: it is a request, or an event for others. Write a target if that is meant; else go to the state in question.";
     // ---- stack -----------------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ pub use compile::compile;
 pub use grow::{Addition, NotGrown};
 pub use hook::{Doo, Hook, Nobody, Place, Printer, Raised, Said, View, Watched};
 pub use machine::Machine;
+pub use order::sort as sort_by_priority;
 pub use outcome::{Ended, Mode, Step, Stepped};
 pub use queue::Queue;
 pub use reactions::AtOnce;

@@ -4,7 +4,7 @@
 //! Luas draw a pivot at random and we go on as before).
 
 /// Sorts `list` so that higher `priority` comes first, in Lua's order.
-pub(super) fn sort<T>(list: &mut [T], priority: impl Fn(&T) -> f64) {
+pub fn sort<T>(list: &mut [T], priority: impl Fn(&T) -> f64) {
     let before = |a: &T, b: &T| priority(a) > priority(b);
     part(list, &before);
 }

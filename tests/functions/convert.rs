@@ -110,6 +110,37 @@ fn scxml_is_written_with_a_warning_for_each_place() {
     }
 }
 
+/// A condition is the call of what nobody has defined: not taken, and never taken for none. A `doo` does not complete.
+#[test]
+fn scxml_says_what_it_cannot_know() {
+    let (text, _) = converted(
+        "return rfsm.state { a = rfsm.state { doo = function() end }, b = rfsm.state { exit = function() end }, c = rfsm.conn {},
+           rfsm.trans { src='initial', tgt='a' }, rfsm.trans { src='a', tgt='b', guard = function() end },
+           rfsm.trans { src='a', tgt='c', events = { 'e', function() end } },
+           rfsm.trans { src='c', tgt='b', events = { 'e' }, guard = function() end },
+           rfsm.trans { src='b', tgt='a', events = { rfsm_timeevent.e_after(function() return 1 end) } } }",
+        Language::Scxml,
+    );
+    let text = text.expect("a text");
+    let state = |from: &str, to: &str| text[text.find(from).unwrap()..text.find(to).unwrap()].to_owned();
+    let (a, b) = (state("id=\"root.a\"", "id=\"root.b\""), state("id=\"root.b\"", "id=\"root.c\""));
+    assert!(!a.contains("<raise") && a.contains("doo: a function"), "{a}");
+    assert!(b.contains("<raise") && b.contains("delayexpr=\"seconds_") && !b.contains(" delay="), "{b}");
+    assert_eq!(text.matches("<transition event=\"*\" cond=").count(), 2, "the guard of `a`, and its predicate: {text}");
+    assert!(text.contains("cond=\"['e'].indexOf(_event.name) &gt;= 0 &amp;&amp; guard_"), "{text}");
+    assert!(!text.contains("event=\"*\" target"), "nothing is taken on any event: {text}");
+    // It comes back as what it is: not the same.
+    let from = Sources::memory([("m.scxml", text.as_str())]);
+    let back = davit::lang::load_coordinator(&from, Path::new("m.scxml"), &LoadOptions::default());
+    assert!(back.coordinator.is_none());
+    assert_eq!(
+        back.findings.iter().filter(|f| f.code == codes::SCXML_NO_COUNTERPART).count(),
+        5,
+        "{:#?}",
+        back.findings
+    );
+}
+
 #[test]
 fn fields_of_ones_own_are_left_out_each_with_a_warning() {
     let (text, findings) = converted(

@@ -112,7 +112,7 @@ fn a_foreign_document_runs() {
     </state>
     <final id=\"spent\"/>
   </state>
-  <state id=\"tired\"><transition event=\"*\" target=\"off\"/></state>
+  <state id=\"tired\"><transition target=\"off\"/></state>
 </scxml>",
     );
     let (chart, _) = compile(&chart);
@@ -134,7 +134,7 @@ fn a_foreign_document_runs() {
     assert!(done.contains(&"raise warn".to_owned()), "{done:?}");
     let (at, done) = line("");
     assert_eq!((at.as_str(), done.contains(&"raise lamp.off".to_owned())), ("root.tired", true));
-    assert_eq!(line("").0, "root.off", "any event, and its own completion is one");
+    assert_eq!(line("").0, "root.off", "without an event it is taken at once");
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn what_would_be_decided_otherwise_is_a_warning() {
         "<state id=\"a\"><transition event=\"e\" target=\"b\"/>\n<state id=\"c\"><transition event=\"e.x\" target=\"d\"/></state><state id=\"d\"/></state><state id=\"b\"/>",
     );
     assert!(
-        matches!(&findings(&inner)[..], [one] if one.starts_with("warning scxml::priority 3:15")),
+        matches!(&findings(&inner)[..], [one, other] if one.starts_with("warning scxml::prefix 2:15") && other.starts_with("warning scxml::priority 3:15")),
         "{:?}",
         findings(&inner)
     );
@@ -207,6 +207,106 @@ fn what_would_be_decided_otherwise_is_a_warning() {
         "{:?}",
         findings(&home)
     );
+}
+
+/// Where a foreign document stands after each line, and what was done.
+fn play(body: &str, lines: &[&str]) -> Vec<(String, Vec<String>)> {
+    let (chart, findings) = compile(&read(&document(body)));
+    let chart = chart.unwrap_or_else(|| panic!("{findings:?}"));
+    let mut sim = Sim::new(&chart);
+    let mut line = |text: &&str| {
+        let seen = sim.line(text).unwrap();
+        (seen.active.last().unwrap().clone(), seen.actions)
+    };
+    line(&"run");
+    lines.iter().map(|text| (line(text), line(&"run")).0).collect()
+}
+
+#[test]
+fn any_event_is_refused_because_completion_would_be_one() {
+    let found = findings(&document("<state id=\"a\"><transition event=\"*\" target=\"a\"/></state>"));
+    assert!(matches!(&found[..], [one] if one.starts_with("scxml::no_counterpart 2:15 `*`")), "{found:?}");
+}
+
+/// Document order decides in SCXML; rFSM's sort moves the second and the third of four.
+#[test]
+fn document_order_decides() {
+    for count in 4..12 {
+        let more: String = (4..count).map(|n| format!("<transition event=\"e{n}\" target=\"d\"/>")).collect();
+        let body = format!(
+            "<state id=\"a\"><transition event=\"e0\" target=\"d\"/><transition event=\"e\" target=\"b\"/>{more}<transition event=\"e\" target=\"c\"/><transition event=\"e3\" target=\"d\"/></state><state id=\"b\"/><state id=\"c\"/><state id=\"d\"/>"
+        );
+        assert_eq!(play(&body, &["e"])[0].0, "root.b", "{count} transitions");
+    }
+    // Where no two can be meant nothing is added.
+    let body: String = (0..6).map(|n| format!("<transition event=\"e{n}\" target=\"a\"/>")).collect();
+    let chart = read(&document(&format!("<state id=\"a\">{body}</state>")));
+    assert!(chart.root.transitions.iter().all(|transition| transition.pn == 0.0));
+}
+
+/// From inside to a state around: SCXML leaves it and enters it again.
+#[test]
+fn a_transition_to_a_state_around_leaves_it() {
+    let body = "<state id=\"a\"><onentry><send event=\"in_a\" target=\"#_parent\"/></onentry><onexit><send event=\"out_a\" target=\"#_parent\"/></onexit>
+        <state id=\"b\"><transition event=\"g\" target=\"c\"/></state>
+        <state id=\"c\"><transition event=\"e\" target=\"a\"><send event=\"between\" target=\"#_parent\"/></transition></state></state>
+        <state id=\"a_again\"/>";
+    let seen = play(body, &["g", "e"]);
+    assert_eq!(seen[1].0, "root.a.b");
+    let raised: Vec<&str> = seen[1].1.iter().filter_map(|action| action.strip_prefix("raise ")).collect();
+    assert_eq!(raised, ["out_a", "between", "in_a"]);
+}
+
+#[test]
+fn a_name_means_all_that_begin_with_it() {
+    let body = "<state id=\"a\"><transition event=\"e.*\" target=\"b\"/></state>
+        <state id=\"b\"><transition event=\"e.f.g\" target=\"a\"/></state><state id=\"c\"><transition event=\"ef\" target=\"a\"/></state>";
+    assert_eq!(play(body, &["e.f.g"])[0].0, "root.b", "a name of the document");
+    assert_eq!(play(body, &["e"])[0].0, "root.b");
+    assert_eq!(play(body, &["ef"])[0].0, "root.a");
+    let found = findings(&document(body));
+    assert!(
+        matches!(&found[..], [one] if one.starts_with("warning scxml::prefix 2:15") && one.contains("`e.f.g`")),
+        "{found:?}"
+    );
+    let alone = findings(&document("<state id=\"a\"><transition event=\"e.*\" target=\"a\"/></state>"));
+    assert!(matches!(&alone[..], [one] if one.starts_with("warning scxml::prefix")), "{alone:?}");
+    let many: String =
+        (0..200).map(|n| format!("<state id=\"s{n}\"><transition event=\"e.x{n}\" target=\"a\"/></state>")).collect();
+    let many = document(&format!("<state id=\"a\"><transition event=\"e\" target=\"a\"/></state>{many}"));
+    assert!(findings(&many).iter().any(|f| f.contains("not all names")), "{:?}", findings(&many)[0]);
+}
+
+/// What other interpreters read: the order in which transitions are tried, and targets that leave no state around.
+#[test]
+fn what_is_written_decides_alike_elsewhere() {
+    let load = |text: &str| {
+        let from = Sources::memory([("m.lua", text)]);
+        lang::load_coordinator(&from, Path::new("m.lua"), &LoadOptions::default()).coordinator.expect("a chart")
+    };
+    let written = |text: &str| print::coordinator(&load(text), Language::Scxml);
+    let order = written(
+        "return state { a = state {}, b = state {}, c = state {}, trans { src='initial', tgt='a' },
+           trans { src='a', tgt='a', events={'e0'} }, trans { src='a', tgt='b', events={'e'} }, trans { src='a', tgt='c', events={'e'} },
+           trans { src='a', tgt='a', events={'e3'} }, trans { src='a', tgt='b', events={'e4'}, pn=1 } }",
+    );
+    let places: Vec<usize> = ["e4", "e0", "\"e\" davit:order=\"2\"", "\"e\" davit:order=\"1\""]
+        .iter()
+        .map(|text| order.find(text).unwrap_or_else(|| panic!("{text} in {order}")))
+        .collect();
+    assert!(places[0] < places[1] && places[2] < places[3], "{order}");
+    // The state around is not left: SCXML leaves it for itself, and stays in it for what is inside.
+    let inside = written(
+        "return state { p = state { a = state {}, b = state {}, trans { src='initial', tgt='a' }, trans { src='b', tgt='root.p', events={'e'} },
+           trans { src='a', tgt='initial', events={'f'} } }, trans { src='initial', tgt='p' }, trans { src='p', tgt='p', events={'g'} } }",
+    );
+    assert!(
+        inside.contains("event=\"e\" target=\"root.p.initial\"")
+            && inside.contains("event=\"f\" target=\"root.p.initial\""),
+        "{inside}"
+    );
+    assert!(inside.contains("<state id=\"root.p.initial\" davit:kind=\"connector\">"), "{inside}");
+    assert!(inside.contains("event=\"g\" target=\"root.p\""), "{inside}");
 }
 
 #[test]

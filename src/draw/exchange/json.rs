@@ -17,9 +17,16 @@ pub fn coordinator_json(chart: &Statechart, active: &[String]) -> String {
         "version": 2,
         "graph": node(&outline, 0),
         "active_leaf": leaf.map_or(Value::Bool(false), |leaf| Value::String(leaf.clone())),
-        "active_leaf_state": leaf.map(|_| "active"),
+        "active_leaf_state": leaf.map(|leaf| mode(&outline, leaf)),
     });
     value.to_string()
+}
+
+/// A leaf with nothing to do is done as soon as it is entered. One with a `doo` is active as long as that runs, which is not
+/// known here.
+fn mode(outline: &Outline<'_>, leaf: &str) -> &'static str {
+    let state = outline.items.iter().find(|item| item.fqn == *leaf).and_then(|item| item.state);
+    if state.is_some_and(|state| state.doo.is_none()) { "done" } else { "active" }
 }
 
 fn raised(actions: &[(Action, crate::model::Origin)]) -> Vec<String> {
@@ -93,6 +100,7 @@ mod tests {
         let text = coordinator_json(&sample(), &["root".into(), "root.idle".into()]);
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!((&value["version"], &value["active_leaf"]), (&json!(2), &json!("root.idle")));
+        assert_eq!(value["active_leaf_state"], "done", "it has nothing to do");
         let nodes = value["graph"]["subnodes"].as_array().unwrap();
         let of = |name: &str| nodes.iter().find(|n| n["id"] == name).unwrap_or_else(|| panic!("{name} in {text}"));
         assert_eq!(of("fork")["type"], "connector");

@@ -43,7 +43,8 @@ impl<'t> Reader<'_, 't> {
                 self.other(element, false);
                 continue;
             }
-            if own(element, "config").is_some() || own(element, "timer").is_some() {
+            let computed = element.attribute("delayexpr").is_some();
+            if own(element, "config").is_some() || (own(element, "timer").is_some() && !computed) {
                 continue;
             }
             let Some(event) = element.attribute("event") else {
@@ -63,7 +64,7 @@ impl<'t> Reader<'_, 't> {
                 }
                 continue;
             }
-            if element.attribute("delayexpr").is_some() {
+            if computed {
                 self.report(
                     element,
                     codes::SCXML_NO_COUNTERPART,
@@ -140,16 +141,6 @@ impl<'t> Reader<'_, 't> {
                             codes::SCXML_PRIORITY,
                             message,
                             "give the two transitions different events",
-                        );
-                    } else if event != "*" && own.iter().any(|other| other != event && overlap(other, event)) {
-                        let message = format!(
-                            "`{event}` shares its beginning with another event: in SCXML a name also means all that begin with it"
-                        );
-                        self.warn(
-                            transition,
-                            codes::SCXML_PREFIX,
-                            message,
-                            "here names are compared whole: list every event",
                         );
                     }
                     own.push(event.to_owned());

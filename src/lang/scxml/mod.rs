@@ -5,6 +5,7 @@
 //! nesting, a bounded number of nodes, and the size of any file.
 
 mod content;
+mod meaning;
 mod places;
 mod transition;
 
@@ -13,6 +14,7 @@ use super::tree::{Cx, Reading};
 use crate::limits;
 use crate::model::statechart::{Connector, INITIAL, Node, ROOT, State, Statechart, Transition};
 use crate::model::{Code, ConfigId, Finding, Ident, Origin, codes};
+use meaning::Names;
 use places::{Places, too_deep};
 use roxmltree::{Document, Node as Element, ParsingOptions};
 use rustc_hash::FxHashMap;
@@ -57,6 +59,8 @@ pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
         full: FxHashMap::default(),
         finals: FxHashMap::default(),
         ours: false,
+        names: Names::default(),
+        again: BTreeMap::new(),
     };
     reader.document(document.root_element())
 }
@@ -72,6 +76,10 @@ struct Reader<'c, 't> {
     finals: FxHashMap<String, Vec<String>>,
     /// Written by us: the meaning is rFSM's already.
     ours: bool,
+    /// All names of events, in documents of others.
+    names: Names,
+    /// Connectors that leave a state and enter it again, by the full name of the state.
+    again: BTreeMap<String, String>,
 }
 
 fn own<'a>(element: Element<'a, '_>, name: &str) -> Option<&'a str> {
@@ -117,6 +125,9 @@ impl<'t> Reader<'_, 't> {
         let top = outermost.filter(|_| self.ours).unwrap_or(root);
         self.ids.insert(ROOT.to_owned(), ROOT.to_owned());
         self.name_all(top, ROOT);
+        if !self.ours {
+            self.names = Names::of(root);
+        }
         let mut state = self.state(top, ROOT, Ident::new(ROOT).ok()?);
         if top != root {
             self.others(root);
@@ -133,7 +144,10 @@ impl<'t> Reader<'_, 't> {
         if !self.ours {
             self.doubts(top, &mut Vec::new());
         }
-        Some(Statechart::new(state))
+        let origin = state.origin;
+        let mut chart = Statechart::new(state);
+        self.connectors(&mut chart, origin);
+        Some(chart)
     }
 
     /// Gives every state its full name.
@@ -232,9 +246,24 @@ impl<'t> Reader<'_, 't> {
         let Some(full) = full else { return };
         let Some(name) = full.rsplit('.').next().and_then(|name| Ident::new(name).ok()) else { return };
         let delays = self.delays(element);
-        for transition in element.children().filter(|c| c.has_tag_name((SCXML, "transition"))) {
-            let read = self.transition(transition, name.as_str(), &full, element, &delays);
-            state.transitions.extend(read);
+        let mut read: Vec<(usize, Transition)> = Vec::new();
+        for (place, transition) in element.children().filter(|c| c.has_tag_name((SCXML, "transition"))).enumerate() {
+            // Ours stand in the order in which they are tried; this is where they were written.
+            let written = own(transition, "order").and_then(|order| order.parse().ok()).filter(|_| self.ours);
+            let one = self.transition(transition, name.as_str(), &full, element, &delays);
+            read.extend(one.map(|one| (written.unwrap_or(place), one)));
+        }
+        read.sort_by_key(|(place, _)| *place);
+        let mut list: Vec<Transition> = read.into_iter().map(|(_, transition)| transition).collect();
+        self.in_document_order(&mut list);
+        state.transitions.extend(list);
+        if own(element, "doo").is_some() {
+            self.report(
+                element,
+                codes::SCXML_NO_COUNTERPART,
+                "an activity that was left out".to_owned(),
+                "read the coordinator from the Lua file that has it",
+            );
         }
         if own(element, "kind") == Some("connector") {
             let origin = self.at(element);

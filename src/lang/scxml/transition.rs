@@ -55,6 +55,11 @@ impl<'t> Reader<'_, 't> {
             return None;
         };
         let target = self.one_target(element, ids)?;
+        if own(element, "function").is_some() {
+            let help = "read the coordinator from the Lua file that has it";
+            self.report(element, codes::SCXML_NO_COUNTERPART, "a condition that was left out".to_owned(), help);
+            return None;
+        }
         if element.attribute("cond").is_some() && own(element, "event").is_none() {
             let help = "let what decides raise one event or another";
             self.report(element, codes::SCXML_NO_COUNTERPART, "a condition on data".to_owned(), help);
@@ -72,15 +77,29 @@ impl<'t> Reader<'_, 't> {
             );
             return None;
         }
+        let leads_back = !self.ours && fqn.strip_prefix(&target).is_some_and(|rest| rest.starts_with('.'));
+        let target = if leads_back { self.again(&target) } else { target };
         let mut out = Transition { origin, ..Transition::default() };
         out.src = Some((src.to_owned(), origin));
         out.tgt = Some((target, origin));
         let events = own(element, "event").or_else(|| element.attribute("event")).unwrap_or_default();
         let exact = own(element, "event").is_some();
         for event in events.split_whitespace().filter(|event| *event != "*") {
-            self.trigger(element, event, exact, delays, &mut out);
+            if exact || self.ours || delays.contains_key(event) {
+                self.trigger(element, event, exact, delays, &mut out);
+                continue;
+            }
+            for meant in self.descriptor(element, event) {
+                self.trigger(element, &meant, exact, delays, &mut out);
+            }
         }
         if events.split_whitespace().any(|event| event == "*") {
+            if !self.ours {
+                let message = "`*` would also mean the state's own completion here, so it would be taken at once";
+                let help = "list the events that are meant";
+                self.report(element, codes::SCXML_NO_COUNTERPART, message.to_owned(), help);
+                return None;
+            }
             out.events.clear();
         }
         if let Some(pn) = own(element, "pn") {
@@ -108,7 +127,6 @@ impl<'t> Reader<'_, 't> {
         delays: &BTreeMap<String, f64>,
         out: &mut Transition,
     ) {
-        let event = if exact { event } else { event.strip_suffix(".*").unwrap_or(event) };
         if let Some(seconds) = delays.get(event).filter(|_| !exact) {
             out.events.push((Trigger::timed(Since::Entry, *seconds), out.origin));
             return;
@@ -124,6 +142,7 @@ impl<'t> Reader<'_, 't> {
             return;
         }
         match Trigger::parse(event) {
+            Ok(trigger) if !self.ours && out.events.iter().any(|(known, _)| *known == trigger) => {}
             Ok(trigger) => out.events.push((trigger, out.origin)),
             Err(error) => self.report(element, codes::TEXT_BAD_NAME, error.to_string(), "write the name of an event"),
         }

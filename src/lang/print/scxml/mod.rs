@@ -8,12 +8,18 @@
 //! * a time event is a delayed `<send>`, cancelled on exit; `e_at` counts from the clock's start, which SCXML does not know;
 //! * connectors are states with transitions that have a condition on the event, decided one after the other, not beforehand;
 //! * **the outermost state wins in rFSM, the innermost in SCXML**, and priority numbers order only one state's transitions;
-//! * functions are left out.
+//! * a transition to a state around its source stays inside that state here, and leaves it in SCXML: it goes to the initial
+//!   connector, which is then written as one;
+//! * transitions stand in the order in which they are tried;
+//! * functions are left out: a comment stands for what they do, and for a condition the call of a function that nobody has
+//!   defined, so that the transition is not taken. A state with a `doo` does not complete.
+
+mod transitions;
 
 use crate::model::Origin;
 use crate::model::outline::{Link, Outline};
-use crate::model::statechart::{Action, INITIAL, Since, Statechart, Trigger};
-use std::collections::BTreeMap;
+use crate::model::statechart::{Action, FunctionId, INITIAL, Since, Statechart, Trigger};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 /// The namespace of SCXML.
@@ -33,7 +39,8 @@ pub fn coordinator_scxml(chart: &Statechart) -> String {
         "  <!-- Written by davit. Of transitions that one event enables in several active states, the outermost is meant;\n       \
          SCXML takes the innermost. What is sent to #_parent is a request or an event for the outside. -->\n",
     );
-    let mut writer = Writer { out: &mut out, outline: &outline };
+    let entered_from_inside = transitions::entered_from_inside(&outline);
+    let mut writer = Writer { out: &mut out, outline: &outline, entered_from_inside };
     writer.node(0, 1);
     out.push_str("</scxml>\n");
     out
@@ -64,6 +71,8 @@ pub fn plain_event(name: &str) -> String {
 struct Writer<'a> {
     out: &'a mut String,
     outline: &'a Outline<'a>,
+    /// Composite states that a transition from inside goes to.
+    entered_from_inside: BTreeSet<usize>,
 }
 
 impl Writer<'_> {
@@ -78,20 +87,12 @@ impl Writer<'_> {
     /// The one transition of an initial connector that needs no event: then `<initial>` says it.
     fn simple_initial(&self, at: usize) -> Option<Link<'_>> {
         let initial = self.outline.child(at, INITIAL).filter(|i| self.outline.items[*i].state.is_none())?;
+        if self.entered_from_inside.contains(&at) {
+            return None;
+        }
         match &self.links(initial)[..] {
             [one] if one.transition.events.is_empty() && one.transition.guard.is_none() => Some(one.clone()),
             _ => None,
-        }
-    }
-
-    /// The id to go to for going to `at`.
-    fn target(&self, at: usize) -> String {
-        let item = &self.outline.items[at];
-        match item.parent {
-            Some(around) if item.name == INITIAL && self.simple_initial(around).is_some() => {
-                self.outline.items[around].fqn.clone()
-            }
-            _ => item.fqn.clone(),
         }
     }
 
@@ -99,7 +100,8 @@ impl Writer<'_> {
         let outline = self.outline;
         let item = &outline.items[at];
         let composite = outline.is_composite(at);
-        let initial = self.simple_initial(at).map(|link| (self.target(link.tgt), link.transition.effect.clone()));
+        let initial =
+            self.simple_initial(at).map(|link| (self.target(link.src, link.tgt), link.transition.effect.clone()));
         let mut head = format!("<state id=\"{}\"", quoted(&item.fqn));
         let Some(state) = item.state else {
             self.line(depth, &format!("{head} davit:kind=\"connector\">"));
@@ -112,6 +114,9 @@ impl Writer<'_> {
         if !state.config.is_empty() {
             let ids: Vec<&str> = state.config.iter().map(|(id, _)| id.as_str()).collect();
             let _ = write!(head, " davit:config=\"{}\"", ids.join(" "));
+        }
+        if state.doo.is_some() {
+            head.push_str(" davit:doo=\"true\"");
         }
         self.line(depth, &format!("{head}>"));
         if let Some((target, effect)) = initial {
@@ -129,10 +134,22 @@ impl Writer<'_> {
             }
             for (event, delay) in &timers {
                 let event = quoted(event);
-                let send = format!("<send event=\"{event}\" id=\"{event}\" delay=\"{delay}s\" davit:timer=\"true\"/>");
-                self.line(depth + 2, &send);
+                let delay = match delay {
+                    Delay::Seconds(seconds) => format!("delay=\"{seconds}s\""),
+                    Delay::By(function) => {
+                        let name = format!("seconds_{}", function.0);
+                        self.undefined(depth + 2, &name, "until then the event does not come");
+                        format!("delayexpr=\"{name}() + 's'\"")
+                    }
+                };
+                self.line(depth + 2, &format!("<send event=\"{event}\" id=\"{event}\" {delay} davit:timer=\"true\"/>"));
             }
-            if !composite {
+            if state.doo.is_some() {
+                self.line(
+                    depth + 2,
+                    "<!-- doo: a function, left out; the state completes when it ends, so here it does not -->",
+                );
+            } else if !composite {
                 let done = plain_event(&format!("e_done@{}", item.fqn));
                 self.line(depth + 2, &format!("<raise event=\"{}\" davit:done=\"true\"/>", quoted(&done)));
             }
@@ -161,64 +178,19 @@ impl Writer<'_> {
         self.line(depth, "</state>");
     }
 
-    /// Time events of a state that count from its entry, with their seconds.
-    fn timers(&self, at: usize) -> BTreeMap<String, f64> {
+    /// Time events of a state that count from its entry, with their times.
+    fn timers(&self, at: usize) -> BTreeMap<String, Delay> {
         let fqn = &self.outline.items[at].fqn;
         let links = self.links(at);
         let triggers = links.iter().flat_map(|link| &link.transition.events);
         let timed = triggers.filter_map(|(trigger, _)| match trigger {
             Trigger::Timed(timed) if timed.since == Since::Entry => {
-                Some((plain_event(&timed.event_of(fqn)), timed.seconds.max(0.0)))
+                let delay = timed.by.map_or(Delay::Seconds(timed.seconds.max(0.0)), Delay::By);
+                Some((plain_event(&timed.event_of(fqn)), delay))
             }
             _ => None,
         });
         timed.collect()
-    }
-
-    fn transitions(&mut self, at: usize, depth: usize) {
-        let outline = self.outline;
-        let fqn = &outline.items[at].fqn;
-        let connector = outline.items[at].state.is_none();
-        for link in outline.links.iter().filter(|link| link.src == at) {
-            let transition = link.transition;
-            let mut plain = Vec::new();
-            let mut written = Vec::new();
-            for (trigger, _) in &transition.events {
-                let name = match trigger {
-                    Trigger::Event(name) if name.as_str() == "e_done" => format!("e_done@{fqn}"),
-                    Trigger::Event(name) => name.to_string(),
-                    Trigger::Timed(timed) => timed.event_of(fqn),
-                    Trigger::Predicate(_) => continue,
-                };
-                plain.push(plain_event(&name));
-                written.push(trigger.to_string());
-            }
-            let mut attributes = String::new();
-            if connector && !plain.is_empty() {
-                let names: Vec<String> = plain.iter().map(|name| format!("'{name}'")).collect();
-                let _ = write!(attributes, " cond=\"[{}].indexOf(_event.name) &gt;= 0\"", quoted(&names.join(",")));
-            } else if !connector {
-                let event = if plain.is_empty() { "*".to_owned() } else { plain.join(" ") };
-                let _ = write!(attributes, " event=\"{}\"", quoted(&event));
-            }
-            if plain != written || connector && !written.is_empty() {
-                let _ = write!(attributes, " davit:event=\"{}\"", quoted(&written.join(" ")));
-            }
-            if transition.pn != 0.0 {
-                let _ = write!(attributes, " davit:pn=\"{}\"", transition.pn);
-            }
-            let _ = write!(attributes, " target=\"{}\"", quoted(&self.target(link.tgt)));
-            self.transition(depth, &attributes, &transition.effect);
-        }
-    }
-
-    fn transition(&mut self, depth: usize, attributes: &str, effect: &[(Action, Origin)]) {
-        if effect.is_empty() {
-            return self.line(depth, &format!("<transition{attributes}/>"));
-        }
-        self.line(depth, &format!("<transition{attributes}>"));
-        self.actions(depth + 1, effect);
-        self.line(depth, "</transition>");
     }
 
     fn actions(&mut self, depth: usize, actions: &[(Action, Origin)]) {
@@ -231,4 +203,16 @@ impl Writer<'_> {
             }
         }
     }
+
+    /// A remark on a function that the document calls and does not define.
+    fn undefined(&mut self, depth: usize, name: &str, else_: &str) {
+        self.line(depth, &format!("<!-- {name} is a function that is left out: define it in a <script>; {else_} -->"));
+    }
+}
+
+/// When a time event comes.
+#[derive(Debug, Clone, Copy)]
+enum Delay {
+    Seconds(f64),
+    By(FunctionId),
 }
