@@ -10,11 +10,14 @@ use std::collections::BTreeMap;
 const LABEL_LINES: usize = 5;
 /// Characters of a line of a label.
 const LABEL_COLUMNS: usize = 34;
+/// What stands for the events of a transition that needs none in particular.
+const ANY: &str = "any event";
 
 /// What a coordinator looks like. `active` are the active states (`root.sync.copying`), which are marked.
 ///
 /// References are followed as far as they lead to something; a transition that leads nowhere is not drawn (`check` says
-/// so). Transitions with the same ends are one edge with the events of all.
+/// so). Transitions with the same ends are one edge with the events of all; one without events says *any event*, but for the
+/// only way between a connector and a node. A priority number other than 0 stands in parentheses.
 pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Picture {
     let title = if chart.is_pure() { title.to_owned() } else { format!("{title} (functions are not verified)") };
     let mut picture = Picture::new(Subject::Statechart, Direction::Down, &title);
@@ -82,8 +85,14 @@ impl Drawing<'_> {
             let ends = (transition.src.as_ref(), transition.tgt.as_ref());
             let (Some((src, _)), Some((tgt, _))) = ends else { continue };
             let (Some(from), Some(to)) = (self.find(fqn, src), self.find(fqn, tgt)) else { continue };
-            let label = transition_lines(transition);
+            let connector = matches!(self.picture.nodes[from].shape, Shape::Dot | Shape::Connector);
+            let mut label = transition_lines(transition, connector);
             if let Some(edge) = self.picture.edges.iter_mut().find(|e| e.from == from && e.to == to) {
+                // Beside another one, what needs no event must not vanish.
+                if edge.label.is_empty() != label.is_empty() {
+                    let empty = if label.is_empty() { &mut label } else { &mut edge.label };
+                    empty.push(ANY.to_owned());
+                }
                 edge.label.extend(label);
             } else {
                 let mut edge = Edge::new(from, to);
@@ -148,8 +157,9 @@ fn state_lines(state: &State) -> Vec<String> {
     lines.iter().map(|l| short(l, 48)).collect()
 }
 
-/// Each event of a transition, the last with what the transition raises.
-fn transition_lines(transition: &Transition) -> Vec<String> {
+/// Each event of a transition, the last with its priority and what the transition raises. Of one out of a connector nothing is
+/// said where it needs no event.
+fn transition_lines(transition: &Transition, connector: bool) -> Vec<String> {
     let mut lines: Vec<String> = transition
         .events
         .iter()
@@ -158,9 +168,15 @@ fn transition_lines(transition: &Transition) -> Vec<String> {
             other => other.to_string(),
         })
         .collect();
+    if lines.is_empty() && !connector {
+        lines.push(ANY.to_owned());
+    }
     let mut tail = String::new();
     if transition.guard.is_some() {
         tail.push_str(" [guard]");
+    }
+    if transition.pn != 0.0 {
+        tail.push_str(&format!(" ({})", transition.pn));
     }
     if let Some(effect) = actions("", &transition.effect) {
         tail.push_str(&effect);
@@ -275,5 +291,45 @@ mod tests {
         assert_eq!(picture.nodes.iter().filter(|n| n.tone == Tone::Active).count(), 2);
         assert!(picture.mermaid().contains("[*] -->"));
         assert!(picture.dot().contains("cluster_"));
+    }
+
+    #[test]
+    fn what_needs_no_event_is_seen_and_so_is_its_priority() {
+        let mut root = state(
+            "root",
+            vec![leaf("idle"), leaf("on")],
+            &[
+                ("initial", "idle", &[]),
+                ("idle", "on", &["e_go"]),
+                ("on", "idle", &[]),
+                ("on", "idle", &["e_stop"]),
+                ("fork", "on", &[]),
+                ("fork", "on", &["e_more"]),
+                ("fork", "idle", &[]),
+            ],
+        );
+        root.children.push(Child::Connector(crate::model::statechart::Connector::new(Ident::new("fork").unwrap())));
+        root.transitions[3].pn = 2.0;
+        let picture = coordinator("k", &Statechart::new(root), &[]);
+        let label = |from: &str, to: &str| {
+            let named = |at: usize| picture.nodes[at].title.as_str();
+            let edge = picture.edges.iter().find(|e| (named(e.from), named(e.to)) == (from, to)).expect("drawn");
+            edge.label.join("|")
+        };
+        assert_eq!(label("on", "idle"), "any event, e_stop (2)");
+        assert_eq!(label("fork", "on"), "any event, e_more");
+        assert_eq!([label("initial", "idle"), label("fork", "idle")], ["", ""]);
+        for text in [picture.svg(), picture.dot(), picture.mermaid()] {
+            assert!(text.contains("any event, e_stop (2)"), "{text}");
+        }
+    }
+
+    #[test]
+    fn mermaid_has_a_title_as_it_is_and_lines_in_labels() {
+        let long = ["e_one_of_them_with_a_name", "e_another_with_a_long_name"];
+        let chart = Statechart::new(state("root", vec![leaf("a")], &[("initial", "a", &[]), ("a", "a", &long)]));
+        let text = coordinator("lab: \"x\" #1; \\", &chart, &[]).mermaid();
+        assert!(text.starts_with("---\ntitle: \"lab: \\\"x\\\" #1; \\\\\"\n---\n"), "{text}");
+        assert!(text.contains("e_one_of_them_with_a_name,<br/>e_another_with_a_long_name"), "{text}");
     }
 }

@@ -8,7 +8,7 @@ pub(super) fn write(picture: &Picture) -> String {
 }
 
 fn flowchart(picture: &Picture) -> String {
-    let mut out = format!("---\ntitle: \"{}\"\n---\n", plain(&picture.title));
+    let mut out = format!("---\ntitle: {}\n---\n", title(&picture.title));
     out.push_str(match picture.direction {
         Direction::Right => "flowchart LR\n",
         Direction::Down => "flowchart TB\n",
@@ -67,7 +67,7 @@ fn flow_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: 
 }
 
 fn statechart(picture: &Picture) -> String {
-    let mut out = format!("---\ntitle: \"{}\"\n---\nstateDiagram-v2\n", plain(&picture.title));
+    let mut out = format!("---\ntitle: {}\n---\nstateDiagram-v2\n", title(&picture.title));
     state_level(&mut out, picture, None, 1);
     let mut active = Vec::new();
     for (i, node) in picture.nodes.iter().enumerate() {
@@ -114,7 +114,7 @@ fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth:
         if edge.label.is_empty() {
             out.push('\n');
         } else {
-            let _ = writeln!(out, " : {}", plain(&edge.label.join(" / ")));
+            let _ = writeln!(out, " : {}", plain(&edge.label.join("\n")));
         }
     }
 }
@@ -143,6 +143,20 @@ fn style(tone: Tone) -> Option<&'static str> {
         Tone::Quiet => "fill:#f3f4f6,stroke:#9aa5b1",
         Tone::Active => "fill:#ffe9b8,stroke:#d97706,stroke-width:2px",
     })
+}
+
+/// The title stands in YAML, where Mermaid reads no codes of characters.
+fn title(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            c if c.is_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
 }
 
 /// Text in which Mermaid sees nothing of its own.
