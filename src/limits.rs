@@ -194,6 +194,11 @@ pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;
 /// guard): some ten milliseconds, a thousand times more than a reaction should take.
 pub const CALL_INSTRUCTIONS: u64 = 1_000_000;
 
+/// What one turn of a machine that a model steps itself costs the call's budget, in instructions, beside one for each
+/// transition looked at and what its functions take: about as long as so many take. Without it a loop of turns without
+/// functions would run for minutes.
+pub const TURN_INSTRUCTIONS: u32 = 20;
+
 /// Instructions between two looks at a call's budget.
 pub const CALL_LOOK: u32 = 1_000;
 

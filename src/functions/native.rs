@@ -356,12 +356,19 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
     let mut calls = Calls { lua: lua.clone(), bound: bound.clone(), _host: None };
     bound.look_for_dbg();
     let mut left = steps;
-    for _ in 0..limits::CHART_RUN {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and the budget ends it long before
+    let asked = if steps.is_finite() { steps.max(0.0) as u64 } else { 0 };
+    for _ in 0..limits::CHART_RUN.saturating_add(asked) {
         let now = now(host)?;
+        let before = machine.work();
         let turn = machine.turn(&bound.tables().chart, now, &mut calls);
         bound.status.borrow_mut().leaf = machine.leaf();
         if let Some(error) = bound.failed.borrow_mut().take() {
             return Err(error);
+        }
+        let searched = u32::try_from(machine.work().saturating_sub(before)).unwrap_or(u32::MAX);
+        if host.budget.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
+            return Err(host.budget.error());
         }
         let idle = match turn {
             Step::NotEntered => return Ok(false),

@@ -98,6 +98,11 @@ fn nothing_in_a_call_outlives_its_budget() {
             "local m = rfsm.init(rfsm.state {{ err = false, warn = false, info = false,
                x = rfsm.state {{ entry = {endless} }}, rfsm.trans {{ src='initial', tgt='x' }} }}) rfsm.run(m)"
         ),
+        // And one without functions that goes round for ever, again and again.
+        "local m = rfsm.init(rfsm.state { err = false, warn = false, info = false, x = rfsm.state {}, y = rfsm.state {},
+           rfsm.trans { src='initial', tgt='x' }, rfsm.trans { src='x', tgt='y', events={ 'e_done' } },
+           rfsm.trans { src='y', tgt='x', events={ 'e_done' } } }) while true do pcall(rfsm.run, m) end"
+            .to_owned(),
         "load('while true do end')()".to_owned(),
         // Library calls that run in one piece.
         "(('a'):rep(40)):find(('a?'):rep(40) .. ('a'):rep(40) .. 'b')".to_owned(),

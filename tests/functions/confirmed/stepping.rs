@@ -124,9 +124,12 @@ fn event_sets_of_a_doo_that_yields_once() {
 
 #[test]
 fn a_null_transition_takes_its_own_completion() {
-    run(
-        "local fsm = init(S { a = S {}, b = S {}, T { src='initial', tgt='a' }, T { src='a', tgt='b' } }) rfsm.run(fsm) eq(leaf(fsm), 'root.b')",
-    );
+    for guard in ["nil", "function(tr, e) eq(e, { 'e_done@root.a' }) end"] {
+        run(&format!(
+            "local fsm = init(S {{ a = S {{}}, b = S {{ doo = function() rfsm.yield(true) end }}, T {{ src='initial', tgt='a' }}, T {{ src='a', tgt='b', guard={guard} }} }})
+             rfsm.step(fsm) eq(leaf(fsm), 'root.a') rfsm.step(fsm) eq(leaf(fsm), 'root.b')"
+        ));
+    }
 }
 
 #[test]
@@ -214,4 +217,10 @@ fn completion_from_a_connector_never_comes() {
     run("local fsm = init(S { a = S {}, b = S {}, k = C {}, T { src='initial', tgt='a' }, T { src='a', tgt='k', events={'e', 'e_done'} }, T { src='k', tgt='b', events={'e_done'} } })
          rfsm.run(fsm) eq(leaf(fsm), 'root.a') rfsm.send_events(fsm, 'e', 'e_done') rfsm.run(fsm) eq(leaf(fsm), 'root.a')
          rfsm.send_events(fsm, 'e', 'e_done@root.k') rfsm.run(fsm) eq(leaf(fsm), 'root.b', 'but may be sent')");
+}
+
+#[test]
+fn as_many_steps_as_were_asked_for() {
+    run("local n = 0 local fsm = init(S { a = S { doo = function() while true do n = n + 1 rfsm.yield() end end }, T { src='initial', tgt='a' } })
+         rfsm.step(fsm) eq(rfsm.step(fsm, 12000), false) eq(n, 12000) eq(rfsm.step(fsm, 0), false) eq(n, 12001, 'none is one')");
 }
