@@ -15,6 +15,8 @@ fn a_monitor_state_sends_all_that_happens_or_the_first() {
          end
          eq(watch {}, {'e_x', 'e_y'}) eq(lines, {'in', 'out'})
          eq(#watch { break_first = true }, 1) eq(#watch { breakfirst = true }, 1)
+         local calm = init(S { a = ext.gen_monitor_state { montab = { e_x = function() return nil end } }, T { src='initial', tgt='a' } })
+         eq(rfsm.step(calm, 5), false, 'busy though nothing happens') eq(rfsm.get_sta_mode(calm.a), 'active')
          for _, bad in ipairs { 7, 'x', true } do eq(pcall(ext.gen_monitor_state, { montab = bad }), false) end");
 }
 
@@ -37,7 +39,7 @@ fn machines_inside_hear_all_events_also_those_of_the_step_that_entered() {
          lines = {{}} go(fsm, 'on') eq(lines, {{ 'twoa-', 'twob+', 'onea-', 'oneb+' }})
          eq(leaf(two), 'root.b', 'those that were given, not copies')
          lines = {{}} go(fsm, 'off') eq(lines, {{ 'twob-', 'oneb-', 'out' }}, 'its own exit last')
-         eq(leaf(one), false, 'they are reset') eq(fsm.post_step_hook, nil, 'and the hook is gone')
+         eq(leaf(one), false, 'they are reset') eq(rfsm.check_events(one), 1, 'to their beginning') eq(fsm.post_step_hook, nil, 'and the hook is gone')
          lines = {{}} go(fsm, 'e_one') eq(lines, {{}}) go(fsm, 'on') eq(lines, {{ 'in', 'twoa+', 'onea+' }})"
     ));
 }

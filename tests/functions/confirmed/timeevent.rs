@@ -111,3 +111,13 @@ fn dbg_is_told_of_a_time_event() {
          assert(lines[1]:find('^TIMEEVENT .*e_after%(2%)@root.a$') and lines[2] == 'RAISED e_after(2)@root.a', table.concat(lines, '|'))"
     ));
 }
+
+#[test]
+fn of_several_that_are_due_the_leafs_comes_first() {
+    run(&format!(
+        "{CLOCK} local fsm = init(S {{ a = S {{ x = S {{}}, T {{ src='initial', tgt='x' }}, T {{ src='x', tgt='x', events={{ te.e_after(2) }} }} }}, b = S {{}},
+           T {{ src='initial', tgt='a' }}, T {{ src='a', tgt='b', events={{ te.e_after(1) }} }} }})
+         rfsm.run(fsm) local sets = {{}} rfsm.pre_step_hook_add(fsm, function(f, e) sets[#sets + 1] = table.concat(e, ' ') end)
+         tick(5) rfsm.step(fsm) rfsm.step(fsm) eq(sets[2], 'e_after(2)@root.a.x e_after(1)@root.a') eq(leaf(fsm), 'root.b', 'and the outer one wins')"
+    ));
+}
