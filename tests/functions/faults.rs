@@ -46,6 +46,10 @@ fn protected_calls_and_coroutines_do_not_outlive_the_budget() {
         "while true do coroutine.resume(coroutine.create(function() while true do end end)) end",
         "while true do coroutine.wrap(function() for i = 1, 10 do end end)() end",
         "local function f() return f() end f()",
+        // Turns of a machine that goes round for ever count, though it has no functions.
+        "local m = rfsm.init(rfsm.state { err = false, warn = false, info = false, x = rfsm.state {}, y = rfsm.state {},
+           rfsm.trans { src='initial', tgt='x' }, rfsm.trans { src='x', tgt='y', events={ 'e_done' } },
+           rfsm.trans { src='y', tgt='x', events={ 'e_done' } } }) while true do pcall(rfsm.run, m) end",
         // What is closed on the way out is counted too.
         "local c <close> = setmetatable({}, { __close = function() while true do end end }) while true do end",
         "coroutine.wrap(function()
