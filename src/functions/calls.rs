@@ -360,7 +360,7 @@ impl Hook for Calls {
     }
 
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
-        let text = format!("connectors lead round in a circle at {}: no path is taken there", chart.fqn(connector));
+        let text = format!("connectors lead round in a circle at {}: no path is taken", chart.fqn(connector));
         self.bound.voice.say(Printer::Err, &text);
     }
 }

@@ -357,7 +357,7 @@ codes! {
         "Entering a state that has states in it means entering one of them, and this one does not say which. Write a transition from `initial` inside it, or name one of the states inside as the target.";
     CHART_CONNECTOR_CIRCLE = "chart::connector_circle",
         "Connectors lead round in a circle",
-        "A path through connectors is searched to its end before anything happens. A circle of them that no guard holds has no end; rFSM overflows its stack. Break the circle, or put a state into it.";
+        "A path through connectors is searched to its end before anything happens. A circle of them that neither a guard nor an event holds has no end; rFSM overflows its stack, and here it is refused. A circle that events hold is a warning: when all that open it come in one step, no transition is taken (rFSM overflows its stack). A deployment gives the coordinator one event a step. Break the circle, or put a state into it.";
     CHART_LONG_CHAIN = "chart::long_chain",
         "Too many connectors one after the other",
         "A path through connectors is taken in one step, and the search for it is bounded. Shorten the chain of connectors, or put states into it.";

@@ -10,8 +10,16 @@ use crate::model::finding::{Finding, Findings};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 
-/// Errors: circles of connectors that no guard holds, and chains of connectors that are too long to search.
+/// Errors: circles of connectors that nothing holds, and chains of connectors that are too long to search. Warnings: circles
+/// that the events of one step can open.
 pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
+    // Each alone: what is closed in one may hide what is in the other.
+    walk_connectors(chart, true, findings);
+    walk_connectors(chart, false, findings);
+}
+
+/// Goes along the transitions between connectors that no guard holds; along those that need no event, or along all.
+fn walk_connectors(chart: &Chart, null: bool, findings: &mut Findings) {
     const UNSEEN: u32 = 0;
     const OPEN: u32 = 1;
     let mut mark = vec![UNSEEN; chart.nodes.len()];
@@ -20,7 +28,8 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
     let next_of = |node: u32| {
         chart.nodes[node as usize].out.ids().filter(|edge| {
             let row = &chart.edges[*edge as usize];
-            row.guard.is_none() && row.predicates.len == 0 && chart.nodes[row.tgt as usize].kind == Kind::Connector
+            let held = row.guard.is_some() || row.predicates.len > 0 || (null && !row.null);
+            !held && chart.nodes[row.tgt as usize].kind == Kind::Connector
         })
     };
     let mut too_long = None;
@@ -28,9 +37,10 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
         if chart.nodes[start as usize].kind != Kind::Connector || mark[start as usize] != UNSEEN {
             continue;
         }
-        let mut open = vec![(start, next_of(start))];
+        // Each with the transition that led to it.
+        let mut open = vec![(start, next_of(start), NONE)];
         mark[start as usize] = OPEN;
-        while let Some((node, edges)) = open.last_mut() {
+        while let Some((node, edges, _)) = open.last_mut() {
             let node = *node;
             let Some(edge) = edges.next() else {
                 open.pop();
@@ -38,7 +48,7 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
                 if length[node as usize] > limits::CONNECTOR_CHAIN {
                     too_long = Some(node);
                 }
-                if let Some((before, _)) = open.last() {
+                if let Some((before, ..)) = open.last() {
                     let through = length[node as usize] + 1;
                     length[*before as usize] = length[*before as usize].max(through);
                 }
@@ -48,12 +58,14 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
             match mark[target as usize] {
                 UNSEEN => {
                     mark[target as usize] = OPEN;
-                    open.push((target, next_of(target)));
+                    open.push((target, next_of(target), edge));
                 }
                 OPEN => {
-                    let circle: Vec<NodeId> =
-                        open.iter().map(|(n, _)| NodeId(*n)).skip_while(|n| n.0 != target).collect();
-                    findings.push(circle_finding(chart, &circle, EdgeId(edge)));
+                    let from = open.iter().position(|step| step.0 == target).unwrap_or(0);
+                    let circle: Vec<NodeId> = open[from..].iter().map(|step| NodeId(step.0)).collect();
+                    let mut edges: Vec<u32> = open[from + 1..].iter().map(|step| step.2).collect();
+                    edges.push(edge);
+                    findings.extend(circle_finding(chart, &circle, &edges, null));
                 }
                 _ => {
                     let longest = length[target as usize] + 1;
@@ -62,7 +74,7 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
             }
         }
     }
-    if let Some(node) = too_long {
+    if let Some(node) = too_long.filter(|_| !null) {
         let node = NodeId(node);
         findings.push(
             Finding::error(
@@ -80,14 +92,47 @@ pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
     }
 }
 
-fn circle_finding(chart: &Chart, circle: &[NodeId], closing: EdgeId) -> Finding {
+/// Of a circle that needs no event: an error. Of one that does: a warning, with what opens it.
+fn circle_finding(chart: &Chart, circle: &[NodeId], edges: &[u32], null: bool) -> Option<Finding> {
     let mut names: Vec<String> = circle.iter().map(|node| format!("`{}`", chart.fqn(*node))).collect();
     names.extend(names.first().cloned());
-    Finding::error(codes::CHART_CONNECTOR_CIRCLE, format!("connectors lead round in a circle: {}", names.join(" → ")))
-        .at(chart.edge_origin(closing))
-        .labelled("this transition closes the circle")
-        .path(chart.fqn(circle[0]).to_string())
-        .help("let one of these transitions end in a state")
+    let round = format!("connectors lead round in a circle: {}", names.join(" → "));
+    let closing = EdgeId(*edges.last()?);
+    let at = |finding: Finding| {
+        let finding = finding.at(chart.edge_origin(closing)).labelled("this transition closes the circle");
+        finding.path(chart.fqn(circle[0]).to_string())
+    };
+    if null {
+        let finding = Finding::error(codes::CHART_CONNECTOR_CIRCLE, round);
+        return Some(at(finding).help("let one of these transitions end in a state"));
+    }
+    let listed: Vec<&[EventId]> = edges
+        .iter()
+        .map(|edge| &chart.edges[*edge as usize])
+        .filter(|row| !row.null)
+        .map(|row| row.events.of(&chart.triggers))
+        .collect();
+    // One that needs no event was an error.
+    let (first, rest) = listed.split_first()?;
+    let alone = first.iter().find(|event| rest.iter().all(|other| other.contains(event)));
+    let opened = match alone {
+        Some(event) => format!("on `{}` ", chart.event_text(*event)),
+        None => {
+            let mut events: Vec<String> = Vec::new();
+            for event in listed.iter().filter_map(|list| list.first()) {
+                let text = format!("`{}`", chart.event_text(*event));
+                if !events.contains(&text) {
+                    events.push(text);
+                }
+            }
+            format!("when {} come in one step ", events.join(" and "))
+        }
+    };
+    let finding = Finding::warning(codes::CHART_CONNECTOR_CIRCLE, format!("{opened}{round}"));
+    Some(
+        at(finding)
+            .help("then no transition is taken, where rFSM overflows its stack: let one of these end in a state"),
+    )
 }
 
 /// Warnings and remarks.
@@ -298,7 +343,7 @@ fn never_fails(chart: &Chart, edge: u32, always: &mut [Option<bool>]) -> bool {
         Kind::Connector => match always[row.tgt as usize] {
             Some(known) => known,
             None => {
-                // Chains without guards are bounded and have no circles.
+                // Chains without guards and events are bounded and have no circles.
                 let found = chart.nodes[row.tgt as usize].out.ids().any(|edge| never_fails(chart, edge, always));
                 always[row.tgt as usize] = Some(found);
                 found

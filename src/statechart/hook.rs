@@ -201,7 +201,7 @@ pub trait Hook {
         None
     }
 
-    /// A chain of connectors went round in a circle, held by no guard; no path was found there.
+    /// A chain of connectors went round in a circle, held by nothing; no transition is taken in this step.
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
         let _ = (chart, connector);
     }

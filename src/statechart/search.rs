@@ -8,6 +8,11 @@
 //! Without guards, whether a connector leads on depends on the events alone; so each connector is searched once a step,
 //! and a net of connectors costs its number of transitions, not its number of paths. With guards every visit counts,
 //! because guards may do things.
+//!
+//! Connectors may lead round in a circle that only several events together open, or that guards hold. When all of it is open,
+//! rFSM overflows its stack, which ends the step with an error. Here the search is lost: it finds no path, none further in
+//! either, and that is told ([`Hook::runaway`]). Without guards a circle is known when a connector is met again on the way to
+//! it; with guards only after [`limits::CONNECTOR_CHAIN`] connectors, since a guard may say something else each time.
 
 use super::EdgeId;
 use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
@@ -33,7 +38,12 @@ pub(super) struct Search {
     memo: Vec<(u32, u32)>,
     step: u32,
     work: u64,
+    /// Connectors led round in this step: nothing is found any more.
+    lost: bool,
 }
+
+/// What is noted of a connector while it is searched: whoever meets it then has gone round.
+const OPEN: u32 = NONE - 1;
 
 /// What the functions called by a search may see.
 pub(super) struct Around<'a> {
@@ -80,7 +90,7 @@ impl Search {
     pub fn new(chart: &Chart) -> Self {
         let memo = if chart.unguarded { vec![(0, NONE); chart.nodes.len()] } else { Vec::new() };
         // One more for the segment that leaves a state: without guards its search stops at the first way.
-        Self { ways: Vec::with_capacity(chart.connector_edges as usize + 1), memo, step: 0, work: 0 }
+        Self { ways: Vec::with_capacity(chart.connector_edges as usize + 1), memo, step: 0, work: 0, lost: false }
     }
 
     /// Makes room for the nodes of a chart that has grown.
@@ -101,6 +111,7 @@ impl Search {
     /// A new step: other events.
     pub fn begin(&mut self) {
         self.ways.clear();
+        self.lost = false;
         self.step = self.step.wrapping_add(1);
         if self.step == 0 {
             self.memo.fill((0, NONE));
@@ -110,7 +121,12 @@ impl Search {
 
     /// The first way of all that lead from `node` to a leaf, or [`NONE`].
     pub fn from(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook) -> u32 {
-        self.find(chart, node, around, hook, 0)
+        if self.lost { NONE } else { self.find(chart, node, around, hook, 0) }
+    }
+
+    /// Whether connectors led round in this step: then no transition is taken in it.
+    pub fn is_lost(&self) -> bool {
+        self.lost
     }
 
     fn find(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook, chain: usize) -> u32 {
@@ -118,11 +134,14 @@ impl Search {
         let is_connector = row.kind == Kind::Connector;
         if is_connector && chart.unguarded {
             let (step, found) = self.memo[node as usize];
-            if step == self.step {
+            if step == self.step && found != OPEN {
                 return found;
             }
+            self.lost = step == self.step;
+            self.memo[node as usize] = (self.step, OPEN);
         }
-        if chain > limits::CONNECTOR_CHAIN {
+        if self.lost || chain > limits::CONNECTOR_CHAIN {
+            self.lost = true;
             hook.runaway(chart, NodeId(node));
             return NONE;
         }
@@ -136,6 +155,7 @@ impl Search {
             let then = match chart.nodes[edge_row.tgt as usize].kind {
                 Kind::Leaf => NONE,
                 Kind::Connector => match self.find(chart, edge_row.tgt, around, hook, chain + 1) {
+                    NONE if self.lost => return NONE,
                     NONE => continue,
                     then => then,
                 },

@@ -206,6 +206,10 @@ impl Hook for Trace {
         self.notes.push(format!("conflicting transitions from src {} to {}", chart.fqn(connector), targets.join(", ")));
     }
 
+    fn runaway(&mut self, chart: &Chart, connector: NodeId) {
+        self.notes.push(format!("connectors lead round in a circle at {}: no path is taken", chart.fqn(connector)));
+    }
+
     fn not_entered(&mut self, chart: &Chart) {
         self.notes.push(format!("failed to enter, no valid path from {}", chart.fqn(chart.initial())));
     }

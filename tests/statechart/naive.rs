@@ -71,6 +71,9 @@ pub struct Naive {
     queue: Vec<String>,
     now: i128,
     rich: Rich,
+    lost: bool,
+    /// Steps in which connectors led round.
+    pub rounds: usize,
     calls: BTreeMap<usize, usize>,
     /// How far the activity of the leaf is; none: it is through, or there is none.
     doo: Option<usize>,
@@ -159,6 +162,8 @@ impl Naive {
             queue: vec!["e_init_fsm".to_owned()],
             now: 0,
             rich,
+            lost: false,
+            rounds: 0,
             calls: BTreeMap::new(),
             doo: None,
             said: Vec::new(),
@@ -260,13 +265,14 @@ impl Naive {
         Some(())
     }
 
-    /// Whether connectors lead round in a circle.
-    pub fn has_circle(&self) -> bool {
+    /// Whether connectors lead round in a circle; where `null`, one that needs no event.
+    pub fn has_circle(&self, null: bool) -> bool {
         self.connectors.iter().any(|start| {
             let mut seen = BTreeSet::new();
             let mut todo = vec![start.clone()];
             while let Some(at) = todo.pop() {
-                for trans in self.outgoing.get(&at).into_iter().flatten() {
+                let outgoing = self.outgoing.get(&at).into_iter().flatten();
+                for trans in outgoing.filter(|trans| !null || trans.events.is_empty()) {
                     if trans.tgt == *start {
                         return true;
                     }
@@ -332,22 +338,32 @@ impl Naive {
         false
     }
 
-    fn paths(&mut self, node: &str, events: &[String]) -> Tree {
-        let mut ways = Vec::new();
+    /// All paths from a node; none at all in this step once connectors led round in a circle (`behind` are those on the way).
+    fn paths(&mut self, node: &str, behind: &[String], events: &[String]) -> Tree {
+        let mut ways: Vec<(Trans, Tree)> = Vec::new();
+        self.lost |= behind.iter().any(|before| before == node);
+        let mut way = behind.to_vec();
+        way.push(node.to_owned());
         for trans in self.outgoing.get(node).cloned().unwrap_or_default() {
+            // Of a state only the first way is taken; without guards the others are not looked at.
+            let pure = self.rich.guard.is_empty() && self.rich.predicates.is_empty();
+            let seen_enough = self.states.contains(node) && pure && !ways.is_empty();
+            if self.lost || seen_enough {
+                break;
+            }
             if !self.enabled(&trans, events) {
                 continue;
             }
             if self.leaves.contains(&trans.tgt) {
                 ways.push((trans.clone(), Tree(Vec::new())));
             } else if self.connectors.contains(&trans.tgt) {
-                let then = self.paths(&trans.tgt, events);
+                let then = self.paths(&trans.tgt, &way, events);
                 if !then.0.is_empty() {
                     ways.push((trans.clone(), then));
                 }
             }
         }
-        Tree(ways)
+        Tree(if self.lost { Vec::new() } else { ways })
     }
 
     fn take(&mut self, tree: &Tree, events: &[String]) {
@@ -459,7 +475,9 @@ impl Naive {
             let mut idle = false;
             let mut counts = true;
             if self.active.is_empty() {
-                let tree = self.paths("root.initial", &events);
+                self.lost = false;
+                let tree = self.paths("root.initial", &[], &events);
+                self.rounds += usize::from(self.lost);
                 if tree.0.is_empty() {
                     let text = "failed to enter fsm root root, no valid path from root.initial";
                     self.said.push(format!("ERR ERROR: {text} nil"));
@@ -471,7 +489,9 @@ impl Naive {
             } else if !events.is_empty() {
                 let mut from_outside = self.active.clone();
                 from_outside.sort_by_key(|s| s.matches('.').count());
-                let found = from_outside.iter().map(|s| self.paths(s, &events)).find(|tree| !tree.0.is_empty());
+                self.lost = false;
+                let found = from_outside.iter().map(|s| self.paths(s, &[], &events)).find(|tree| !tree.0.is_empty());
+                self.rounds += usize::from(self.lost);
                 match found {
                     Some(tree) => {
                         self.take(&tree, &events);

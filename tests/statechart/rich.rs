@@ -228,7 +228,7 @@ fn side_by_side(bytes: &[u8], functions: &[u8], script: &[u8]) -> Result<(&'stat
     let model = chart(bytes);
     let mut maker = Maker { choices: Choices(functions, 0), rich: Rich::default(), programs: 0, transitions: 0 };
     maker.state(&model.root, "root");
-    let Some(mut naive) = Naive::with(&model, maker.rich.clone()).filter(|naive| !naive.has_circle()) else {
+    let Some(mut naive) = Naive::with(&model, maker.rich.clone()).filter(|naive| !naive.has_circle(false)) else {
         return Ok(("refused", 0));
     };
     let text = lua(&model, &maker.rich);

@@ -119,6 +119,69 @@ fn circles_of_connectors_are_refused() {
     refused(vec![s("a", vec![]), t("initial", "a", ""), t("initial", "initial", "")], "chart::connector_circle");
 }
 
+/// A circle that only several events open in one step: each alone finds its way, together they find none, in the states
+/// further in either. rFSM overflows its stack.
+#[test]
+fn a_circle_held_by_events_works() {
+    let model = root(vec![
+        s("a", vec![]),
+        s("b", vec![]),
+        c("k"),
+        c("l"),
+        t("initial", "a", ""),
+        t("a", "k", "e"),
+        t("k", "l", "e2"),
+        t("l", "k", "e3"),
+        t("l", "b", ""),
+        t("b", "a", "back"),
+        t("a", "b", "e3"),
+    ]);
+    let (chart, findings) = davit::statechart::compile(&model);
+    let circle: Vec<_> = findings.iter().filter(|f| f.code.0 == "chart::connector_circle").collect();
+    let [one] = &circle[..] else { panic!("{findings:?}") };
+    assert!(!one.is_error() && one.message.starts_with("when `e2` and `e3` come in one step"), "{}", one.message);
+    let chart = chart.expect("accepted");
+    let mut sim = Sim::new(&chart);
+    line(&mut sim, "run");
+    let seen = line(&mut sim, "e e2 e3");
+    assert_eq!((seen.active.last().unwrap().as_str(), seen.transition), ("root.a", false));
+    assert_eq!(seen.notes, ["connectors lead round in a circle at root.k: no path is taken"]);
+    assert_eq!(line(&mut sim, "e e2").active.last().unwrap(), "root.b");
+    line(&mut sim, "back");
+    assert_eq!(line(&mut sim, "e3").active.last().unwrap(), "root.b", "what was lost is found in the next step");
+    // One event opens it alone: a warning that says so.
+    let model =
+        root(vec![s("a", vec![]), c("k"), t("initial", "a", ""), t("a", "k", "e"), t("k", "k", "e"), t("k", "a", "")]);
+    let (chart, findings) = davit::statechart::compile(&model);
+    assert!(chart.is_some() && findings.iter().any(|f| f.message.starts_with("on `e` connectors")), "{findings:?}");
+}
+
+/// Circles inside circles that guards hold end soon, too.
+#[test]
+fn many_ways_round_are_not_all_gone() {
+    let guarded = |src, tgt| {
+        let mut one = transition(src, tgt, "");
+        one.guard = function(1);
+        Part::Trans(one)
+    };
+    let model = root(vec![
+        s("a", vec![]),
+        c("k"),
+        t("initial", "a", ""),
+        t("a", "k", "e"),
+        guarded("k", "k"),
+        guarded("k", "k"),
+        guarded("k", "k"),
+        t("k", "a", ""),
+    ]);
+    let mut run = Run::of(&model, Scripted::default().function(1, |_| 1));
+    run.run();
+    run.hook.take();
+    run.send("e");
+    run.run();
+    assert_eq!(run.hook.log.iter().filter(|l| l.starts_with("runaway root.")).count(), 1);
+}
+
 #[test]
 fn a_circle_held_by_a_guard_works() {
     let mut guarded = transition("k", "l", "");
