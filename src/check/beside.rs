@@ -7,7 +7,7 @@
 //! component, that is said; a few coordinators are then followed together as well (`joint`).
 
 use super::coordinator::ask_of;
-use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
+use crate::model::codes::{COORD_REQUEST_REFUSED, COORD_SHARED, DEPLOY_EVENT_UNHEARD, UNKNOWN_COMPONENT};
 use crate::model::{
     Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Severity, Target,
 };
@@ -68,6 +68,34 @@ pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
         _ => None,
     })
     .collect()
+}
+
+/// Who asks for a configuration that makes the component which a finding of the `number`-th coordinator alone misses: that
+/// coordinator's number, and the configuration with the component.
+pub fn maker(
+    deployment: &Deployment,
+    charts: &[&Chart],
+    number: usize,
+    finding: &Finding,
+) -> Option<(usize, ConfigId, ComponentName)> {
+    let makes = |configuration: &Configuration| {
+        configuration.changes.iter().find_map(|change| match &change.kind {
+            ChangeKind::Create { component, .. } if misses(finding, *component) => Some((configuration.id, *component)),
+            _ => None,
+        })
+    };
+    let others = (0..charts.len()).filter(|other| *other != number);
+    others.into_iter().find_map(|other| {
+        let asked = asked(deployment, charts[other]);
+        let own = deployment.configurations.iter().filter(|c| asked.contains(&c.id));
+        own.into_iter().find_map(makes).map(|(id, component)| (other, id, component))
+    })
+}
+
+/// Whether a finding is that this component is not there.
+fn misses(finding: &Finding, component: ComponentName) -> bool {
+    matches!(finding.code, UNKNOWN_COMPONENT | COORD_REQUEST_REFUSED)
+        && finding.message.ends_with(&format!("there is no component `{component}`"))
 }
 
 /// What the configurations of different coordinators touch together: one finding for each pair of coordinators. `verified`:

@@ -22,8 +22,9 @@ mod world;
 
 use crate::model::codes::{
     CLASH, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED,
+    UNKNOWN_COMPONENT,
 };
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Severity, finding};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Ident, Severity, finding};
 use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
@@ -114,6 +115,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     }
     let mut looked = Looked {
         charts: charts.iter().collect(),
+        names: deployment.coordinators(),
         entangled: false,
         catalogue,
         findings,
@@ -147,6 +149,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 /// What following the coordinators found.
 struct Looked<'a> {
     charts: Vec<&'a Chart>,
+    names: Vec<Ident>,
     /// They touch the same components: what one alone leads to is not all there is to know.
     entangled: bool,
     catalogue: &'a Catalogue,
@@ -219,6 +222,17 @@ impl Looked<'_> {
         self.alone.push(exploration);
         traced.sort_by_key(|(f, _)| std::cmp::Reverse(f.severity));
         for (mut finding, way) in traced {
+            // Alone, it never meets what another one makes.
+            if let Some((other, by, component)) = beside::maker(deployment, &self.charts, number, &finding) {
+                if finding.code == UNKNOWN_COMPONENT {
+                    continue;
+                }
+                let other = self.names[other];
+                finding.help = Some(format!(
+                    "`{component}` comes with `{by}`, which `{other}` asks for: ask for this one when that is there, \
+                     which `{other}` can tell by an event"
+                ));
+            }
             // What functions decide, or what the components of another coordinator would change, is not known here.
             if (!chart.is_pure() || self.entangled) && finding.severity == Severity::Error {
                 finding.severity = Severity::Warning;

@@ -102,6 +102,18 @@ fn a_refusal_because_of_the_other_names_both_and_comes_with_a_way() {
     assert_eq!(json["explored"]["complete"], true);
 }
 
+/// A component that another coordinator's configuration makes is not unknown.
+#[test]
+fn what_another_one_makes_is_not_missed() {
+    let (json, _) = holders(&["arm", "gripper"], |_| "arm".to_owned());
+    assert!(of_code(&json, "conf::unknown_component").is_empty(), "{json:#}");
+    let refused = of_code(&json, "coord::request_refused");
+    let message = "`gripper_high` is refused when it is asked for: there is no component `armDrive`";
+    let one = refused.iter().find(|f| f["message"] == message).unwrap_or_else(|| panic!("{json:#}"));
+    let help = one["help"].as_str().unwrap();
+    assert!(help.contains("`arm_base`, which `arm` asks for"), "{help}");
+}
+
 #[test]
 fn more_than_a_few_are_followed_one_by_one() {
     let (json, text) = holders(&["a", "b", "c", "d"], str::to_owned);
