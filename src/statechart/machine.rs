@@ -340,9 +340,6 @@ impl Machine {
                 }
             }
             let way = self.find(chart, node.0, hook);
-            if self.search.is_lost() {
-                break;
-            }
             if way != NONE {
                 self.trace_path(chart, way, hook);
                 self.execute(chart, way, now, hook);

@@ -61,7 +61,7 @@ impl Around<'_> {
 
 /// The first look at a state's transitions.
 pub(super) enum Straight {
-    /// None of them is enabled.
+    /// None of them is enabled, or the search is lost.
     None,
     /// This one is taken: it leads to a leaf.
     Leaf(u32),
@@ -72,6 +72,9 @@ pub(super) enum Straight {
 impl Search {
     /// Whether the first enabled transition of `node` needs no search. Only for charts without guards.
     pub fn straight(&mut self, chart: &Chart, node: u32, events: &[EventId]) -> Straight {
+        if self.lost {
+            return Straight::None;
+        }
         for edge in chart.nodes[node as usize].out.ids() {
             self.work += 1;
             let row = &chart.edges[edge as usize];
@@ -122,11 +125,6 @@ impl Search {
     /// The first way of all that lead from `node` to a leaf, or [`NONE`].
     pub fn from(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook) -> u32 {
         if self.lost { NONE } else { self.find(chart, node, around, hook, 0) }
-    }
-
-    /// Whether connectors led round in this step: then no transition is taken in it.
-    pub fn is_lost(&self) -> bool {
-        self.lost
     }
 
     fn find(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook, chain: usize) -> u32 {
