@@ -202,6 +202,24 @@ pub const TURN_INSTRUCTIONS: u32 = 20;
 /// Instructions between two looks at a call's budget.
 pub const CALL_LOOK: u32 = 1_000;
 
+/// The same where every instruction is counted, in simulated time: single ones may take long, so looks are closer. What
+/// costs is that there are looks at all.
+pub const CALL_LOOK_EXACT: u32 = 100;
+
+/// Elements of a list, or bytes of a text, that a function of Lua's library goes through in the time of one instruction.
+pub const CALL_ELEMENTS: u64 = 4;
+
+/// Bytes of memory that a call may ask for in the place of one instruction, counted of pieces of at least this: together
+/// half a gigabyte, a tenth of a second of copying.
+pub const CALL_BYTES: usize = 512;
+
+/// Processor time of one call in simulated time, a hundred times what its instructions take: for what no count sees (a
+/// comparison of texts of megabytes is one instruction).
+pub const CALL_TIME: Duration = Duration::from_secs(10);
+
+/// The same of a script.
+pub const SCRIPT_TIME: Duration = Duration::from_secs(60);
+
 /// Processor time of its thread after which a call on the real clock has its instructions counted (at the latest after
 /// twice this). Longer than a good function takes, whose calls then cost nothing but themselves; shorter than anybody
 /// waits for a reaction.

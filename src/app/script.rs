@@ -8,6 +8,7 @@ mod values;
 
 use super::{Refused, StartError};
 use crate::lang::LoadOptions;
+use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ComponentName, ConfigId, EventName, MemberRef};
 use crate::runtime::Libraries;
@@ -122,10 +123,11 @@ fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure>
         syntax: matches!(error, mlua::Error::SyntaxError { .. }),
         message: sandbox::message(&error),
     };
-    let lua = sandbox::state().map_err(failed)?;
+    let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
     let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
-    chunk.set_mode(mlua::chunk::ChunkMode::Text).exec().map_err(failed)
+    let chunk = chunk.set_mode(mlua::chunk::ChunkMode::Text);
+    guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || chunk.exec()).map_err(failed)
 }
 
 /// Every function a script may call, for the help of an unknown one and for the documentation's test.

@@ -1,6 +1,7 @@
 //! A machine with its tables, and what a call may see of it and send to it.
 
-use super::budget::{Budget, message_of, undefined_global};
+use super::budget::Budget;
+use super::errors::{message_of, undefined_global};
 use super::host::{Host, Voice};
 use super::tables::Tables;
 use crate::limits;

@@ -8,16 +8,33 @@ use mlua::{Lua, Result};
 use std::cell::Cell;
 #[cfg(target_os = "linux")]
 use std::cell::OnceCell;
+use std::ffi::CStr;
 use std::rc::Rc;
+use std::time::Duration;
+
+/// What an error says inside a call that is over; outside it is [`Budget::error`].
+pub const ENDED: &CStr = c"ended: its instructions are used up";
 
 /// Counts the instructions of the call under way. Once they are used up every look fails, and what protects calls in Lua
 /// passes that on, so that the call ends wherever it is.
 ///
-/// Counting costs more than most calls. It is exact, from the first instruction on, until [`Budget::count_late`].
+/// Counting costs more than most calls. It is exact, from the first instruction on, until [`Budget::count_late`]. What
+/// instructions set in motion (`work.rs`) is always counted.
 #[derive(Default)]
 pub struct Budget {
     used: Cell<u64>,
+    /// Of these, what was done beside instructions: elements gone through, memory asked for, steps of patterns.
+    work: Cell<u64>,
+    /// Of these, what ticks stand for.
+    ticks: Cell<u64>,
     limit: Cell<u64>,
+    /// Processor time of one call where every instruction is counted: for what no count sees.
+    time: Duration,
+    began: Cell<Duration>,
+    looks: Cell<u32>,
+    /// A large piece of memory was asked for: single instructions may take long.
+    large: Cell<bool>,
+    out_of_time: Cell<bool>,
     depth: Cell<u32>,
     over: Cell<bool>,
     /// Finds the calls that take long; none: all are counted.
@@ -25,11 +42,19 @@ pub struct Budget {
     watch: OnceCell<Watch>,
 }
 
+/// Looks at the count between two looks at the time.
+const LOOKS_WITHOUT_TIME: u32 = 10;
+
+/// Bytes of a piece of memory with which a single instruction may take long.
+const LARGE: usize = 256 * 1024;
+
+const LONG: &str = "are there very long texts or lists?";
+
 impl Budget {
-    /// Puts a budget on all code of a Lua state, coroutines included.
-    pub fn install(lua: &Lua) -> Result<Rc<Self>> {
-        lua.set_memory_limit(limits::FUNCTIONS_BYTES)?;
-        let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), ..Self::default() });
+    /// Puts a budget on all code of a Lua state, coroutines included. `time` is the processor time that a call may take
+    /// where all is counted.
+    pub fn install(lua: &Lua, time: Duration) -> Result<Rc<Self>> {
+        let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), time, ..Self::default() });
         exact::begin(lua)?;
         Ok(budget)
     }
@@ -40,7 +65,14 @@ impl Budget {
         #[cfg(target_os = "linux")]
         {
             let budget = Rc::downgrade(self);
-            let look = move |instructions| budget.upgrade().is_some_and(|budget| budget.look(instructions));
+            let look = move |instructions| {
+                budget.upgrade().is_some_and(|budget| {
+                    if instructions == limits::CALL_TICK_INSTRUCTIONS {
+                        budget.ticks.set(budget.ticks.get() + u64::from(instructions));
+                    }
+                    budget.look(instructions)
+                })
+            };
             if let Some(watch) = Watch::start(lua, look)
                 && exact::end(lua).is_ok()
             {
@@ -66,7 +98,43 @@ impl Budget {
 
     /// So many instructions more; whether they are too many.
     pub(super) fn look(&self, instructions: u32) -> bool {
-        self.used.set(self.used.get() + u64::from(instructions));
+        self.add(u64::from(instructions))
+    }
+
+    /// The same where every instruction is counted; there the time is looked at too, for what no count sees: instructions
+    /// that compare texts of megabytes, or pass a million values.
+    pub(super) fn look_exactly(&self, instructions: u32) -> bool {
+        self.looks.set(self.looks.get().wrapping_add(1));
+        // Asking for the time takes as long as some twenty instructions.
+        if (self.large.get() || self.looks.get().is_multiple_of(LOOKS_WITHOUT_TIME))
+            && processor_time().saturating_sub(self.began.get()) > self.time
+        {
+            self.out_of_time.set(true);
+            self.over.set(true);
+        }
+        self.look(instructions) || self.over.get()
+    }
+
+    /// Something goes through so many elements; whether that is too much.
+    pub(super) fn gone_through(&self, elements: u64) -> bool {
+        self.more_work(elements / limits::CALL_ELEMENTS)
+    }
+
+    /// Memory is asked for; whether that is too much.
+    pub(super) fn allocated(&self, bytes: usize) -> bool {
+        if bytes >= LARGE {
+            self.large.set(true);
+        }
+        self.more_work((bytes / limits::CALL_BYTES) as u64)
+    }
+
+    fn more_work(&self, instructions: u64) -> bool {
+        self.work.set(self.work.get().saturating_add(instructions));
+        self.add(instructions)
+    }
+
+    fn add(&self, instructions: u64) -> bool {
+        self.used.set(self.used.get().saturating_add(instructions));
         let over = self.used.get() > self.limit.get();
         if over {
             self.over.set(true);
@@ -83,14 +151,25 @@ impl Budget {
                 return true;
             }
             steps = 0;
-            !self.look(limits::CALL_LOOK)
+            !self.more_work(u64::from(limits::CALL_LOOK))
         }
     }
 
-    /// What a call whose budget is used up ends with.
+    /// What a call whose budget is used up ends with: what it was used up by.
     pub fn error(&self) -> mlua::Error {
-        let limit = self.limit.get() / 1_000_000;
-        mlua::Error::runtime(format!("ended after {limit} million instructions: is there an endless loop?"))
+        let (used, millions) = (self.used.get(), self.limit.get() / 1_000_000);
+        let text = if self.out_of_time.get() {
+            format!("ended after {} s of processor time: {LONG}", self.time.as_secs())
+        } else if self.ticks.get() > used / 2 {
+            let ticks = self.ticks.get() / u64::from(limits::CALL_TICK_INSTRUCTIONS);
+            let seconds = limits::CALL_TICK.as_secs_f64() * ticks as f64;
+            format!("ended after {seconds:.1} s of processor time: {LONG}")
+        } else if self.work.get() > used / 2 {
+            format!("ended: what it let the library do counts as more than {millions} million instructions: {LONG}")
+        } else {
+            format!("ended after {millions} million instructions: is there an endless loop?")
+        };
+        mlua::Error::runtime(text)
     }
 
     /// Makes a call of at most `limit` instructions. A call inside another shares the outer one's budget.
@@ -107,8 +186,15 @@ impl Budget {
         if !outermost {
             return call();
         }
-        self.used.set(0);
+        for counter in [&self.used, &self.work, &self.ticks] {
+            counter.set(0);
+        }
         self.limit.set(limit);
+        if !self.counts_late() {
+            self.began.set(processor_time());
+            self.looks.set(0);
+            self.out_of_time.set(false);
+        }
         let outcome = exact::during(self, || self.watched(call));
         drop(leave);
         if self.over.replace(false) {
@@ -131,25 +217,14 @@ impl Budget {
     }
 }
 
-/// The text of an error, with file and line where Lua knows them, without stack traces.
-pub fn message_of(error: &mlua::Error) -> String {
-    let text = match error {
-        mlua::Error::CallbackError { cause, .. } => return message_of(cause),
-        mlua::Error::SyntaxError { message, .. }
-        | mlua::Error::RuntimeError(message)
-        | mlua::Error::MemoryError(message) => message.clone(),
-        other => other.to_string(),
-    };
-    let text = text.split("\nstack traceback:").next().unwrap_or_default();
-    let text = text.strip_prefix("runtime error: ").unwrap_or(text);
-    if text.contains("not enough memory") {
-        let mb = limits::FUNCTIONS_BYTES / 1024 / 1024;
-        return format!("needs more than the {mb} MB of memory that the coordinator's functions may hold");
+/// The processor's time that this thread has used. Not the time of day: a busy machine must not refuse what an idle one
+/// takes.
+pub fn processor_time() -> Duration {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is a valid place to write to, and the call keeps no reference to it.
+    let answer = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+    if answer != 0 {
+        return Duration::ZERO;
     }
-    text.to_owned()
-}
-
-/// The global name that an error found undefined.
-pub fn undefined_global(message: &str) -> Option<&str> {
-    message.split("(global '").nth(1)?.split('\'').next().filter(|name| !name.is_empty())
+    Duration::new(u64::try_from(time.tv_sec).unwrap_or(0), u32::try_from(time.tv_nsec).unwrap_or(0))
 }

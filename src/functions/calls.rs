@@ -14,10 +14,10 @@ use std::sync::Arc;
 
 /// Calls the functions of one machine.
 pub struct Calls {
+    /// What a coordinator's functions share; an inner machine's is held by the outermost one's. It goes before the state.
+    pub(super) _host: Option<Rc<Host>>,
     pub(super) lua: Lua,
     pub(super) bound: Rc<Bound>,
-    /// What a coordinator's functions share; an inner machine's is held by the outermost one's.
-    pub(super) _host: Option<Rc<Host>>,
 }
 
 impl std::fmt::Debug for Calls {

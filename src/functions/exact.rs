@@ -41,10 +41,19 @@ pub fn during<R>(budget: &Budget, call: impl FnOnce() -> R) -> R {
     call()
 }
 
+/// Whose call is under way on this thread.
+///
+/// # Safety
+/// For who is called by Lua inside of [`during`], and is done before that is.
+pub unsafe fn current<'a>() -> Option<&'a Budget> {
+    // SAFETY: `during` put it there from a borrow that lives until it has taken it away again.
+    unsafe { CURRENT.get().as_ref() }
+}
+
 /// # Safety
 /// `state` is a living thread of Lua that belongs to this thread of the operating system.
 unsafe fn set(state: *mut lua_State, on: bool) {
-    let every = limits::CALL_LOOK.cast_signed();
+    let every = limits::CALL_LOOK_EXACT.cast_signed();
     // SAFETY: as above; `count` may be called whenever Lua calls hooks.
     unsafe {
         if on {
@@ -57,14 +66,13 @@ unsafe fn set(state: *mut lua_State, on: bool) {
 
 /// The hook. It holds nothing that a jump of Lua's would leave behind.
 unsafe extern "C-unwind" fn count(state: *mut lua_State, _: *mut ffi::lua_Debug) {
-    // SAFETY: `during` put the budget there from a borrow that lives until it has taken it away again, and Lua runs inside
-    // of that. Lua guarantees room for what is pushed here; an error ends the hook and the instruction it was called at.
+    // SAFETY: Lua runs inside of `during`. Lua guarantees room for what is pushed here; an error ends the hook and the instruction it was called at.
     unsafe {
-        let Some(budget) = CURRENT.get().as_ref() else { return };
+        let Some(budget) = current() else { return };
         if budget.counts_late() {
             set(state, false);
-        } else if budget.look(limits::CALL_LOOK) {
-            ffi::lua_pushstring(state, c"ended: its instructions are used up".as_ptr());
+        } else if budget.look_exactly(limits::CALL_LOOK_EXACT) {
+            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
             ffi::lua_error(state)
         }
     }

@@ -2,6 +2,7 @@
 
 use super::bound::Bound;
 use super::budget::Budget;
+use super::guards::{self, Guards};
 use super::lower::Spot;
 use super::native;
 use crate::limits;
@@ -56,6 +57,7 @@ impl Voice {
 /// What everything of one state shares.
 pub struct Host {
     pub budget: Rc<Budget>,
+    _guards: Guards,
     pub voice: Rc<Voice>,
     /// Where constructors were called, in order.
     pub spots: RefCell<Vec<Spot>>,
@@ -97,13 +99,15 @@ pub fn state(open: Openings, reader: Reader) -> Result<(Lua, Rc<Host>)> {
         libraries |= StdLib::OS;
     }
     let lua = Lua::new_with(libraries, LuaOptions::new().catch_rust_panics(true))?;
-    let budget = Budget::install(&lua)?;
+    let native = lua.create_table()?;
+    let guards = guards::install(&lua, &native, limits::FUNCTIONS_BYTES, limits::CALL_TIME)?;
     let spot_of = lua.create_table()?;
     let weak = lua.create_table()?;
     weak.raw_set("__mode", "k")?;
     spot_of.set_metatable(Some(weak))?;
     let host = Rc::new(Host {
-        budget,
+        budget: guards.budget.clone(),
+        _guards: guards,
         voice: Rc::default(),
         spots: RefCell::default(),
         spot_of: spot_of.clone(),
@@ -112,7 +116,7 @@ pub fn state(open: Openings, reader: Reader) -> Result<(Lua, Rc<Host>)> {
         clock: RefCell::default(),
         reader: RefCell::new(reader),
         serial: Cell::new(0),
-        native: lua.create_table()?,
+        native,
     });
     native::install(&lua, &host)?;
     host.budget.spend(limits::LUA_INSTRUCTIONS, || {

@@ -12,7 +12,9 @@ mod aside;
 mod bound;
 mod budget;
 mod calls;
+mod errors;
 mod exact;
+mod guards;
 mod host;
 mod lower;
 mod merge;
@@ -25,8 +27,11 @@ mod unset;
 mod values;
 #[cfg(target_os = "linux")]
 mod watch;
+mod work;
 
 pub use aside::Field;
-pub use budget::message_of;
+pub use budget::{Budget, processor_time};
+pub use errors::{message_of, place};
+pub use guards::{Guards, install as guard, loops};
 pub use lower::{Problem, Spot};
 pub use open::{Functions, Lab, NotOpened, Opener, Reads, read};

@@ -5,27 +5,17 @@ use super::calls::{Calls, address};
 use super::host::{Host, run};
 use super::lower::Spot;
 use super::merge::merge;
-use super::patterns;
 use super::values::to_json;
 use crate::limits;
 use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, Step};
 use crate::time::Time;
-use mlua::{Function, Lua, LuaString, MultiValue, Result, Table, Value};
+use mlua::{Function, Lua, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
 
 /// Puts all of it into `host.native`.
 pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     let native = &host.native;
     native.raw_set("make", constructor(lua, host)?)?;
-    let budget = host.budget.clone();
-    native.raw_set("over", lua.create_function(move |_, ()| Ok(budget.is_over()))?)?;
-    native.raw_set("failure", lua.create_function(|_, ()| Ok("ended: its instructions are used up"))?)?;
-    #[cfg(target_os = "linux")]
-    {
-        let (resume, close) = super::watch::functions(lua)?;
-        native.raw_set("resume", resume)?;
-        native.raw_set("close", close)?;
-    }
     let voice = host.voice.clone();
     native.raw_set(
         "printer",
@@ -62,7 +52,7 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let (shown, text) = (host.reader.borrow_mut())(&name).map_err(mlua::Error::runtime)?;
         Ok(run(lua, &shown, &text)?.pop_front().unwrap_or(Value::Nil))
     })?;
-    native.raw_set("json", lua.create_function(|_, value: Value| Ok(to_json(&value, 0)?.to_string()))?)?;
+    shared(lua, host, "json", |_, host, value: Value| Ok(to_json(&value, 0, &mut host.budget.steps())?.to_string()))?;
     shared(lua, host, "bind", |lua, host, fsm: Table| {
         if host.machines.borrow().len() >= limits::INNER_MACHINES {
             return Ok(Some(format!("a coordinator makes at most {} machines", limits::INNER_MACHINES)));
@@ -79,35 +69,9 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
             }
         }
     })?;
-    looking(lua, host)?;
     asking(lua, host)?;
     growing(lua, host)?;
     stepping(lua, host)
-}
-
-/// What is asked before a pattern function of Lua's runs.
-fn looking(lua: &Lua, host: &Rc<Host>) -> Result<()> {
-    shared(lua, host, "room", |_, _, pattern: LuaString| {
-        Ok(patterns::room(&pattern.as_bytes()).map_or(-1, |room| i64::try_from(room).unwrap_or(i64::MAX)))
-    })?;
-    shared(lua, host, "walk", |_, host, args: (LuaString, LuaString, Option<i64>, Option<i64>, bool)| {
-        let (text, pattern, from, matches, anchors) = args;
-        let (text, pattern) = (text.as_bytes(), pattern.as_bytes());
-        // Counted from the end where negative, as Lua does.
-        let from = from.unwrap_or(1);
-        let length = i64::try_from(text.len()).unwrap_or(i64::MAX);
-        let from = if from < 0 { length.saturating_add(from) } else { from.saturating_sub(1) };
-        let from = usize::try_from(from.max(0)).unwrap_or(usize::MAX);
-        let matches = matches.map_or(usize::MAX, |matches| usize::try_from(matches.max(0)).unwrap_or(usize::MAX));
-        let (anchored, pattern) = match pattern.strip_prefix(b"^").filter(|_| anchors) {
-            Some(rest) => (true, rest),
-            None => (false, &*pattern),
-        };
-        match patterns::walk(&text, pattern, from, matches, anchored, &mut host.budget.steps()) {
-            Err(patterns::Stop::Over) => Err(host.budget.error()),
-            _ => Ok(()),
-        }
-    })
 }
 
 /// A function that needs the host, which must not hold itself.

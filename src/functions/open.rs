@@ -1,8 +1,8 @@
 //! From a program to its chart, and from a program to functions that can be called.
 
 use super::aside::{self, Field};
-use super::budget::{message_of, undefined_global};
 use super::calls::{Calls, address};
+use super::errors::{message_of, undefined_global};
 use super::host::{Host, Reader, run, run_program, state};
 use super::lower::{self, Problem, Spot};
 use super::unset::Watch;
@@ -187,8 +187,8 @@ impl Opener {
 /// A Lua state with rFSM in it and no coordinator: texts that make and step machines of their own. For trying things out,
 /// and for tests of the semantics.
 pub struct Lab {
-    lua: Lua,
     host: Rc<Host>,
+    lua: Lua,
 }
 
 impl Lab {
@@ -215,7 +215,8 @@ impl Lab {
         let failed = |error: mlua::Error| NotOpened::new(name, &error);
         let values: MultiValue =
             self.host.budget.spend(limits::LUA_INSTRUCTIONS, || run(&self.lua, name, text)).map_err(failed)?;
-        values.iter().map(|value| super::values::to_json(value, 0).map_err(failed)).collect()
+        let mut any = || true;
+        values.iter().map(|value| super::values::to_json(value, 0, &mut any).map_err(failed)).collect()
     }
 
     /// What was printed since the last time.

@@ -78,6 +78,33 @@ pub fn walk(
     Ok(())
 }
 
+/// Walks through a search for a plain text from the byte `from` on, as the library compares it place by place. Bytes of one
+/// comparison are taken together: they are quick.
+///
+/// # Errors
+/// The walk did not come to its end.
+pub fn walk_plain(text: &[u8], what: &[u8], from: usize, spend: &mut dyn FnMut() -> bool) -> Walked<()> {
+    let Some((first, rest)) = what.split_first() else { return Ok(()) };
+    for at in from..text.len().saturating_sub(rest.len()) {
+        if text[at] != *first {
+            if at % 16 == 0 && !spend() {
+                return Err(Stop::Over);
+            }
+            continue;
+        }
+        let same = rest.iter().zip(&text[at + 1..]).take_while(|(a, b)| a == b).count();
+        for _ in 0..=same / 16 {
+            if !spend() {
+                return Err(Stop::Over);
+            }
+        }
+        if same == rest.len() {
+            break;
+        }
+    }
+    Ok(())
+}
+
 /// Where the single item at `at` ends: a character, a class or a set.
 fn class_end(pattern: &[u8], at: usize) -> Walked<usize> {
     let mut end = at + 1;

@@ -33,8 +33,12 @@ pub fn to_lua(lua: &Lua, json: &Json) -> Result<Value> {
     })
 }
 
-/// A Lua value as JSON; what has no counterpart by its text.
-pub fn to_json(value: &Value, level: usize) -> Result<Json> {
+/// A Lua value as JSON; what has no counterpart by its text. `spend` is asked at every value (a table may stand in a
+/// table many times over); `false`: enough.
+pub fn to_json(value: &Value, level: usize, spend: &mut dyn FnMut() -> bool) -> Result<Json> {
+    if !spend() {
+        return Err(mlua::Error::runtime("more values than can be written down"));
+    }
     Ok(match value {
         Value::Nil => Json::Null,
         Value::Boolean(v) => Json::Bool(*v),
@@ -45,11 +49,11 @@ pub fn to_json(value: &Value, level: usize) -> Result<Json> {
             let mut fields = serde_json::Map::new();
             let mut items = Vec::with_capacity(length);
             for i in 1..=length {
-                items.push(to_json(&table.raw_get::<Value>(i)?, level + 1)?);
+                items.push(to_json(&table.raw_get::<Value>(i)?, level + 1, spend)?);
             }
             table.for_each(|key: Value, inner: Value| {
                 if let Value::String(name) = &key {
-                    fields.insert(name.to_string_lossy(), to_json(&inner, level + 1)?);
+                    fields.insert(name.to_string_lossy(), to_json(&inner, level + 1, spend)?);
                 }
                 Ok(())
             })?;

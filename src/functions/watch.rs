@@ -226,7 +226,7 @@ unsafe extern "C-unwind" fn look(state: *mut lua_State, _: *mut ffi::lua_Debug) 
             instructions = limits::CALL_TICK_INSTRUCTIONS;
         }
         if (watch.look)(instructions) {
-            ffi::lua_pushstring(state, c"ended: its instructions are used up".as_ptr());
+            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
             ffi::lua_error(state)
         }
     }

@@ -134,6 +134,52 @@ fn the_coordinators_own_machine_cannot_be_stepped_from_inside() {
     told(&model("entry = function(fsm) rfsm.reset(fsm) end", ""), "ENTRY", "stepped by Davit");
 }
 
+/// What our own functions raise is a text as Lua's own errors are: with the line that called, and nothing of what is inside.
+#[test]
+fn errors_of_ours_are_texts_with_a_place() {
+    let body = "entry = function(fsm)
+        print(pcall(function() rfsm.step(fsm) end))
+        print(pcall(rfsm.load, 'absent.lua'))
+        print(xpcall(function() rfsm.load('absent.lua') end, function(why) return type(why) end))
+        print(coroutine.resume(coroutine.create(function() rfsm.reset(fsm) end)))
+        print(pcall(coroutine.wrap(function() rfsm.reset(fsm) end)))
+        print(pcall(function() rfsm.state('x') end))
+        rfsm.exit_state(fsm, fsm)
+    end";
+    let notes = model(body, "").notes(&["run"]);
+    assert_eq!(
+        notes,
+        [
+            "false model.lua:2: rfsm.step: the coordinator is stepped by Davit",
+            "false model.lua:3: `absent.lua` was not loaded before",
+            "false string",
+            "false model.lua:5: rfsm.reset: the coordinator is stepped by Davit",
+            "false model.lua:6: rfsm.reset: the coordinator is stepped by Davit",
+            "false model.lua:7: one table is wanted here, this is a string",
+            "error: ENTRY error executing entry of root.a: model.lua:8: rfsm.exit_state: the coordinator is stepped by Davit",
+        ]
+    );
+}
+
+/// A table that stands in tables many times over is not written down for ever.
+#[test]
+fn what_is_written_as_json_is_bounded() {
+    let body = "local t = {} for i = 1, 60 do t = { t, t } end
+        local m = rfsm.init(rfsm.state { err = false, warn = false, info = false,
+          x = rfsm.state {}, rfsm.trans { src='initial', tgt='x' } })
+        m._id = t require('rfsm.rfsm2json').encode(m)";
+    told(&model(&format!("entry = function() {body} end"), ""), "ENTRY", "million instructions");
+}
+
+/// The engine's turns for a machine that a model steps are counted too.
+#[test]
+fn machines_that_are_stepped_for_ever_end() {
+    let body = "local m = rfsm.init(rfsm.state { err = false, warn = false, info = false,
+          x = rfsm.state {}, rfsm.trans { src='initial', tgt='x' }, rfsm.trans { src='x', tgt='x', events={ 'e_done' } } })
+        while true do rfsm.run(m) end";
+    told(&model(&format!("entry = function() {body} end"), ""), "ENTRY", "million instructions");
+}
+
 #[test]
 fn a_step_hook_that_fails_is_told() {
     let model = Model::new(

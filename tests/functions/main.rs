@@ -8,6 +8,7 @@ mod faults;
 mod guide;
 mod lab;
 mod late;
+mod library;
 mod loading;
 mod merge;
 mod named;

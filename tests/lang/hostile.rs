@@ -48,9 +48,29 @@ fn endless_loops_end() {
         "local t = {} for i = 1, 100000 do t[i] = i % 7 end while true do table.sort(t) end",
         "local s = string.rep('x', 1000000) while true do local _ = s:upper() end",
         "local s = 'x' while #s < 8000000 do s = s .. s end while true do local _ = s .. 'y' end",
+        // What loops in the library, where no instruction is counted.
+        "table.insert(setmetatable({}, { __len = function() return 1e15 end }), 1, 0)",
+        "table.remove(setmetatable({}, { __len = function() return 1e15 end }), 1)",
+        "pcall(table.remove, setmetatable({}, { __len = function() return 1e15 end }), 1) while true do end",
+        "table.unpack(setmetatable({}, { __len = function() return 900000 end, __index = function() return 1 end })) while true do end",
+        "local t = {} for i = 1, 100000 do t[i] = i end while true do table.insert(t, 1, 1) table.remove(t, 1) end",
+        "local t = {} for i = 1, 100000 do t[i] = i end while true do select('#', table.unpack(t)) end",
+        "local t = {} for i = 1, 1000000 do t[i] = '' end while true do table.concat(t) end",
+        "local s = ('x'):rep(100000) while true do s:byte(1, -1) end",
+        "local s = ('1'):rep(1000000) while true do tonumber(s) end",
+        "string.rep('', 1e15) string.rep('', 1e15, '') while true do end",
     ] {
         assert_eq!(lua(text), ["lua::instructions"], "{text}");
     }
+}
+
+/// The line is the file's, not one of what guards it.
+#[test]
+fn a_budget_that_ends_in_the_library_is_told_at_the_line_that_called() {
+    let text = "\n\ntable.insert(setmetatable({}, { __len = function() return 1e15 end }), 1, 0)";
+    let loaded = with_configurations(text);
+    let place = loaded.sources.locate(loaded.findings[0].origin).expect("a place");
+    assert_eq!(place.line, 3);
 }
 
 #[test]

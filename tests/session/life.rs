@@ -145,6 +145,25 @@ fn a_script_that_fails_leaves_nothing_behind() {
         ("deploy('@generic_arm.yaml') wait_answer('never.ok', 1)", "`never.ok` was not heard in 1 s"),
         ("deploy('@generic_arm.yaml') local t = {} while true do t[1] = 1 end", "endless loop"),
         ("deploy('@generic_arm.yaml') while true do pcall(function() while true do end end) end", "endless loop"),
+        (
+            "deploy('@generic_arm.yaml') xpcall(function() while true do end end, function() while true do end end)",
+            "endless loop",
+        ),
+        (
+            "deploy('@generic_arm.yaml')
+             local x <close> = setmetatable({}, { __close = function() while true do end end }) while true do end",
+            "endless loop",
+        ),
+        (
+            "deploy('@generic_arm.yaml') table.insert(setmetatable({}, { __len = function() return 1e15 end }), 1, 0)",
+            "endless loop",
+        ),
+        ("deploy('@generic_arm.yaml') while true do local s = ('x'):rep(1e8) end", "million instructions"),
+        (
+            "deploy('@generic_arm.yaml') (('a'):rep(40)):find(('a?'):rep(40) .. ('a'):rep(40) .. 'b')",
+            "million instructions",
+        ),
+        ("deploy('@generic_arm.yaml') local ok, why = pcall(wait, -1) error(type(why) .. ' ' .. why, 0)", "string"),
         ("deploy('@generic_arm.yaml') deploy('@generic_arm.yaml')", "already up"),
     ] {
         let (failure, clean) = run_text(script);

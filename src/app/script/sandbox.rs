@@ -1,39 +1,22 @@
 //! The Lua that scripts run in: the language and its harmless libraries, no files, processes or network, and bounds on
-//! memory and on instructions between two of its answers.
+//! memory and on instructions, which nothing in a script outlives.
 
+use crate::functions::{self, Guards, place};
 use crate::limits;
-use mlua::{HookTriggers, Lua, LuaOptions, Result, StdLib, Value, VmState};
-use std::cell::Cell;
+use mlua::{Lua, LuaOptions, Result, StdLib, Value};
 
-/// A state for one script.
+/// A state for one script, and its guards, which go before it.
 ///
 /// # Errors
 /// When Lua has no memory for it.
-pub fn state() -> Result<Lua> {
+pub fn state() -> Result<(Lua, Guards)> {
     let lua = Lua::new_with(StdLib::TABLE | StdLib::STRING | StdLib::MATH | StdLib::UTF8, LuaOptions::default())?;
     let globals = lua.globals();
     for closed in ["load", "loadfile", "dofile", "collectgarbage", "require", "print"] {
         globals.raw_set(closed, Value::Nil)?;
     }
-    lua.set_memory_limit(limits::SCRIPT_MEMORY)?;
-    let used = Cell::new(0_u64);
-    lua.set_global_hook(HookTriggers::new().every_nth_instruction(TICK), move |lua, _| {
-        used.set(used.get() + u64::from(TICK));
-        if used.get() <= limits::SCRIPT_INSTRUCTIONS {
-            return Ok(VmState::Continue);
-        }
-        // From here on every instruction fails, so that `pcall` cannot go on.
-        lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), |_, _| Err(over()))?;
-        Err(over())
-    })?;
-    Ok(lua)
-}
-
-const TICK: u32 = 10_000;
-
-fn over() -> mlua::Error {
-    let millions = limits::SCRIPT_INSTRUCTIONS / 1_000_000;
-    mlua::Error::runtime(format!("the script ran more than {millions} million instructions: is there an endless loop?"))
+    let guards = functions::guard(&lua, &lua.create_table()?, limits::SCRIPT_MEMORY, limits::SCRIPT_TIME)?;
+    Ok((lua, guards))
 }
 
 /// The text of an error, with file and line where Lua knows them, without stack traces.
@@ -53,16 +36,6 @@ pub fn message(error: &mlua::Error) -> String {
         }
         other => other.to_string(),
     }
-}
-
-/// The innermost place of the script in a stack trace: `story.lua:12`.
-fn place(traceback: &str) -> Option<String> {
-    traceback.lines().map(str::trim).find_map(|line| {
-        let mut parts = line.splitn(3, ':');
-        let (file, number) = (parts.next()?, parts.next()?);
-        let known = !file.starts_with('[') && number.bytes().all(|b| b.is_ascii_digit()) && !number.is_empty();
-        known.then(|| format!("{file}:{number}"))
-    })
 }
 
 /// The text without a first line `#!…`, which the shell reads and Lua does not; its line stays, for the numbers.

@@ -2,6 +2,7 @@
 //!
 //! Nothing of Lua remains afterwards: the model is plain data.
 
+mod budget;
 mod constructors;
 mod convert;
 mod loading;
@@ -89,7 +90,7 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
     constructors::install(&lua, &env, shared)?;
     monitors::install(&lua, &env, shared)?;
     loading::install(&lua, &env, shared)?;
-    sandbox::start_budget(&lua, shared)?;
+    budget::start(&lua, shared)?;
     let function = chunk(&lua, shared, text, env)?;
     let returned: mlua::Value = function.call(())?;
     lua.remove_global_hook();

@@ -51,6 +51,8 @@ pub struct Recorder {
     pub classed: FxHashMap<usize, Classed>,
     /// Nodes recorded so far, against [`limits::TEXT_NODES`].
     pub nodes: usize,
+    /// Instructions so far, and what counts like them.
+    pub instructions: u64,
     /// Set once; from then on every instruction of the file fails.
     pub exhausted: Option<Exhausted>,
     /// Names of which it was said already that they are undefined.
@@ -76,6 +78,7 @@ impl Recorder {
             made: Vec::new(),
             classed: FxHashMap::default(),
             nodes: 0,
+            instructions: 0,
             exhausted: None,
             undefined: FxHashSet::default(),
             parsing: false,

@@ -3,16 +3,17 @@
 //! Absent on purpose: files, processes, network, `require` of anything but rFSM's constructors, loading of text or
 //! bytecode, the debug library, random numbers (a file must give the same model every time), finalisers (`__gc` runs
 //! where no budget can stop it), and the pattern functions of `string` (one call can run for years and is not
-//! interrupted by a hook). `table.sort` and `table.concat` are ours, since the library's run long in one instruction.
+//! interrupted by a hook). `table.sort` and `table.concat` are ours, since the library's run long in one instruction; the
+//! other functions that loop are charged before they do (`functions::loops`).
 
+use super::budget::{charge, known_metatables};
 use super::convert;
-use super::recorder::{Exhausted, Shared};
+use super::recorder::Shared;
+use crate::functions;
 use crate::limits;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Finding, codes};
-use mlua::debug::HookTriggers;
-use mlua::{Function, LightUserData, Lua, MultiValue, Table, Thread, Value, VmState};
-use std::time::Duration;
+use mlua::{Function, LightUserData, Lua, MultiValue, Table, Thread, Value};
 
 /// What of Lua's base library a file may use.
 const BASE: &[&str] = &[
@@ -69,10 +70,6 @@ const CLOSED: &[(&str, &str)] = &[
     ("coroutine.close", "coroutines end by themselves"),
 ];
 
-/// Instructions between two looks at the budgets. Library calls count as one instruction each, so it is small: between
-/// two looks a file can make only so many of them.
-const TICK: u32 = 100;
-
 const SORT: &str = "
 return function(list, less)
   less = less or function(a, b) return a < b end
@@ -95,8 +92,17 @@ end";
 
 /// The line of the Lua code that called the function that is running.
 pub fn line(lua: &Lua) -> u32 {
-    for level in 1..4 {
-        if let Some(Some(line)) = lua.inspect_stack(level, |debug| debug.current_line()) {
+    line_from(lua, 1)
+}
+
+/// The same from that level of calls on; 0 is the function that runs.
+pub fn line_from(lua: &Lua, level: usize) -> u32 {
+    for level in level..level + 5 {
+        // Not a line of what is ours.
+        let of_file = |debug: &mlua::debug::Debug<'_>| {
+            debug.current_line().filter(|_| debug.source().short_src.is_some_and(|source| source == "davit"))
+        };
+        if let Some(Some(line)) = lua.inspect_stack(level, of_file) {
             return u32::try_from(line).unwrap_or(u32::MAX);
         }
     }
@@ -106,6 +112,8 @@ pub fn line(lua: &Lua) -> u32 {
 /// The table of globals of a file.
 pub fn environment(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
     let globals = lua.globals();
+    let charge = charge(lua, shared)?;
+    functions::loops(lua, &charge)?;
     let env = lua.create_table()?;
     for name in BASE {
         env.raw_set(*name, globals.raw_get::<Value>(*name)?)?;
@@ -118,7 +126,7 @@ pub fn environment(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
         strings.raw_set("__metatable", false)?;
     }
     let table = library(lua, shared, &env, "table", TABLE)?;
-    table.raw_set("concat", lua.create_function(concat)?)?;
+    table.raw_set("concat", lua.create_function(move |lua, arguments| concat(lua, &charge, arguments))?)?;
     table.raw_set("sort", lua.load(SORT).set_name("=sort").eval::<Function>()?)?;
     let math: Table = globals.raw_get("math")?;
     for name in NOT_OF_MATH {
@@ -339,77 +347,36 @@ fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
     Ok(meta)
 }
 
-/// Starts counting. The hook is global (coroutines have it too); once a budget is used up it fires at every
-/// instruction and fails each time, so that no code of the file goes on.
-pub fn start_budget(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
-    let recorder = shared.clone();
-    let started = processor_time();
-    // Strings have a metatable, which a file can reach.
-    if let Some(meta) = lua.type_metatable::<mlua::LuaString>() {
-        known_metatables(lua)?.raw_set(meta, true)?;
-    }
-    let used = std::cell::Cell::new(0_u64);
-    lua.set_global_hook(HookTriggers::new().every_nth_instruction(TICK), move |lua, debug| {
-        let mut recorder = recorder.borrow_mut();
-        used.set(used.get() + u64::from(TICK));
-        if recorder.exhausted.is_none() {
-            let over = if used.get() > limits::LUA_INSTRUCTIONS {
-                let millions = limits::LUA_INSTRUCTIONS / 1_000_000;
-                Some((codes::LUA_INSTRUCTIONS, format!("the file runs longer than {millions} million instructions")))
-            } else if processor_time().saturating_sub(started) > limits::LUA_TIME {
-                let limit = limits::LUA_TIME.as_secs_f64();
-                Some((codes::LUA_INSTRUCTIONS, format!("the file keeps the processor longer than {limit} s")))
-            } else {
-                None
-            };
-            if let Some((code, message)) = over {
-                let line = debug.current_line().and_then(|l| u32::try_from(l).ok()).unwrap_or(1);
-                recorder.exhausted = Some(Exhausted { code, message, line });
-            }
-        }
-        if recorder.exhausted.is_none() {
-            return Ok(VmState::Continue);
-        }
-        drop(recorder);
-        close_nothing(lua)?;
-        lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), |_, _| {
-            Err(mlua::Error::runtime("the budget is used up"))
-        })?;
-        Err(mlua::Error::runtime("the budget is used up"))
-    })
-}
-
-/// The processor's time that this thread has used. Not the time of day: a busy machine must not refuse a file that an
-/// idle one takes. Library calls cannot be counted, only timed; the limit lies far beyond what any file needs.
-fn processor_time() -> Duration {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is a valid place to write to, and the call keeps no reference to it.
-    let answer = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-    if answer != 0 {
-        return Duration::ZERO;
-    }
-    Duration::new(u64::try_from(time.tv_sec).unwrap_or(0), u32::try_from(time.tv_nsec).unwrap_or(0))
-}
-
 /// `string.rep`, bounded.
 fn repeat(lua: &Lua, (text, n, separator): (mlua::LuaString, i64, Option<mlua::LuaString>)) -> mlua::Result<Value> {
     let n = usize::try_from(n).unwrap_or(0);
     let separator = separator.as_ref().map(|s| s.as_bytes().to_vec()).unwrap_or_default();
     let text = text.as_bytes();
-    if n.saturating_mul(text.len() + separator.len()) > limits::LUA_STRING {
+    let each = text.len() + separator.len();
+    if n.saturating_mul(each) > limits::LUA_STRING {
         return Err(mlua::Error::runtime("string.rep would make a text of more than 1 MB"));
     }
-    let parts = vec![text.to_vec(); n];
-    Ok(Value::String(lua.create_string(parts.join(&separator[..]))?))
+    // Nothing, however often, is nothing.
+    if n == 0 || each == 0 {
+        return Ok(Value::String(lua.create_string("")?));
+    }
+    let mut out = [&text[..], &separator[..]].concat().repeat(n);
+    out.truncate(n * each - separator.len());
+    Ok(Value::String(lua.create_string(out)?))
 }
 
 /// `table.concat`, bounded.
 fn concat(
     lua: &Lua,
+    charge: &Function,
     (list, separator, from, to): (Table, Option<mlua::LuaString>, Option<i64>, Option<i64>),
 ) -> mlua::Result<Value> {
     let separator = separator.as_ref().map(|s| s.as_bytes().to_vec()).unwrap_or_default();
-    let to = to.unwrap_or_else(|| i64::try_from(list.raw_len()).unwrap_or(0));
+    let length = i64::try_from(list.raw_len()).unwrap_or(0);
+    let to = to.unwrap_or(length);
+    // What is absent ends it.
+    let count = if list.raw_get::<Value>(to)?.is_nil() { length } else { to.saturating_sub(from.unwrap_or(1)) };
+    charge.call::<()>(count.max(0))?;
     let mut out: Vec<u8> = Vec::new();
     for i in from.unwrap_or(1)..=to {
         match list.raw_get::<Value>(i)? {
@@ -450,25 +417,6 @@ fn set_metatable(lua: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Resu
     }
     table.set_metatable(meta)?;
     Ok(table)
-}
-
-/// All metatables of a file, as the keys of a table that does not keep them.
-fn known_metatables(lua: &Lua) -> mlua::Result<Table> {
-    const KEY: &str = "davit.metatables";
-    if let Some(known) = lua.named_registry_value::<Option<Table>>(KEY)? {
-        return Ok(known);
-    }
-    let (known, weak) = (lua.create_table()?, lua.create_table()?);
-    weak.raw_set("__mode", "k")?;
-    known.set_metatable(Some(weak))?;
-    lua.set_named_registry_value(KEY, &known)?;
-    Ok(known)
-}
-
-/// Variables that close something (`local x <close>`) close nothing any more: what an error closes on its way out of a
-/// hook, or with a coroutine that has ended, runs with hooks off, where no budget reaches.
-fn close_nothing(lua: &Lua) -> mlua::Result<()> {
-    known_metatables(lua)?.for_each(|meta: Table, _: bool| meta.raw_set("__close", Value::Nil))
 }
 
 /// The text of an error, without stack traces.
