@@ -62,6 +62,7 @@ mod tests {
     #[test]
     fn an_error_of_ours_is_told_at_the_line_that_called() {
         let traceback = "stack traceback:\n\t[C]: in ?\n\t[davit]:12: in function 'pcall'\n\trfsm:391: in function 'rfsm.step'\n\tmodel.lua:5: in function <model.lua:4>";
+        #[allow(clippy::arc_with_non_send_sync)] // mlua's own field
         let error = |text: &str| Error::CallbackError {
             traceback: traceback.to_owned(),
             cause: Arc::new(Error::runtime(text.to_owned())),

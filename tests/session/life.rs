@@ -158,9 +158,8 @@ fn a_script_that_fails_leaves_nothing_behind() {
             "deploy('@generic_arm.yaml') table.insert(setmetatable({}, { __len = function() return 1e15 end }), 1, 0)",
             "endless loop",
         ),
-        ("deploy('@generic_arm.yaml') while true do local s = ('x'):rep(1e8) end", "million instructions"),
         (
-            "deploy('@generic_arm.yaml') (('a'):rep(40)):find(('a?'):rep(40) .. ('a'):rep(40) .. 'b')",
+            "deploy('@generic_arm.yaml') local _ = (('a'):rep(40)):find(('a?'):rep(40) .. ('a'):rep(40) .. 'b')",
             "million instructions",
         ),
         ("deploy('@generic_arm.yaml') local ok, why = pcall(wait, -1) error(type(why) .. ' ' .. why, 0)", "string"),
