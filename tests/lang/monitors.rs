@@ -1,6 +1,8 @@
 //! The monitor language: both spellings mean the same; a mistake in every word and name has its place and its help.
 
 use crate::helpers::{codes, load, shown};
+use davit::diagnostics::Language;
+use davit::lang::print;
 use davit::lang::{self, LoadOptions, LoadedMonitors, Sources};
 use davit::model::Monitor;
 use std::path::Path;
@@ -77,6 +79,23 @@ fn both_spellings_mean_the_same() {
     let (lua, yaml) = (good("m.lua", LUA), good("m.yaml", YAML));
     assert_eq!(lua.len(), 4);
     assert_eq!(lua, yaml);
+}
+
+/// What is written can be read by people too: what stands in several places has a name, and no line is long.
+#[test]
+fn what_is_written_repeats_nothing_and_has_lines() {
+    let text = std::fs::read_to_string("configs/youbot/monitors.lua").unwrap();
+    let lua = good("m.lua", &text);
+    for (file, language) in [("m.yaml", Language::Yaml), ("m.lua", Language::Lua)] {
+        let written = print::monitors(&lua, language);
+        assert_eq!(good(file, &written), lua, "{written}");
+        for line in written.lines() {
+            assert!(line.chars().count() <= 125 || line.contains("description"), "{line}");
+        }
+        assert_eq!(written.matches("&c1 ").count(), usize::from(language == Language::Yaml), "{written}");
+    }
+    let yaml = print::monitors(&lua, Language::Yaml);
+    assert!(yaml.matches("*c1").count() > 1 && yaml.len() < 2 * text.len(), "{} bytes\n{yaml}", yaml.len());
 }
 
 #[test]

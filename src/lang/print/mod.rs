@@ -5,6 +5,7 @@ mod kept;
 mod lua;
 mod monitor;
 pub mod scxml;
+mod wrap;
 mod yaml;
 
 pub use kept::texts as program_texts;

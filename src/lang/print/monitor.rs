@@ -1,11 +1,12 @@
 //! Printing monitors: both languages write the same words.
 
+use super::wrap::wrap;
 use super::{float, lua, seconds, yaml};
 use crate::diagnostics::Language;
 use crate::model::Monitor;
 use crate::model::monitor::{Condition, ConditionKind, Interval, Sampling, Signal, SignalKind};
+use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::time::Duration;
 
 /// A text in quotes where the language wants them.
 fn text(t: &str, language: Language) -> String {
@@ -79,10 +80,78 @@ fn signal(s: &Signal, l: Language) -> String {
     }
 }
 
-fn condition(c: &Condition, l: Language) -> String {
+/// Conditions that stand in several places. In YAML the first of them gets a name (`&c1 …`) and the others are that name
+/// (`*c1`); in Lua, where a local would have to stand somewhere, each is written out.
+#[derive(Default)]
+struct Shared {
+    /// By their text, how often they stand; what is in one counts once for all of them.
+    times: HashMap<String, usize>,
+    /// By their text, the names of those that were written.
+    names: HashMap<String, String>,
+}
+
+/// Characters of a condition before a name is shorter.
+const WORTH_A_NAME: usize = 48;
+
+impl Shared {
+    fn of(list: &[Monitor], language: Language) -> Self {
+        let mut shared = Self::default();
+        if language != Language::Lua {
+            list.iter().for_each(|monitor| shared.count(&monitor.when));
+        }
+        shared
+    }
+
+    fn count(&mut self, c: &Condition) {
+        let text = plain(c, Language::Yaml, &mut Self::default());
+        if text.len() >= WORTH_A_NAME {
+            let times = self.times.entry(text).or_insert(0);
+            *times += 1;
+            if *times > 1 {
+                return;
+            }
+        }
+        inside(c).into_iter().for_each(|inner| self.count(inner));
+    }
+}
+
+/// The conditions that a condition is made of.
+fn inside(c: &Condition) -> Vec<&Condition> {
     use ConditionKind as K;
-    let all = |list: &[Condition]| list.iter().map(|c| condition(c, l)).collect::<Vec<_>>();
-    let short = |word: &str, c: &Condition, time: Duration| method(word, &condition(c, l), &seconds(time), l);
+    match &c.kind {
+        K::Compare { .. } | K::IsTrue(_) | K::InState { .. } | K::Faulted(_) | K::Silent { .. } => Vec::new(),
+        K::All(list) | K::Any(list) => list.iter().collect(),
+        K::No(c) | K::Rise(c) | K::Fall(c) => vec![c],
+        K::Implies(a, b) => vec![a, b],
+        K::Once { condition, .. } | K::Historically { condition, .. } => vec![condition],
+        K::Since { hold, from, .. } => vec![hold, from],
+        K::ForAtLeast { condition, .. } | K::WithinLast { condition, .. } => vec![condition],
+    }
+}
+
+/// A condition, or its name where it was written before.
+fn condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
+    if shared.times.is_empty() {
+        return plain(c, l, shared);
+    }
+    let key = plain(c, l, &mut Shared::default());
+    if shared.times.get(&key).is_none_or(|times| *times < 2) {
+        return plain(c, l, shared);
+    }
+    if let Some(name) = shared.names.get(&key) {
+        return format!("*{name}");
+    }
+    // What is in it may have a name of its own, which comes first.
+    let text = plain(c, l, shared);
+    let name = format!("c{}", shared.names.len() + 1);
+    let named = format!("&{name} {text}");
+    shared.names.insert(key, name);
+    named
+}
+
+fn plain(c: &Condition, l: Language, shared: &mut Shared) -> String {
+    use ConditionKind as K;
+    let mut one = |c: &Condition| condition(c, l, shared);
     match &c.kind {
         K::Compare { left, op, right, hysteresis } => {
             let mut args = vec![signal(left, l), signal(right, l)];
@@ -96,19 +165,17 @@ fn condition(c: &Condition, l: Language) -> String {
         K::InState { component, state } => call("in_state", &[text(component.as_str(), l), text(state.as_str(), l)], l),
         K::Faulted(component) => call("faulted", &[text(component.as_str(), l)], l),
         K::Silent { port, time } => call("silent", &[text(&port.to_string(), l), seconds(*time)], l),
-        K::All(list) => many("all", &all(list), l),
-        K::Any(list) => many("any", &all(list), l),
-        K::No(c) => call("no", &[condition(c, l)], l),
-        K::Implies(a, b) => call("implies", &[condition(a, l), condition(b, l)], l),
-        K::Rise(c) => call("rise", &[condition(c, l)], l),
-        K::Fall(c) => call("fall", &[condition(c, l)], l),
-        K::Once { condition: c, interval: i } => call("once", &[condition(c, l), interval(*i, l)], l),
-        K::Historically { condition: c, interval: i } => call("historically", &[condition(c, l), interval(*i, l)], l),
-        K::Since { hold, from, interval: i } => {
-            call("since", &[condition(hold, l), condition(from, l), interval(*i, l)], l)
-        }
-        K::ForAtLeast { condition: c, time } => short("for_at_least", c, *time),
-        K::WithinLast { condition: c, time } => short("within_last", c, *time),
+        K::All(list) => many("all", &list.iter().map(one).collect::<Vec<_>>(), l),
+        K::Any(list) => many("any", &list.iter().map(one).collect::<Vec<_>>(), l),
+        K::No(c) => call("no", &[one(c)], l),
+        K::Implies(a, b) => call("implies", &[one(a), one(b)], l),
+        K::Rise(c) => call("rise", &[one(c)], l),
+        K::Fall(c) => call("fall", &[one(c)], l),
+        K::Once { condition: c, interval: i } => call("once", &[one(c), interval(*i, l)], l),
+        K::Historically { condition: c, interval: i } => call("historically", &[one(c), interval(*i, l)], l),
+        K::Since { hold, from, interval: i } => call("since", &[one(hold), one(from), interval(*i, l)], l),
+        K::ForAtLeast { condition: c, time } => method("for_at_least", &one(c), &seconds(*time), l),
+        K::WithinLast { condition: c, time } => method("within_last", &one(c), &seconds(*time), l),
     }
 }
 
@@ -118,6 +185,7 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
     if list.is_empty() {
         return if is_lua { "Monitors {}\n".to_owned() } else { "monitors: {}\n".to_owned() };
     }
+    let mut shared = Shared::of(list, language);
     let mut out = String::from(if is_lua { "Monitors {\n" } else { "monitors:\n" });
     for m in list {
         if is_lua {
@@ -131,7 +199,9 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
         if let Some(description) = &m.description {
             part("description", if is_lua { lua::quoted(description) } else { yaml::quoted(description) });
         }
-        part("when", condition(&m.when, language));
+        let when = condition(&m.when, language, &mut shared);
+        // In YAML every line of a value stands further right than its key.
+        part("when", wrap(&when, 11, if is_lua { 4 } else { 6 }));
         if let Some(raise) = m.raise {
             part("event", text(raise.as_str(), language));
         }
