@@ -3,6 +3,7 @@
 //! a model are small programs here, which `rich.rs` writes down in Lua for the engine.
 
 use davit::model::statechart::{Action, Node, Since, State, Statechart, Trigger};
+use davit::statechart::Mode;
 use std::collections::{BTreeMap, BTreeSet};
 
 #[derive(Clone, Debug)]
@@ -535,6 +536,11 @@ impl Naive {
         let mut active = self.active.clone();
         active.sort_by_key(|s| s.matches('.').count());
         active
+    }
+
+    /// The mode of the leaf.
+    pub fn leaf_mode(&self) -> Option<Mode> {
+        self.leaf.as_ref().map(|_| if self.doo.is_some() { Mode::Active } else { Mode::Done })
     }
 
     pub fn queue(&self) -> &[String] {

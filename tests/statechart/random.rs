@@ -257,7 +257,7 @@ fn side_by_side(bytes: &[u8], script: &[u8], rounds: &Cell<usize>) -> Result<&'s
         let active = naive.active();
         let theirs = (&naive.actions[..], &active[..], naive.queue(), naive.transition, idle);
         prop_assert_eq!(ours, theirs, "line {} `{}` of {:#?}", number, text, model);
-        prop_assert_eq!(seen.mode.is_some(), !active.is_empty());
+        prop_assert_eq!(seen.mode, naive.leaf_mode());
         if !seen.active.is_empty() {
             outcome = "run";
         }

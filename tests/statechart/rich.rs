@@ -270,6 +270,7 @@ fn side_by_side(bytes: &[u8], functions: &[u8], script: &[u8]) -> Result<(&'stat
         let ours = (&seen.actions[..], &seen.active[..], &seen.queue[..], seen.transition, seen.idle);
         let theirs = (&naive.actions[..], &active[..], naive.queue(), naive.transition, idle);
         prop_assert_eq!(ours, theirs, "line {} `{}` of {}", number, line, text);
+        prop_assert_eq!(seen.mode, naive.leaf_mode(), "line {} `{}` of {}", number, line, text);
         calls += naive.said.len();
         if !active.is_empty() {
             outcome = "run";
