@@ -245,7 +245,12 @@ impl<'m> Builder<'m> {
         }
         match self.lookup().resolve(scope, text) {
             Ok(node) => Some(node),
-            Err(unresolved) => {
+            Err(mut unresolved) => {
+                if text == INITIAL && self.states[scope as usize].is_some_and(|state| state.doo.is_some()) {
+                    unresolved.help =
+                        "a state with a `doo` is given none: move the activity into one of the states inside"
+                            .to_owned();
+                }
                 self.findings.push(
                     Finding::error(codes::CHART_UNKNOWN_STATE, unresolved.message)
                         .at(*origin)

@@ -82,10 +82,10 @@ impl Names<'_> {
             .collect();
         known.sort_unstable();
         let help = match (finding::nearest(name, known.iter().copied()), elsewhere) {
-            (None, Some(node)) => format!("there is one elsewhere: write `{}`", self.fqn(node)),
             _ if name == INITIAL => {
                 format!("write a transition with `src = \"initial\"` in `{here}`, so that it has an initial connector")
             }
+            (None, Some(node)) => format!("there is one elsewhere: write `{}`", self.fqn(node)),
             _ => finding::did_you_mean(name, "nodes", known),
         };
         Unresolved { message, help }

@@ -24,6 +24,9 @@ fn a_composite_with_an_activity_gets_no_initial_connector() {
     assert!(chart.is_none());
     let codes: Vec<&str> = found.iter().map(|f| f.code.0).collect();
     assert!(codes.contains(&"chart::doo_in_composite") && codes.contains(&"chart::unknown_state"), "{codes:?}");
+    let unknown = found.iter().find(|f| f.code.0 == "chart::unknown_state").expect("looked at");
+    let help = unknown.help.as_ref().expect("help");
+    assert!(help.starts_with("a state with a `doo` is given none"), "{help}");
 }
 
 #[test]

@@ -14,6 +14,8 @@ fn help(parts: Vec<Part>) -> String {
 fn unknown_names_are_told_with_the_nearest() {
     let said = help(vec![s("lighthouse", vec![]), t("initial", "lighthuose", "")]);
     assert_eq!(said, "there is no `lighthuose` in `root`; did you mean `lighthouse`?");
+    let said = help(vec![s("a", vec![]), s("b", vec![s("x", vec![]), t("x", "initial", "e")]), t("initial", "a", "")]);
+    assert!(said.contains("write a transition with `src = \"initial\"` in `root.b`"), "not another state's: {said}");
     let said = help(vec![s("a", vec![s("lamp", vec![])]), t("initial", "lamp", "")]);
     assert_eq!(said, "there is no `lamp` in `root`; there is one elsewhere: write `root.a.lamp`");
     let said = help(vec![s("a", vec![]), t("initial", "root.harbour.dock", "")]);
