@@ -87,6 +87,10 @@ pub const TEXT_DEPTH: usize = 64;
 /// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
 pub const TEXT_NODES: usize = 1_000_000;
 
+/// Bytes of text that are looked through for globals that nobody has set, counted once for each such name: a model that asks for
+/// many in a large text is not searched for ever.
+pub const SLIP_BYTES: usize = 64 * 1024 * 1024;
+
 /// Names that one event of a foreign SCXML document is taken to mean beside itself (those that begin with it); past it a warning
 /// says that they are not all.
 pub const SCXML_NAMES: usize = 100;

@@ -174,9 +174,11 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params, options: &
         Language::Lua => {
             let before = cx.findings.len();
             let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)));
-            let other = made
-                .as_ref()
-                .is_some_and(|made| made.chart.is_none() && (made.configurations.is_some() || made.monitors.is_some()));
+            // Whatever it makes, it is no coordinator, trusted or not.
+            let other = made.as_ref().is_some_and(|made| {
+                let some = made.configurations.is_some() || made.monitors.is_some();
+                made.chart.is_none() && (some || !crate::model::finding::has_errors(&cx.findings[before..]))
+            });
             if options.trusted && !other && !cx.unreadable && !made_of_others(cx, reading) {
                 cx.findings.truncate(before);
                 let host = host_files(&options.host);

@@ -14,6 +14,7 @@ use super::slips;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::diagnostics::{FileId, Language};
 use crate::functions::{self, Field, NotOpened, Spot};
+use crate::limits;
 use crate::model::finding::nearest;
 use crate::model::program::{Openings, Program};
 use crate::model::{Code, Finding, Findings, Origin, Statechart, codes};
@@ -196,9 +197,14 @@ fn open(
         });
         slips::field(field, place).or(left_out).into_iter().for_each(|finding| cx.report(finding));
     }
+    let mut looked_through = 0;
     for (name, spot) in &reads.unset {
         let Some(id) = ids.get(&spot.file).copied() else { continue };
         let text: Arc<str> = cx.sources.file(id).text.clone();
+        looked_through += text.len();
+        if looked_through > limits::SLIP_BYTES {
+            break;
+        }
         let line = cx.sources.exact_line(id, spot.line);
         let finding = slips::unset(cx, line, &text, spot.line, name);
         finding.into_iter().for_each(|finding| cx.report(finding));

@@ -166,6 +166,10 @@ fn other_files_are_converted_as_before() {
     assert!(text.is_none() && findings.iter().all(|f| f.code != codes::LUA_HOST_MISSING), "{findings:?}");
     let (text, findings) = converted(CONFIGURATIONS, Language::Yaml);
     assert!(text.is_some(), "{findings:?}");
+    for nothing in ["", "local x = {}"] {
+        let (_, findings) = converted(nothing, Language::Yaml);
+        assert!(matches!(&findings[..], [one] if one.code == codes::TEXT_NOTHING), "{nothing}: {findings:?}");
+    }
 }
 
 /// A file that is trusted has functions; what is wrong is another thing, and only that is said.
