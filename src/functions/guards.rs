@@ -5,7 +5,8 @@
 use super::budget::Budget;
 use super::errors::message_of;
 use super::{patterns, work};
-use mlua::{Function, Lua, LuaString, Result, Table, Value};
+use mlua::thread::ThreadStatus;
+use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -41,6 +42,9 @@ pub fn install(lua: &Lua, native: &Table, bytes: usize, time: Duration) -> Resul
             other => Ok(other),
         })?,
     )?;
+    // Of an error, not by coming to its end.
+    let died = |_: &Lua, thread: Thread| Ok(thread.status() == ThreadStatus::Error);
+    native.raw_set("died", lua.create_function(died)?)?;
     #[cfg(target_os = "linux")]
     {
         let (resume, close) = super::watch::functions(lua)?;

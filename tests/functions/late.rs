@@ -181,6 +181,60 @@ fn closing_what_was_ended_is_refused() {
     }
 }
 
+/// Wherever the look that ends the call comes, and whatever look comes right after it.
+#[test]
+fn closing_what_was_ended_is_refused_at_every_instruction() {
+    for before in 0..110 {
+        let model = model(
+            "local co",
+            &format!(
+                "entry = function()
+                    co = coroutine.create(function()
+                        local c <close> = setmetatable({{}}, {{ __close = function() while true do end end }})
+                        while true do end
+                    end)
+                    for i = 1, {before} do end
+                    coroutine.resume(co)
+                end,
+                exit = function() print('closed', coroutine.close(co)) end"
+            ),
+            "",
+        );
+        // In simulated time every call is counted from its first instruction on, so each of these looks comes elsewhere.
+        let mut sim = model.sim_on(Some(Clock::simulated()));
+        let last = ["run", "e", "run"].into_iter().map(|line| sim.line(line).expect("a line")).last();
+        assert_eq!(last.and_then(|seen| seen.active.last().cloned()).as_deref(), Some("root.b"), "{before}");
+    }
+}
+
+#[test]
+fn coroutines_that_ended_by_themselves_are_closed_as_lua_does() {
+    let text = "entry = function()
+            local function closes() local c <close> = setmetatable({}, { __close = function() print('closes') end }) end
+            local good = coroutine.create(closes)
+            coroutine.resume(good)
+            print(coroutine.close(good))
+            local bad = coroutine.create(function()
+                local c <close> = setmetatable({}, { __close = function() print('late') end })
+                error('mine', 0)
+            end)
+            print(coroutine.resume(bad))
+            print(coroutine.close(bad))
+            local waits = coroutine.create(function()
+                local c <close> = setmetatable({}, { __close = function() print('left') end })
+                coroutine.yield()
+            end)
+            coroutine.resume(waits)
+            print(coroutine.close(waits), coroutine.status(waits))
+        end";
+    let model = model("", text, "");
+    for clock in [Clock::real(), Clock::simulated()] {
+        let mut sim = model.sim_on(Some(clock));
+        let notes = sim.line("run").expect("a line").notes;
+        assert_eq!(notes, ["closes", "true", "false mine", "late", "false mine", "left", "true dead"]);
+    }
+}
+
 #[test]
 fn what_was_ended_leaves_no_trace() {
     // The coroutine was running when its call was ended; later calls do their work, in it and beside it.

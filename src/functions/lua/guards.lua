@@ -44,15 +44,15 @@ if coroutine then
   -- What runs in another coroutine must be known to those who count (`watch.rs`).
   local resume, close = native.resume or raw_resume, native.close or raw_close
 
-  -- A coroutine that was ended in a look is left without hooks: what it would do when it is closed, nothing could end.
-  local ended = setmetatable({}, { __mode = "k" })
+  -- A coroutine that was ended in a look is left without hooks: what it would do when it is closed, nothing could end. So
+  -- one that died of an error is closed only if it is known that this was none of a look. Noted is who may be closed, not who
+  -- may not: a look, or a want of memory, may come before anything is noted.
+  local failed = setmetatable({}, { __mode = "k" })
 
   local function noted(thread, ok, ...)
     if ok then return ok, ... end
-    if over() then
-      ended[thread] = true
-      error(failure(), 0)
-    end
+    if over() then error(failure(), 0) end
+    failed[thread] = true
     return told(ok, ...)
   end
 
@@ -62,9 +62,9 @@ if coroutine then
     error(value, 0)
   end
   local function untold(thread, ok, ...)
-    if not ok and over() then
-      ended[thread] = true
-      error(failure(), 0)
+    if not ok then
+      if over() then error(failure(), 0) end
+      failed[thread] = true
     end
     return ok, ...
   end
@@ -76,17 +76,15 @@ if coroutine then
     local how = status(thread)
     if how ~= "suspended" and how ~= "dead" then error("cannot close a " .. how .. " coroutine", 2) end
     if over() then error(failure(), 0) end
-    if ended[thread] then return false, failure() end
+    if native.died(thread) and not failed[thread] then return false, failure() end
     return passed(close(thread))
   end
 
   local function unwrapped(thread, ok, ...)
     if ok then return ... end
     local why = ...
-    if over() then
-      ended[thread] = true
-      error(failure(), 0)
-    end
+    if over() then error(failure(), 0) end
+    failed[thread] = true
     if status(thread) == "dead" then
       local _, later = close(thread)
       if later ~= nil then why = later end
