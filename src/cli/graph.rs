@@ -85,6 +85,8 @@ impl Run for Args {
             context.out.findings(&read.findings, &read.sources);
             let asks = |beside: &Beside| beside.plugin.as_deref() != Some("checkevents");
             let hidden = read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks));
+            // What is drawn says so itself of functions in the chart.
+            let hidden = hidden || (self.format == Format::Plantuml && !read.chart.is_pure());
             let mark = if hidden { " (functions are not verified)" } else { "" };
             let title = format!("{}: coordinator{mark}", read.name);
             let text = match self.format {

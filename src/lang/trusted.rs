@@ -75,9 +75,11 @@ pub fn read(
         return strict.map(|chart| (chart, None));
     }
     if cx.unreadable || !errors().all(|f| MAY_GO.contains(&f.code)) {
-        // It is trusted: that it has functions is not what is wrong, nor what is only wrong where there are none.
-        let rich = strict_findings.iter().any(|f| f.code == codes::CHART_FUNCTION);
-        cx.findings.extend(strict_findings.into_iter().filter(|f| !rich || !MAY_GO.contains(&f.code)));
+        // It is trusted: what is only wrong in a pure one is not what is wrong.
+        let (pure_only, others): (Findings, Findings) =
+            strict_findings.into_iter().partition(|f| MAY_GO.contains(&f.code));
+        let told = others.iter().any(Finding::is_error);
+        cx.findings.extend(if told { others } else { pure_only });
         return None;
     }
     open(cx, from, path, reading, params, trust)

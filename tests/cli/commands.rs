@@ -321,3 +321,60 @@ fn sim_runs_a_model_with_functions_and_what_stands_in_for_its_host() {
     assert!(ran.err.contains("note: youBot root.a"), "{}", ran.err);
     assert!(ran.err.contains("note: error: DOO doo program of state 'root.b' failed: worn out"), "{}", ran.err);
 }
+
+/// Functions are kept or told of, never lost in silence; what looks like a slip is told wherever a coordinator is read.
+#[test]
+fn functions_are_kept_or_told_of() {
+    let demo = Demo::new();
+    let chart = |fields: &str, transition: &str| {
+        format!(
+            "return rfsm.state {{ {fields} idle = rfsm.state {{}}, on = rfsm.state {{ doo = function() end }},
+               rfsm.trans {{ src = 'initial', tgt = 'idle' }}, rfsm.trans {{ src = 'idle', tgt = 'on', events = {{ 'e_start' }}, {transition} }},
+               rfsm.trans {{ src = 'on', tgt = 'idle', events = {{ 'e_stop' }} }} }}"
+        )
+    };
+    demo.write("rich.lua", &chart("", "guard = function() return true end"));
+    demo.write("slip.lua", &chart("", "gaurd = function() return true end"));
+    demo.write("asks.lua", &chart("getevents = function() return {} end,", "").replace("doo = function() end", ""));
+    demo.write("none.lua", "ConfiguratorConf {}");
+    demo.write(
+        "rich.yaml",
+        "davit: 1
+name: rich
+platform: simulated
+libraries: [standard]
+configurations: [none.lua]
+coordinator: rich.lua
+trusted: true
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_stop, down: idle, within_s: 5 }
+",
+    );
+    let kept = demo.run(&["convert", "rich.yaml", "--to", "yaml"]);
+    assert_eq!(kept.code, 0, "{}", kept.err);
+    assert!(kept.out.contains("trusted: true") && kept.out.contains("-- coordinator.lua"), "{}", kept.out);
+    assert!(kept.out.contains("guard = function()") && kept.err.contains("convert::functions"), "{}", kept.err);
+    let refused = demo.run(&["convert", "rich.lua", "--to", "lua"]);
+    assert_eq!((refused.code, refused.out.as_str()), (1, ""));
+    assert!(refused.err.contains("`root.on`: `doo`"), "{}", refused.err);
+    for args in [["convert", "rich.lua", "--to", "scxml"], ["graph", "rich.lua", "--format", "scxml"]] {
+        let written = demo.run(&args);
+        assert_eq!(written.code, 0, "{}", written.err);
+        assert_eq!(written.err.matches("convert::left_out").count(), 2, "{}", written.err);
+        assert!(written.out.contains("cond=\"guard_"), "{}", written.out);
+    }
+    for args in [["sim", "slip.lua", "--events", "none.lua"], ["graph", "slip.lua", "--format", "dot"]] {
+        let told = demo.run(&args);
+        assert!(
+            told.err.contains("chart::slip") && told.err.contains("did you mean `guard`?"),
+            "{args:?}: {}",
+            told.err
+        );
+    }
+    for format in ["mermaid", "dot", "svg", "plantuml"] {
+        for file in ["asks.lua", "rich.lua"] {
+            let drawn = demo.run(&["graph", file, "--format", format]).out;
+            assert!(drawn.contains("(functions are not verified)"), "{file} as {format}: {drawn}");
+        }
+    }
+}
