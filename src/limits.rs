@@ -29,6 +29,10 @@ pub const LOG_ENTRIES: usize = 4096;
 /// such events, its own and those of others, and nothing else of the log.
 pub const LOG_REPORTS: usize = 1024;
 
+/// How long a coordinator may react to one event before it is told that it does: a hundred times what a call of a function
+/// may take by its budget. What takes longer waits outside of Lua.
+pub const REACTION_LONG: Duration = Duration::from_secs(1);
+
 /// How often it is told that events were dropped because a coordinator does not keep up; what comes in between is counted.
 pub const DROPS_TOLD: Duration = Duration::from_secs(1);
 
@@ -56,6 +60,13 @@ pub const XML_DEPTH: usize = CHART_DEPTH + 8;
 
 /// Lines of an interactive `davit sim` that can be taken back: taking one back does all the others again.
 pub const SIM_LINES: usize = 10_000;
+
+/// Actions of one line of `davit sim` that are shown from its beginning, and as many from its end: nobody reads what a machine
+/// that does not come to rest does in ten thousand turns.
+pub const SIM_ACTIONS_SHOWN: usize = 200;
+
+/// Notes of one line of `davit sim` (what functions print, what goes wrong); more are counted.
+pub const SIM_NOTES: usize = 1024;
 
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;

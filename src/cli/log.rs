@@ -81,6 +81,13 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             out.paint(Style::Care, "dropped"),
             entry["events"]
         ),
+        "slow" => format!(
+            "{}       {} has been in a function for {:.1} s",
+            out.paint(Style::Care, "slow"),
+            text(&entry["coordinator"]),
+            entry["seconds"].as_f64().unwrap_or_default()
+        ),
+        "said" => format!("{:<10} {}", text(&entry["by"]), text(&entry["text"])),
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),
     };

@@ -101,6 +101,10 @@ impl Progress {
                 let word = out.paint(Style::Care, "dropped");
                 self.line(format!("{time}  {word}  {events} events: the coordinator does not keep up"));
             }
+            Happening::Slow { coordinator, seconds } => {
+                let word = out.paint(Style::Care, "slow");
+                self.line(format!("{time}  {word}  {coordinator} has been in a function for {seconds:.1} s"));
+            }
             Happening::Phase { phase: Phase::Broken } => {
                 self.line(format!("{time}  {}", out.paint(Style::Bad, "broken")));
             }

@@ -7,7 +7,8 @@ use super::sim_editor::edit;
 use super::{Answer, Context, Failure, Run};
 use crate::functions::Opener;
 use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
-use crate::statechart::{Hook, Sim, compile};
+use crate::statechart::{Hook, Observation, Sim, compile};
+use serde_json::{Value as Json, json};
 use std::io::{BufRead, BufReader, IsTerminal, Read};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +16,8 @@ use std::sync::Arc;
 /// Step a coordinator alone, interactively or from a file of events.
 ///
 /// A Lua file given here may have functions: it is trusted, with files and processes closed to it. What they print and
-/// what goes wrong in them is shown as notes.
+/// what goes wrong in them is shown as notes, between the entries and exits where it happened; with --json also in `notes`,
+/// each with the number of actions before it.
 ///
 /// One line is one set of events, separated by blanks, queued in the order written and followed by one step; an empty
 /// line queues nothing; the first line also enters the machine. A line `run` runs to idle; `advance 0.5` moves the clock
@@ -87,6 +89,16 @@ impl Run for Args {
     }
 }
 
+/// A line's JSON, with its notes where there are some: `{"after": 2, "text": "…"}`, after how many of its actions.
+fn with_notes(seen: &Observation) -> Json {
+    let mut json = serde_json::to_value(seen).expect("plain data");
+    if !seen.notes.is_empty() {
+        let notes = seen.notes.iter().zip(&seen.notes_after);
+        json["notes"] = notes.map(|(text, after)| json!({ "after": after, "text": text })).collect();
+    }
+    json
+}
+
 impl Args {
     fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> Answer {
         let out = &context.out;
@@ -110,7 +122,7 @@ impl Args {
                     for note in &seen.notes {
                         out.error(format!("note: {note}\n"));
                     }
-                    out.json_line(&seen);
+                    out.json_line(&with_notes(&seen));
                 }
                 Ok(seen) => {
                     out.line(out.paint(Style::Dim, format!("> {line}")));

@@ -43,6 +43,12 @@ pub fn text(json: &Json) -> &str {
     json.as_str().unwrap_or_default()
 }
 
+/// That a coordinator stands still in a function, and for how long.
+fn in_function(out: &Output, seconds: Option<&Json>) -> String {
+    let Some(seconds) = seconds.and_then(Json::as_f64) else { return String::new() };
+    format!(", {}", out.paint(Style::Care, format!("in a function for {seconds:.0} s")))
+}
+
 fn print(out: &Output, status: &Json) {
     let phase = text(&status["phase"]);
     out.line(format!(
@@ -53,17 +59,25 @@ fn print(out: &Output, status: &Json) {
     ));
     let active = status["coordinator"].as_array().and_then(|a| a.last()).map_or("(inactive)", |s| text(s));
     match status["coordinators"].as_object().filter(|all| all.len() > 1) {
-        None => out.line(format!("coordinator  {}", out.paint(Style::Name, active))),
+        None => {
+            let slow = status["slow"].as_object().and_then(|slow| slow.values().next());
+            out.line(format!("coordinator  {}{}", out.paint(Style::Name, active), in_function(out, slow)));
+        }
         Some(all) => {
             for (name, states) in all {
                 let active = states.as_array().and_then(|a| a.last()).map_or("(inactive)", text);
-                out.line(format!("coordinator  {name}: {}", out.paint(Style::Name, active)));
+                let slow = in_function(out, status["slow"].get(name));
+                out.line(format!("coordinator  {name}: {}{slow}", out.paint(Style::Name, active)));
             }
         }
     }
     if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();
         out.line(format!("waiting for  {}", names.join(", ")));
+    }
+    if let Some(inside) = status["dropped"]["inside"].as_u64().filter(|inside| *inside > 0) {
+        let word = out.paint(Style::Care, "dropped");
+        out.line(format!("{word}      {inside} events that a coordinator sent to itself: too many at once"));
     }
     let dropped = ["control", "report"].map(|lane| status["dropped"][lane].as_u64().unwrap_or_default());
     if dropped != [0, 0] {

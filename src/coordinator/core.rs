@@ -88,7 +88,11 @@ impl Trouble {
             Self::Runaway => (
                 NodeId::ROOT,
                 codes::CHART_RUNAWAY,
-                format!("the coordinator did not come to rest within {} steps and was stopped", limits::CHART_RUN),
+                format!(
+                    "the coordinator did not come to rest within {} steps: what it had sent to itself is dropped, and it goes \
+                     on with the next event from where it stands",
+                    limits::CHART_RUN
+                ),
             ),
         };
         Finding::new(finding::Severity::Error, code, message).at(chart.origin(node)).path(chart.fqn(node).to_string())
@@ -154,6 +158,11 @@ impl<F: Hook> Core<F> {
     /// Where it stands.
     pub fn machine(&self) -> &Machine {
         &self.machine
+    }
+
+    /// Events that found no room inside the chart so far: what it raises or its functions send to itself.
+    pub fn lost(&self) -> u64 {
+        self.machine.queue().dropped() + self.functions.lost()
     }
 
     /// Enters the chart and lets it come to rest.

@@ -69,13 +69,19 @@ pub struct Dropped {
     pub control: u64,
     /// Of the lane for reports.
     pub report: u64,
+    /// Of the chart's own queue: events that its functions sent, or that it raised for itself.
+    pub inside: u64,
 }
 
 impl Dropped {
     /// This and another one, as one.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
-        Self { control: self.control + other.control, report: self.report + other.report }
+        Self {
+            control: self.control + other.control,
+            report: self.report + other.report,
+            inside: self.inside + other.inside,
+        }
     }
 }
 
@@ -145,7 +151,7 @@ mod tests {
         assert_eq!(refused, 10);
         inbox.push(Incoming::control(event("stop"))).unwrap();
         inbox.push(Incoming::control(event("after"))).unwrap();
-        assert_eq!(inbox.dropped(), Dropped { control: 0, report: 10 });
+        assert_eq!(inbox.dropped(), Dropped { control: 0, report: 10, inside: 0 });
         assert_eq!(inbox.pop().unwrap().event, event("stop"));
         assert_eq!(inbox.pop().unwrap().event, event("after"));
         assert_eq!(inbox.pop().unwrap().event, event("chatter"));

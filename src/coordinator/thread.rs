@@ -27,6 +27,10 @@ struct Shared {
     /// Index of the active leaf plus one; 0 before the chart was entered. The leaf tells the whole active configuration.
     leaf: AtomicUsize,
     detached: AtomicBool,
+    /// When the reaction under way began, in nanoseconds plus one; 0: it does not react.
+    since: AtomicU64,
+    /// Events that were lost inside the chart.
+    lost: AtomicU64,
     /// Held while the coordinator reacts.
     reacting: Mutex<()>,
     /// Held while the listener is called; whoever holds it knows that nothing is being told. Not held while a function of
@@ -90,6 +94,8 @@ impl Coordinator {
             bell: clock.signal(),
             leaf: AtomicUsize::new(0),
             detached: AtomicBool::new(false),
+            since: AtomicU64::new(0),
+            lost: AtomicU64::new(0),
             reacting: Mutex::new(()),
             telling: Mutex::new(()),
             delivered: AtomicU64::new(0),
@@ -171,7 +177,18 @@ impl Coordinator {
 
     /// Events that found no room.
     pub fn dropped(&self) -> Dropped {
-        lock(&self.shared.inbox).dropped()
+        let inside = self.shared.lost.load(Ordering::Relaxed);
+        Dropped { inside, ..lock(&self.shared.inbox).dropped() }
+    }
+
+    /// Since when it has been reacting to one event; none: it waits for one. Never waits.
+    pub fn reacting_since(&self) -> Option<Time> {
+        self.shared.since.load(Ordering::Relaxed).checked_sub(1).map(Time)
+    }
+
+    /// Whether it has been reacting to one event for longer than [`limits::REACTION_LONG`]: a function of its model hangs.
+    pub fn hangs(&self) -> bool {
+        self.reacting_since().is_some_and(|since| self.shared.clock.now() > since + limits::REACTION_LONG)
     }
 
     /// Events that were delivered to the chart so far.
@@ -245,15 +262,17 @@ impl Shared {
             Err(text) => return listener.said(&Said { by: Printer::Err, text }),
         };
         let mut listener = Told { shared: self, listener };
-        self.react(|| {
-            core.start(self.clock.now(), &mut listener);
+        let began = self.clock.now();
+        self.react(began, || {
+            core.start(began, &mut listener);
             true
         });
+        self.lost.store(core.lost(), Ordering::Relaxed);
         let mut round = Round::default();
         while !self.detached.load(Ordering::SeqCst) {
             let now = self.clock.now();
             // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
-            let worked = self.react(|| match self.next() {
+            let worked = self.react(now, || match self.next() {
                 Some(incoming) => {
                     if core.deliver(incoming.event, incoming.tag, now, &mut listener) != Delivered::Stale {
                         self.delivered.fetch_add(1, Ordering::Relaxed);
@@ -267,6 +286,7 @@ impl Shared {
                 None => false,
             });
             if worked {
+                self.lost.store(core.lost(), Ordering::Relaxed);
                 round.turn(&self.clock, now);
             } else {
                 listener.rested();
@@ -280,9 +300,15 @@ impl Shared {
     }
 
     /// Whether there was something to react to.
-    fn react(&self, reaction: impl FnOnce() -> bool) -> bool {
+    fn react(&self, now: Time, reaction: impl FnOnce() -> bool) -> bool {
         let _reacting = lock(&self.reacting);
-        !self.detached.load(Ordering::SeqCst) && reaction()
+        if self.detached.load(Ordering::SeqCst) {
+            return false;
+        }
+        self.since.store(now.0.saturating_add(1), Ordering::Relaxed);
+        let worked = reaction();
+        self.since.store(0, Ordering::Relaxed);
+        worked
     }
 }
 
@@ -318,6 +344,7 @@ struct Ended<'a>(&'a Shared);
 impl Drop for Ended<'_> {
     fn drop(&mut self) {
         self.0.detached.store(true, Ordering::SeqCst);
+        self.0.since.store(0, Ordering::Relaxed);
         lock(&self.0.inbox).clear();
         lock(&self.0.waiting).all.clear();
     }

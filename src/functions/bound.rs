@@ -1,12 +1,12 @@
 //! A machine with its tables, and what a call may see of it and send to it.
 
 use super::budget::Budget;
-use super::errors::{message_of, undefined_global};
+use super::errors::{message_of, undefined_global, without_address};
 use super::host::{Host, Voice};
 use super::tables::Tables;
 use crate::limits;
 use crate::model::{Finding, Openings};
-use crate::statechart::{EdgeId, EventId, Kind, Machine, NodeId, Printer, View};
+use crate::statechart::{Chart, EdgeId, EventId, Kind, Machine, NodeId, Printer, View};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -41,6 +41,8 @@ pub struct Bound {
     strange: RefCell<Vec<Value>>,
     strange_next: Cell<usize>,
     pub status: RefCell<Status>,
+    /// The leaf that `fsm._act_leaf` shows.
+    shown_leaf: Cell<Option<NodeId>>,
     pub thread: RefCell<Option<Thread>>,
     /// The events of this step as the functions get them.
     pub events: RefCell<Option<Table>>,
@@ -73,6 +75,8 @@ pub struct Words {
     pub post_step: LuaString,
     /// The name of the printer that hears of what happens.
     pub dbg: LuaString,
+    /// Where a model finds its active leaf.
+    pub act_leaf: LuaString,
 }
 
 /// Why a machine could not be made of its tables.
@@ -95,6 +99,7 @@ impl Bound {
         let polls = given("_polls")?;
         let word = |text: &str| lua.create_string(text);
         let machine = Machine::new(&tables.chart);
+        fsm.raw_set("_act_leaf", false)?;
         Ok(Self {
             budget: host.budget.clone(),
             voice: host.voice.clone(),
@@ -103,6 +108,7 @@ impl Bound {
             strange: RefCell::default(),
             strange_next: Cell::new(0),
             status: RefCell::new(Status { room: limits::CHART_QUEUE, ..Status::default() }),
+            shown_leaf: Cell::new(None),
             thread: RefCell::default(),
             events: RefCell::default(),
             words: Words {
@@ -113,6 +119,7 @@ impl Bound {
                 pre_step: word("pre_step_hook")?,
                 post_step: word("post_step_hook")?,
                 dbg: word("dbg")?,
+                act_leaf: word("_act_leaf")?,
             },
             go_on: host.native.raw_get("go_on")?,
             traces: Cell::new(false),
@@ -154,6 +161,21 @@ impl Bound {
         self.tables.borrow().value(event).unwrap_or(Value::Nil)
     }
 
+    /// An event in words. One that is no text has the name by which the chart knows it, never an address: two runs of one
+    /// model tell the same.
+    pub fn event_text(&self, chart: &Chart, event: EventId) -> String {
+        let value = self.value(event);
+        let text = match &value {
+            Value::Nil => return chart.event_text(event),
+            value => value.to_string().unwrap_or_default(),
+        };
+        match (without_address(&text), event.as_strange()) {
+            (None, _) => text,
+            (Some(_), None) => chart.event_text(event),
+            (Some(kind), Some(number)) => format!("{kind}#unlisted{}", number + 1),
+        }
+    }
+
     /// The event that a Lua value is.
     pub fn event(&self, value: Value) -> EventId {
         if let Some(event) = self.tables.borrow().event(&value) {
@@ -185,10 +207,7 @@ impl Bound {
             let event = self.event(value);
             self.status.borrow_mut().outbox.push(event);
         }
-        if lost > 0 {
-            let most = limits::CHART_QUEUE;
-            self.voice.say(Printer::Err, &format!("{lost} events found no room: at most {most} wait for a step"));
-        }
+        self.voice.no_room(lost);
     }
 
     /// The events of the step that a view shows.
@@ -204,6 +223,16 @@ impl Bound {
         Ok(table)
     }
 
+    /// Puts the active leaf where rFSM has it (`rfsm.md` §5): only when it is another one than was seen last.
+    pub fn show_leaf(&self, leaf: Option<NodeId>) {
+        if self.shown_leaf.replace(leaf) == leaf {
+            return;
+        }
+        let value = leaf.map_or(Value::Boolean(false), |leaf| self.tables.borrow().node(leaf).clone());
+        // Where there is no memory for that, the call that comes finds none either.
+        let _ = self.fsm.raw_set(&self.words.act_leaf, value);
+    }
+
     /// Makes a call that sees what `view` shows; what it sends goes into the view's queue.
     pub fn calling<R>(&self, view: &mut View<'_>, call: impl FnOnce() -> Result<R>) -> Result<R> {
         {
@@ -212,6 +241,7 @@ impl Bound {
             status.waiting = view.queue.events().len();
             status.room = view.queue.room();
         }
+        self.show_leaf(view.leaf);
         let outcome = self.budget.spend(limits::CALL_INSTRUCTIONS, call);
         let mut status = self.status.borrow_mut();
         for event in status.outbox.drain(..) {
@@ -223,9 +253,16 @@ impl Bound {
     /// Tells the model's `err` of an error: a tag, a text, and the message.
     pub fn complain(&self, tag: &str, text: &str, error: &mlua::Error) {
         let mut message = message_of(error);
-        if let Some(name) = undefined_global(&message).filter(|name| Openings::NAMES.contains(name)) {
-            message =
-                format!("{message}: closed to this model, `trusted: {{ open: [{name}] }}` in a deployment opens it");
+        if let Some(name) = undefined_global(&message) {
+            let why = if Openings::NAMES.contains(&name) {
+                format!("closed to this model, `trusted: {{ open: [{name}] }}` in a deployment opens it")
+            } else {
+                format!(
+                    "there is no `{name}`; if the model expects it from its host, a Lua file can stand in for it: \
+                     `host: [FILE]` in a deployment, `--host FILE` of `davit sim`"
+                )
+            };
+            message = format!("{message}: {why}");
         }
         let told = self.fsm.raw_get::<Value>("err").and_then(|printer| match printer {
             Value::Function(err) => {

@@ -134,10 +134,7 @@ impl Hook for Calls {
     }
 
     fn event_text(&self, chart: &Chart, event: EventId) -> String {
-        match self.bound.value(event) {
-            Value::Nil => chart.event_text(event),
-            value => value.to_string().unwrap_or_default(),
-        }
+        self.bound.event_text(chart, event)
     }
 
     fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
@@ -156,6 +153,10 @@ impl Hook for Calls {
 
     fn said(&mut self, said: &mut Vec<Said>) {
         self.bound.voice.drain(said);
+    }
+
+    fn lost(&self) -> u64 {
+        self.bound.voice.lost_events()
     }
 
     fn traces(&self) -> bool {
@@ -239,8 +240,8 @@ impl Hook for Calls {
         if self.bound.failed.borrow().is_none() {
             self.step_hook(&self.bound.words.post_step, view);
         }
-        let mut status = self.bound.status.borrow_mut();
-        status.leaf = view.leaf;
+        self.bound.status.borrow_mut().leaf = view.leaf;
+        self.bound.show_leaf(view.leaf);
     }
 
     fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {

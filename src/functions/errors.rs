@@ -25,7 +25,17 @@ pub fn message_of(error: &Error) -> String {
         let mb = limits::FUNCTIONS_BYTES / 1024 / 1024;
         return format!("needs more than the {mb} MB of memory that the coordinator's functions may hold");
     }
-    text.to_owned()
+    match without_address(text) {
+        Some(kind) => format!("the error is a {kind} and no text"),
+        None => text.to_owned(),
+    }
+}
+
+/// What kind of thing a text stands for that is nothing but its address (`table: 0x55d0`).
+pub fn without_address(text: &str) -> Option<&str> {
+    let (kind, address) = text.split_once(": 0x")?;
+    let kinds = ["table", "function", "thread", "userdata"];
+    (kinds.contains(&kind) && address.bytes().all(|b| b.is_ascii_hexdigit())).then_some(kind)
 }
 
 /// The global name that an error found undefined.

@@ -23,6 +23,9 @@ pub type Reader = Box<dyn FnMut(&str) -> std::result::Result<(String, String), S
 pub struct Voice {
     lines: RefCell<Vec<Said>>,
     lost: Cell<usize>,
+    /// Events that found no room: since that was last told, and before.
+    no_room: Cell<u64>,
+    no_room_before: Cell<u64>,
 }
 
 impl Voice {
@@ -41,9 +44,26 @@ impl Voice {
         lines.push(Said { by, text });
     }
 
+    /// Counts events that found no room; how many there were is told once a step.
+    pub fn no_room(&self, events: u64) {
+        self.no_room.set(self.no_room.get() + events);
+    }
+
+    /// How many events found no room, ever.
+    pub fn lost_events(&self) -> u64 {
+        self.no_room.get() + self.no_room_before.get()
+    }
+
     /// Moves all of it to the end of `out`.
     pub fn drain(&self, out: &mut Vec<Said>) {
         out.append(&mut self.lines.borrow_mut());
+        let events = self.no_room.replace(0);
+        if events > 0 {
+            self.no_room_before.set(self.no_room_before.get() + events);
+            let (events, most) = (grouped(events), grouped(limits::CHART_QUEUE as u64));
+            let text = format!("{events} events found no room: at most {most} wait for a step");
+            out.push(Said { by: Printer::Err, text });
+        }
         let lost = self.lost.replace(0);
         if lost > 0 {
             out.push(Said {
@@ -52,6 +72,19 @@ impl Voice {
             });
         }
     }
+}
+
+/// A number as people read it: `18,976`.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut out = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
 }
 
 /// What everything of one state shares.
@@ -67,6 +100,8 @@ pub struct Host {
     pub machines: RefCell<FxHashMap<usize, Rc<Bound>>>,
     pub gettime: RefCell<Option<Function>>,
     pub reader: RefCell<Reader>,
+    /// Files that are being run, each loaded by the one before it.
+    loading: RefCell<Vec<String>>,
     /// The time of inner machines whose model says none.
     pub clock: RefCell<Option<Clock>>,
     pub serial: Cell<u32>,
@@ -74,7 +109,27 @@ pub struct Host {
     pub native: Table,
 }
 
+/// While a file is being run.
+pub struct Loading<'a>(&'a Host);
+
+impl Drop for Loading<'_> {
+    fn drop(&mut self) {
+        self.0.loading.borrow_mut().pop();
+    }
+}
+
 impl Host {
+    /// A file begins to be run; one that is being run already is refused, with the way that leads round.
+    pub fn loading(&self, file: &str) -> Result<Loading<'_>> {
+        let mut loading = self.loading.borrow_mut();
+        if let Some(at) = loading.iter().position(|known| known == file) {
+            let way: Vec<&str> = loading[at..].iter().map(String::as_str).chain([file]).collect();
+            return Err(mlua::Error::runtime(format!("files load each other in a circle: {}", way.join(" -> "))));
+        }
+        loading.push(file.to_owned());
+        Ok(Loading(self))
+    }
+
     /// The module `rfsm`.
     pub fn rfsm(&self, lua: &Lua) -> Result<Table> {
         lua.named_registry_value(RFSM_KEY)
@@ -115,6 +170,7 @@ pub fn state(open: Openings, reader: Reader) -> Result<(Lua, Rc<Host>)> {
         gettime: RefCell::default(),
         clock: RefCell::default(),
         reader: RefCell::new(reader),
+        loading: RefCell::default(),
         serial: Cell::new(0),
         native,
     });
@@ -155,6 +211,7 @@ pub fn run_program(lua: &Lua, host: &Host, program: &Program) -> std::result::Re
             let ran = host.budget.spend(limits::LUA_INSTRUCTIONS, || run(lua, file, text));
             ran.map_err(at(file))?;
         }
+        let _loading = host.loading(&program.file).map_err(at(&program.file))?;
         *values = host
             .budget
             .spend(limits::LUA_INSTRUCTIONS, || run(lua, &program.file, &program.text))

@@ -50,6 +50,7 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     })?;
     shared(lua, host, "run_file", |lua, host, name: String| {
         let (shown, text) = (host.reader.borrow_mut())(&name).map_err(mlua::Error::runtime)?;
+        let _loading = host.loading(&shown)?;
         Ok(run(lua, &shown, &text)?.pop_front().unwrap_or(Value::Nil))
     })?;
     shared(lua, host, "json", |_, host, value: Value| Ok(to_json(&value, 0, &mut host.budget.steps())?.to_string()))?;
@@ -262,6 +263,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let mut machine = taken(&bound)?;
         machine.reset(&bound.tables().chart);
         *bound.status.borrow_mut() = super::bound::Status { room: limits::CHART_QUEUE, ..Default::default() };
+        bound.show_leaf(None);
         *bound.thread.borrow_mut() = None;
         *bound.machine.borrow_mut() = Some(machine);
         Ok(())
@@ -275,6 +277,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let mut machine = taken(&bound)?;
         machine.leave(&tables.chart, node, &mut Calls { lua: lua.clone(), bound: bound.clone(), _host: None });
         bound.status.borrow_mut().leaf = machine.leaf();
+        bound.show_leaf(machine.leaf());
         *bound.machine.borrow_mut() = Some(machine);
         flush(&bound);
         Ok(())
@@ -327,6 +330,7 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
         let before = machine.work();
         let turn = machine.turn(&bound.tables().chart, now, &mut calls);
         bound.status.borrow_mut().leaf = machine.leaf();
+        bound.show_leaf(machine.leaf());
         if let Some(error) = bound.failed.borrow_mut().take() {
             return Err(error);
         }

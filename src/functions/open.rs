@@ -156,6 +156,8 @@ impl Opener {
         let simulated = clock.as_ref().is_none_or(Clock::is_simulated);
         *host.clock.borrow_mut() = clock;
         let template = template(&lua, &host, program)?;
+        // What the texts print was told when they were read.
+        host.voice.drain(&mut Vec::new());
         let init: Function = host.rfsm(&lua).and_then(|rfsm| rfsm.raw_get("init")).map_err(failed)?;
         let made: Value = host.budget.spend(limits::LUA_INSTRUCTIONS, || init.call(template)).map_err(failed)?;
         let Value::Table(fsm) = made else {

@@ -68,10 +68,7 @@ fn call(lua: &Lua, bound: &Bound, tag: &str, words: &[String]) -> Result<()> {
 }
 
 fn text(bound: &Bound, chart: &Chart, event: EventId) -> String {
-    match bound.value(event) {
-        Value::Nil => chart.event_text(event),
-        value => value.to_string().unwrap_or_default(),
-    }
+    bound.event_text(chart, event)
 }
 
 fn complain(bound: &Bound, told: Result<()>) {

@@ -176,11 +176,8 @@ fn open(
         origins.push(if word.is_empty() { base } else { cx.sources.within(base, &word) });
     }
     let at = |origin: Origin| origins.get(origin.0 as usize).copied().unwrap_or(reading.whole);
-    for Said { by, text } in reads.said {
-        if by != Printer::Dbg {
-            let finding = Finding::info(codes::LUA_PRINT, format!("the file prints: {text}"));
-            cx.report(finding.at(reading.whole));
-        }
+    if let Some(finding) = printed(&program.file, &reads.said) {
+        cx.report(finding);
     }
     let broken = !reads.problems.is_empty();
     for problem in reads.problems {
@@ -224,6 +221,22 @@ pub fn mentions(text: &str, word: &str) -> bool {
     text.match_indices(word).any(|(at, _)| {
         !text[..at].chars().next_back().is_some_and(part) && !text[at + word.len()..].chars().next().is_some_and(part)
     })
+}
+
+/// Lines of what a file prints while it is loaded that are shown; the others are counted.
+const PRINTS_SHOWN: usize = 5;
+
+/// One remark about all that a file prints while it is loaded. Without a place: nobody knows the lines.
+fn printed(file: &str, said: &[Said]) -> Option<Finding> {
+    let lines: Vec<&str> = said.iter().filter(|said| said.by != Printer::Dbg).map(|said| said.text.as_str()).collect();
+    let mut message = format!("`{file}` prints while it is loaded: ");
+    let shown: Vec<String> = lines.iter().take(PRINTS_SHOWN).map(|line| line.chars().take(200).collect()).collect();
+    message.push_str(&shown.join("; "));
+    match lines.len().checked_sub(PRINTS_SHOWN) {
+        None | Some(0) => {}
+        Some(more) => message.push_str(&format!("; and {more} more lines")),
+    }
+    (!lines.is_empty()).then(|| Finding::info(codes::LUA_PRINT, message))
 }
 
 fn json(node: &Node) -> serde_json::Value {

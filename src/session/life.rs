@@ -78,7 +78,8 @@ impl Session {
                     false,
                 );
             }
-            hub.changed.wait(deadline);
+            self.tell_slow();
+            hub.changed.wait(self.next_look(deadline));
         };
         let reasons = self.failures_since(began);
         let ended = self.roll_back();
@@ -92,7 +93,8 @@ impl Session {
                 return command;
             }
             self.refresh_phase();
-            self.hub().changed.wait(Time::NEVER);
+            self.tell_slow();
+            self.hub().changed.wait(self.next_look(Time::NEVER));
         }
     }
 
@@ -121,7 +123,8 @@ impl Session {
                     why = Some(format!("not `{}` after {} s", take_down.down, take_down.within.as_secs_f64()));
                     break;
                 }
-                hub.changed.wait(deadline);
+                self.tell_slow();
+                hub.changed.wait(self.next_look(deadline));
             }
         }
         if why.is_none() && !self.is_empty() {

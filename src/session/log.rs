@@ -85,6 +85,13 @@ pub enum Happening {
         /// How many since this was last told.
         events: u64,
     },
+    /// A coordinator has been reacting to one event for long: a function of its model waits outside of Lua. Told once.
+    Slow {
+        /// Which.
+        coordinator: String,
+        /// For how many seconds so far.
+        seconds: f64,
+    },
     /// A function of the coordinator printed something, or failed.
     Said {
         /// By which printer: `err`, `warn`, `info` or `dbg`.
@@ -250,8 +257,11 @@ pub struct StatusView {
     pub faults: Vec<Fault>,
     /// Requests that are not answered yet.
     pub outstanding: Vec<String>,
-    /// Events that found a coordinator's inbox full, since the session began.
+    /// Events that found a coordinator's inbox, or its own queue, full, since the session began.
     pub dropped: Dropped,
+    /// For how many seconds coordinators have been in one function, by name; those that have been for longer than
+    /// [`limits::REACTION_LONG`].
+    pub slow: BTreeMap<String, f64>,
     /// Seconds of its clock since its start.
     pub at: f64,
 }

@@ -12,6 +12,7 @@ use crate::model::{Deployment, EventName, Ident};
 use crate::statechart::{Chart, EventId, NodeId};
 use crate::time::Clock;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 /// One coordinator of a session.
 pub(super) struct Part {
@@ -22,6 +23,8 @@ pub(super) struct Part {
     pub down: Option<NodeId>,
     /// It has functions: they see every event, also one that no transition lists.
     pub sees_all: bool,
+    /// The beginning of the last reaction of which it was told that it takes long.
+    pub told_slow: AtomicU64,
     failed: Vec<(NodeId, String)>,
 }
 
@@ -69,6 +72,7 @@ impl Part {
                 up: state(up),
                 down: state(down),
                 sees_all,
+                told_slow: AtomicU64::new(u64::MAX),
                 failed: failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
                 chart: chart.clone(),
                 coordinator,

@@ -15,8 +15,9 @@ use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
-use crate::time::Clock;
+use crate::time::{Clock, Time};
 use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 /// What a session is made of.
@@ -214,9 +215,42 @@ impl Session {
             stack,
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
+            slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
         }
+    }
+
+    /// Coordinators that have been reacting to one event for long, with the seconds.
+    fn slow(&self) -> BTreeMap<String, f64> {
+        let now = self.clock.now();
+        let hanging = self.parts.iter().filter(|part| part.coordinator.hangs());
+        hanging
+            .filter_map(|part| {
+                let since = part.coordinator.reacting_since()?;
+                Some((part.name.to_string(), now.since(since).as_secs_f64()))
+            })
+            .collect()
+    }
+
+    /// Tells of coordinators that have begun to hang, of each reaction once.
+    pub(super) fn tell_slow(&self) {
+        for part in &self.parts {
+            let Some(since) = part.coordinator.reacting_since().filter(|_| part.coordinator.hangs()) else { continue };
+            if part.told_slow.swap(since.0, Ordering::Relaxed) != since.0 {
+                let seconds = self.clock.now().since(since).as_secs_f64();
+                self.hub.note(Happening::Slow { coordinator: part.name.to_string(), seconds });
+            }
+        }
+    }
+
+    /// When whoever drives the session has to look again: now and then where functions may hang. Simulated time stands
+    /// still meanwhile, and must not be moved by looking.
+    pub(super) fn next_look(&self, deadline: Time) -> Time {
+        if self.clock.is_simulated() || !self.sees_all_events() {
+            return deadline;
+        }
+        deadline.min(self.clock.now() + limits::REACTION_LONG)
     }
 
     /// Follows the configurator into *broken* and back.
@@ -307,8 +341,14 @@ impl Session {
         self.configurator.discard_stack();
         let deadline = self.clock.now() + limits::VIEW;
         self.configurator.stop(deadline);
+        // Nothing is needed of a coordinator any more; one that hangs is left behind at once.
+        let soon = self.clock.now() + limits::REACTION_LONG;
         for part in &self.parts {
-            let _ = part.coordinator.stop(deadline);
+            if part.coordinator.hangs() {
+                part.coordinator.detach();
+            } else {
+                let _ = part.coordinator.stop(soon);
+            }
         }
         self.part();
     }

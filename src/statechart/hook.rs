@@ -72,6 +72,10 @@ pub trait Hook {
     /// [`exited`](Self::exited), [`taking`](Self::taking) or [`conflict`](Self::conflict). If not (and if it has no hand in
     /// single turns), whole reactions that are known beforehand are taken at once.
     const WATCHES: bool = true;
+
+    /// Whether a watcher wants what functions print between the things it watches, in [`heard`](Self::heard).
+    const HEARS: bool = false;
+
     /// The event that `name` means; a hook may remember names that the chart does not know.
     fn event(&mut self, chart: &Chart, name: EventName) -> EventId {
         chart.event(name)
@@ -91,6 +95,17 @@ pub trait Hook {
     /// Moves what functions said since the last time to the end of `said`.
     fn said(&mut self, said: &mut Vec<Said>) {
         let _ = said;
+    }
+
+    /// What functions have said up to here, for who watches and wants it in order with what happens
+    /// ([`HEARS`](Self::HEARS)). Drained.
+    fn heard(&mut self, said: &mut Vec<Said>) {
+        said.clear();
+    }
+
+    /// How many events functions sent so far that found no room.
+    fn lost(&self) -> u64 {
+        0
     }
 
     /// Whether turns are to be taken now and then even when no event waits: the model asks outside for events.
@@ -238,6 +253,17 @@ pub struct Watched<'a, W, F> {
     pub functions: &'a mut F,
 }
 
+impl<W: Hook, F: Hook> Watched<'_, W, F> {
+    /// Before something is watched: what was said before it.
+    fn hear(&mut self) {
+        if W::HEARS {
+            let mut said = Vec::new();
+            self.functions.said(&mut said);
+            self.watcher.heard(&mut said);
+        }
+    }
+}
+
 impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
     const TURNS: bool = W::TURNS || F::TURNS;
     const WATCHES: bool = W::WATCHES || F::WATCHES;
@@ -258,6 +284,10 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.said(said);
     }
 
+    fn lost(&self) -> u64 {
+        self.functions.lost()
+    }
+
     fn polls(&self) -> bool {
         self.functions.polls()
     }
@@ -271,11 +301,13 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
     }
 
     fn entered(&mut self, chart: &Chart, state: NodeId) {
+        self.hear();
         self.watcher.entered(chart, state);
         self.functions.entered(chart, state);
     }
 
     fn exited(&mut self, chart: &Chart, state: NodeId) {
+        self.hear();
         self.watcher.exited(chart, state);
         self.functions.exited(chart, state);
     }
@@ -286,12 +318,14 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
     }
 
     fn raised(&mut self, chart: &Chart, raised: Raised) {
+        self.hear();
         self.watcher.raised(chart, raised);
         self.functions.raised(chart, raised);
     }
 
     fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
         let ways: Vec<EdgeId> = ways.collect();
+        self.hear();
         self.watcher.conflict(chart, connector, &mut ways.iter().copied());
         self.functions.conflict(chart, connector, &mut ways.iter().copied());
     }

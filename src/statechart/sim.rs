@@ -27,9 +27,13 @@ pub struct Observation {
     pub transition: bool,
     /// What `step` returned: nothing is left to do.
     pub idle: bool,
-    /// What rFSM would have reported (a conflict at a connector, a failed entry). Not part of the JSON.
+    /// What functions printed, and what rFSM would have reported (a conflict at a connector, a failed entry). Not part of
+    /// the JSON.
     #[serde(skip)]
     pub notes: Vec<String>,
+    /// After how many of the actions each note came.
+    #[serde(skip)]
+    pub notes_after: Vec<usize>,
 }
 
 /// Why a line was not understood. Nothing happened then.
@@ -118,7 +122,7 @@ impl<'c, F: Hook> Sim<'c, F> {
         };
         if lost > 0 {
             let most = limits::CHART_QUEUE;
-            trace.notes.push(format!("{lost} events found no room: a set holds at most {most}"));
+            trace.note(format!("{lost} events found no room: a set holds at most {most}"));
         }
         Ok(self.observe(stepped, trace))
     }
@@ -126,13 +130,17 @@ impl<'c, F: Hook> Sim<'c, F> {
     fn observe(&mut self, stepped: Stepped, mut trace: Trace) -> Observation {
         let mut said = Vec::new();
         self.functions.said(&mut said);
-        trace.notes.extend(said.into_iter().map(|Said { by, text }| match by {
-            Printer::Err => format!("error: {text}"),
-            Printer::Warn => format!("warning: {text}"),
-            Printer::Info | Printer::Dbg => text,
-        }));
+        trace.heard(&mut said);
+        let last = trace.actions.len();
+        let mut end = |text: String| {
+            trace.notes.push(text);
+            trace.notes_after.push(last);
+        };
+        if trace.left_out > 0 {
+            end(format!("{} more notes are left out", trace.left_out));
+        }
         if stepped.ended == Ended::Endless {
-            trace.notes.push(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
+            end(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
         }
         Observation {
             active: self.machine.active().iter().map(|node| self.chart().fqn(*node).to_string()).collect(),
@@ -148,6 +156,7 @@ impl<'c, F: Hook> Sim<'c, F> {
             transition: stepped.transition,
             idle: stepped.idle,
             notes: trace.notes,
+            notes_after: trace.notes_after,
         }
     }
 }
@@ -155,11 +164,20 @@ impl<'c, F: Hook> Sim<'c, F> {
 /// For people: one line an action, then where it stands.
 impl fmt::Display for Observation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for action in &self.actions {
-            writeln!(f, "  {action}")?;
-        }
-        for note in &self.notes {
-            writeln!(f, "  note: {note}")?;
+        let mut notes = self.notes.iter().zip(&self.notes_after).peekable();
+        for done in 0..=self.actions.len() {
+            while let Some((note, _)) = notes.next_if(|(_, after)| **after <= done) {
+                writeln!(f, "  note: {note}")?;
+            }
+            let Some(action) = self.actions.get(done) else { break };
+            // Of a machine that does not rest, the beginning and the end.
+            let (first, last) =
+                (limits::SIM_ACTIONS_SHOWN, self.actions.len().saturating_sub(limits::SIM_ACTIONS_SHOWN));
+            if done < first || done >= last {
+                writeln!(f, "  {action}")?;
+            } else if done == first {
+                writeln!(f, "  … {} more are left out", last - first)?;
+            }
         }
         match (self.active.last(), self.mode) {
             (Some(leaf), Some(Mode::Active)) => write!(f, "= {leaf} (active)")?,
@@ -184,10 +202,35 @@ impl fmt::Display for Observation {
 struct Trace {
     actions: Vec<String>,
     notes: Vec<String>,
+    notes_after: Vec<usize>,
+    /// Notes that are too many.
+    left_out: usize,
+}
+
+impl Trace {
+    fn note(&mut self, text: String) {
+        if self.notes.len() >= limits::SIM_NOTES {
+            self.left_out += 1;
+            return;
+        }
+        self.notes.push(text);
+        self.notes_after.push(self.actions.len());
+    }
 }
 
 impl Hook for Trace {
     const TURNS: bool = false;
+    const HEARS: bool = true;
+
+    fn heard(&mut self, said: &mut Vec<Said>) {
+        for Said { by, text } in said.drain(..) {
+            self.note(match by {
+                Printer::Err => format!("error: {text}"),
+                Printer::Warn => format!("warning: {text}"),
+                Printer::Info | Printer::Dbg => text,
+            });
+        }
+    }
 
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         self.actions.push(format!("entry {}", chart.fqn(state)));
@@ -203,7 +246,7 @@ impl Hook for Trace {
 
     fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
         let targets: Vec<String> = ways.map(|edge| chart.fqn(chart.ends(edge).1).to_string()).collect();
-        self.notes.push(format!("conflicting transitions from src {} to {}", chart.fqn(connector), targets.join(", ")));
+        self.note(format!("conflicting transitions from src {} to {}", chart.fqn(connector), targets.join(", ")));
     }
 
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
@@ -211,6 +254,6 @@ impl Hook for Trace {
     }
 
     fn not_entered(&mut self, chart: &Chart) {
-        self.notes.push(format!("failed to enter, no valid path from {}", chart.fqn(chart.initial())));
+        self.note(format!("failed to enter, no valid path from {}", chart.fqn(chart.initial())));
     }
 }

@@ -61,6 +61,11 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 
 /// Brings a deployment with this coordinator up, lets `seconds` pass, takes it down; answers what its functions said.
 pub fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
+    watched(coordinator, seconds, |_| {})
+}
+
+/// The same; `look` sees the session before it is taken down.
+fn watched(coordinator: &str, seconds: u64, look: impl FnOnce(&davit::session::Session)) -> Vec<String> {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", coordinator)];
     let folder = folder(&files);
     let libraries = davit::runtime::Libraries::new();
@@ -79,6 +84,7 @@ pub fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
     }));
     session.bring_up().expect("up");
     clock.sleep(Duration::from_secs(seconds));
+    look(&session);
     session.take_down(false);
     clock.shutdown();
     said.lock().unwrap().clone()
@@ -103,6 +109,63 @@ fn functions_that_fail_or_hang_keep_no_deployment_from_coming_up() {
         );
         assert!(said.contains(&"info: effect make.ok".to_owned()), "{said:?}");
     }
+}
+
+/// What the status says of events that functions send faster than the chart takes them.
+#[test]
+fn events_lost_inside_a_coordinator_are_counted() {
+    let text = COORDINATOR.replace(
+        "entry = 'make' }",
+        "entry = { 'make', function(fsm) for i = 1, 3000 do rfsm.send_events(fsm, 'x') end end } }",
+    );
+    let mut lost = None;
+    let said = watched(&text, 1, |session| lost = Some(session.status().dropped));
+    // And the completion of the state, which found no room either.
+    assert_eq!(lost.expect("a status").inside, 3000 - 1024 + 1);
+    assert_eq!(said.iter().filter(|s| s.contains("1,976 events found no room")).count(), 1, "{said:?}");
+}
+
+/// A function that waits outside of Lua, here for a file that nobody writes: told once, and shown in the status; the
+/// session ends without waiting for it.
+#[cfg(unix)]
+#[test]
+fn a_coordinator_that_hangs_in_a_function_is_told() {
+    let folder = folder(&[
+        ("d.yaml", &DEPLOYMENT.replace("trusted: true", "trusted: { open: [io] }")),
+        ("configurations.lua", CONFIGURATIONS),
+    ]);
+    let pipe = folder.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("it runs").success());
+    let text = COORDINATOR.replace("return rfsm.state {", &format!("local function wait() io.open('{}'):read('a') end return rfsm.state {{", pipe.display()))
+        .replace("rfsm.trans { src = 'fault'", "rfsm.trans { src = 'operational', tgt = 'operational', events = { 'e_hang' }, effect = wait }, rfsm.trans { src = 'fault'");
+    std::fs::write(folder.path().join("coordinator.lua"), text).expect("a file");
+    let read =
+        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
+    let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+    let clock = Clock::real();
+    let _me = clock.enter();
+    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default()));
+    let session = app::start_on(&checked, platform, &clock);
+    let told: Arc<Mutex<Vec<(String, f64)>>> = Arc::default();
+    let heard = told.clone();
+    let driver = Arc::downgrade(&session);
+    session.hub().observe(Arc::new(move |_, what| {
+        if let Happening::Slow { coordinator, seconds } = what {
+            heard.lock().unwrap().push((coordinator.clone(), *seconds));
+            if let Some(session) = driver.upgrade() {
+                session.command(davit::session::Command::Shutdown { force: true });
+            }
+        }
+    }));
+    session.bring_up().expect("up");
+    session.raise(davit::model::EventName::new("e_hang").unwrap(), "test");
+    session.serve();
+    let slow = session.status().slow;
+    assert!(slow.len() == 1 && slow.values().all(|seconds| *seconds > 1.0), "{slow:?}");
+    assert_eq!(told.lock().unwrap().len(), 1);
+    assert!(session.take_down(true).is_clean());
+    // So that the thread ends.
+    std::fs::write(&pipe, "x").expect("somebody reads");
 }
 
 #[test]

@@ -109,11 +109,14 @@ fn a_printer_that_fails_does_not_swallow_the_error() {
 
 #[test]
 fn a_flood_of_events_and_lines_is_bounded_and_said() {
-    let flood = "entry = function(fsm) for i = 1, 20000 do rfsm.send_events(fsm, 'x' .. i) end end";
+    let flood = "entry = function(fsm) for i = 1, 10000 do rfsm.send_events(fsm, 'x' .. i) end end";
     let seen = model(flood, "").play(&["", "run"]);
     assert!(seen[0].queue.len() <= limits::CHART_QUEUE, "{}", seen[0].queue.len());
     assert_eq!(seen[0].queue[0], "x1");
-    assert!(seen[0].notes.iter().any(|n| n.contains("found no room")), "{:?}", seen[0].notes.first());
+    assert_eq!(seen[0].notes, ["error: 8,976 events found no room: at most 1,024 wait for a step"]);
+    // One line a step, however many calls sent them.
+    let flood = "entry = function(fsm) for i = 1, 10000 do rfsm.send_events(fsm, 'x', 'y') end end";
+    assert_eq!(model(flood, "").notes(&[""]), ["error: 18,976 events found no room: at most 1,024 wait for a step"]);
     let notes =
         model("entry = function() for i = 1, 2000 do print(i) end print(('x'):rep(1e6)) end", "").notes(&["run"]);
     assert_eq!(notes.len(), limits::SAID_LINES + 1);
@@ -181,6 +184,12 @@ fn machines_that_are_stepped_for_ever_end() {
 }
 
 #[test]
+fn what_the_host_should_have_given_is_named_where_it_is_missed() {
+    told(&model("entry = function() rtt.log('x') end", ""), "ENTRY", "`--host FILE` of `davit sim`");
+    told(&model("", ", effect = function() yarp() end"), "EFFECT", "there is no `yarp`");
+}
+
+#[test]
 fn a_step_hook_that_fails_is_told() {
     let model = Model::new(
         "local hooked = false
@@ -232,4 +241,102 @@ fn strange_models_are_refused_or_read() {
             loaded.findings
         );
     }
+}
+
+#[test]
+fn files_that_load_each_other_in_a_circle_are_named() {
+    for files in [
+        &[("model.lua", "return rfsm.load('model.lua')")][..],
+        &[
+            ("model.lua", "local f = function() end return rfsm.load('b.lua')"),
+            ("b.lua", "return rfsm.load('model.lua')"),
+        ],
+    ] {
+        let loaded = super::support::read(files, &[]);
+        assert!(loaded.coordinator.is_none());
+        let text = &loaded.findings[0].message;
+        let way = if files.len() == 1 { "model.lua -> model.lua" } else { "model.lua -> b.lua -> model.lua" };
+        assert!(text.contains("files load each other in a circle") && text.contains(way), "{text}");
+    }
+}
+
+/// What files print while they are loaded is one remark, and is not said again when they are run.
+#[test]
+fn what_is_printed_while_a_model_loads_is_told_once() {
+    let prints = (1..=9).map(|i| format!("print('line {i}') ")).collect::<String>();
+    let text = format!(
+        "{prints} local m = rfsm.init(rfsm.state {{ x = rfsm.state {{}} }})
+         return rfsm.state {{ a = rfsm.state {{ entry = function() print('in a') end }}, rfsm.trans {{ src='initial', tgt='a' }} }}"
+    );
+    let loaded = super::support::read(&[("model.lua", &text)], &[]);
+    let said: Vec<_> = loaded.findings.iter().filter(|f| f.code.to_string() == "lua::print").collect();
+    assert_eq!(said.len(), 1, "{said:?}");
+    let expected = "`model.lua` prints while it is loaded: line 1; line 2; line 3; line 4; line 5; and 5 more lines";
+    assert_eq!(said[0].message, expected);
+    assert_eq!(Model::new(&text).notes(&["run"]), ["in a"]);
+}
+
+/// What functions print is placed between what happened before and after it.
+#[test]
+fn notes_stand_where_they_happened() {
+    let body = "entry = function() print('in a') end, exit = function() print('out of a') end";
+    let seen = model(body, ", effect = function() print('on the way') end").play(&["", "e"]);
+    let text = seen[1].to_string();
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let at = |line: &str| lines.iter().position(|l| *l == line).unwrap_or_else(|| panic!("{line}: {lines:?}"));
+    assert!(at("exit root.a") < at("note: out of a") && at("note: out of a") < at("note: on the way"));
+    assert!(at("note: on the way") < at("entry root.b") && at("entry root.b") < at("note: in b"), "{lines:?}");
+    assert_eq!(seen[1].notes_after, [1, 1, 2]);
+}
+
+#[test]
+fn a_machine_that_never_rests_is_shown_in_short() {
+    let model = Model::new(
+        "return rfsm.state { a = rfsm.state { entry = function() print('a') end }, b = rfsm.state {}, rfsm.trans { src='initial', tgt='a' },
+           rfsm.trans { src='a', tgt='b', events={'e_done'} }, rfsm.trans { src='b', tgt='a', events={'e_done'} } }",
+    );
+    let seen = &model.play(&["run"])[0];
+    assert!(seen.actions.len() > 10_000);
+    let text = seen.to_string();
+    let left_out = seen.actions.len() - 2 * limits::SIM_ACTIONS_SHOWN;
+    assert!(text.contains(&format!("… {left_out} more are left out")), "{}", text.len());
+    assert!(text.lines().count() < 2 * limits::SIM_ACTIONS_SHOWN + limits::SIM_NOTES + 10);
+}
+
+/// Events and errors that are no texts are told without addresses, so that two runs tell the same.
+#[test]
+fn nothing_that_is_told_has_an_address() {
+    let body = "entry = function(fsm) rfsm.send_events(fsm, { 1 }, print, fsm[2].events[1]) error({}) end";
+    let model = Model::new(&format!(
+        "local known = {{}} return rfsm.state {{ a = rfsm.state {{ {body} }}, b = rfsm.state {{}}, rfsm.trans {{ src='initial', tgt='a' }},
+           rfsm.trans {{ src='a', tgt='b', events={{ known }}, guard=function() return false end }} }}"
+    ));
+    let seen = &model.play(&[""])[0];
+    assert_eq!(seen.queue[..3], ["table#unlisted1", "function#unlisted2", "table#1"], "{:?}", seen.queue);
+    assert_eq!(seen.notes, ["error: ENTRY error executing entry of root.a: the error is a table and no text"]);
+}
+
+/// `rfsm.md` §5: set after the entry, away after the exit.
+#[test]
+fn the_active_leaf_is_found_in_the_machine() {
+    let text = "local function show(where, fsm) print(where, fsm._act_leaf and fsm._act_leaf._fqn) end
+        local a = rfsm.state { entry = function(fsm) show('entry', fsm) end, doo = function(fsm) show('doo', fsm) end,
+                               exit = function(fsm) show('exit', fsm) end }
+        return rfsm.state { a = a, b = rfsm.state {}, rfsm.trans { src='initial', tgt='a' },
+          post_step_hook = function(fsm) show('after', fsm) end,
+          rfsm.trans { src='a', tgt='b', events={'e'}, effect = function(fsm) show('effect', fsm) end } }";
+    let notes = Model::new(text).notes(&["", "run", "e"]);
+    assert_eq!(notes[..2], ["entry false", "after root.a"], "{notes:?}");
+    assert!(notes.contains(&"doo root.a".to_owned()), "{notes:?}");
+    assert_eq!(notes[notes.len() - 3..], ["exit root.a", "effect false", "after root.b"], "{notes:?}");
+    let own = super::lab::run(
+        "local m = rfsm.init(rfsm.state { err = false, warn = false, info = false, a = rfsm.state {}, b = rfsm.state {},
+           rfsm.trans { src='initial', tgt='a' }, rfsm.trans { src='a', tgt='b', events={'e'} } })
+         local before = m._act_leaf
+         rfsm.run(m) local first = m._act_leaf._fqn
+         rfsm.send_events(m, 'e') rfsm.run(m) local second = m._act_leaf._fqn
+         rfsm.exit_state(m, m) local left = m._act_leaf rfsm.run(m)
+         rfsm.reset(m) return before, first, second, left, m._act_leaf",
+    );
+    assert_eq!(serde_json::Value::from(own), serde_json::json!([false, "root.a", "root.b", false, false]));
 }

@@ -374,10 +374,15 @@ fn it_is_detached_though_a_function_of_its_model_hangs() {
     coordinator.deliver(Incoming::control(event("e_aligned"))).unwrap();
     clock.sleep(Duration::from_millis(1));
     let asked = clock.now();
-    assert!(!coordinator.is_settled());
+    assert!(!coordinator.is_settled() && !coordinator.hangs());
+    assert!(coordinator.reacting_since().is_some_and(|since| since < asked));
+    clock.sleep(Duration::from_secs(1));
+    assert!(coordinator.hangs(), "for longer than a second");
+    let asked = clock.now();
     coordinator.detach();
     assert_eq!(clock.now(), asked, "nobody waits for it");
     assert!(coordinator.stop(clock.now() + Duration::from_secs(1)).is_err(), "its thread is still in the function");
     clock.sleep(Duration::from_secs(20));
+    assert!(!coordinator.hangs() && coordinator.reacting_since().is_none());
     assert!(log.take().is_empty(), "what it comes back with is told to nobody");
 }

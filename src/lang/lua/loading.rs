@@ -8,6 +8,9 @@ use crate::lang::tree::Reading;
 use crate::model::{Finding, codes};
 use mlua::{Lua, LuaString, Result, Table, Value};
 
+/// What a text that is loaded is called.
+const TEXT: &str = "rfsm.load_str";
+
 /// Levels of files that load files.
 const LEVELS: usize = 16;
 
@@ -32,7 +35,7 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> Result<()> {
             let text = text.to_string_lossy();
             let reading = {
                 let mut recorder = recorder.borrow_mut();
-                let file = recorder.cx.sources.add_file("rfsm.load_str", text.clone(), Language::Lua);
+                let file = recorder.cx.sources.add_file(TEXT, text.clone(), Language::Lua);
                 Reading { file, whole: recorder.cx.sources.whole_file(file) }
             };
             within(lua, &recorder, &text, reading, &world)
@@ -44,8 +47,19 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> Result<()> {
 fn within(lua: &Lua, shared: &Shared, text: &str, reading: Reading, world: &Table) -> Result<Value> {
     let before = {
         let mut recorder = shared.borrow_mut();
-        recorder.level += 1;
-        if recorder.level > LEVELS {
+        let name = |file| recorder.cx.sources.file(file).name.to_string();
+        let (loader, file) = (name(recorder.reading.file), name(reading.file));
+        if recorder.loading.is_empty() {
+            recorder.loading.push(loader);
+        }
+        if file != TEXT
+            && let Some(at) = recorder.loading.iter().position(|known| *known == file)
+        {
+            let way: Vec<&str> = recorder.loading[at..].iter().chain([&file]).map(String::as_str).collect();
+            return Err(mlua::Error::runtime(format!("files load each other in a circle: {}", way.join(" -> "))));
+        }
+        recorder.loading.push(file);
+        if recorder.loading.len() > LEVELS {
             return Err(mlua::Error::runtime(format!("files load files more than {LEVELS} deep")));
         }
         std::mem::replace(&mut recorder.reading, reading)
@@ -54,7 +68,7 @@ fn within(lua: &Lua, shared: &Shared, text: &str, reading: Reading, world: &Tabl
     let value: Value = chunk(lua, shared, text, world.clone())?.call(())?;
     let mut recorder = shared.borrow_mut();
     recorder.reading = before;
-    recorder.level -= 1;
+    recorder.loading.pop();
     Ok(value)
 }
 

@@ -61,8 +61,8 @@ pub struct Recorder {
     pub parsing: bool,
     /// Where files that it loads are; none: it may not load any.
     pub loads: Option<super::Loads>,
-    /// How many files are being run inside each other.
-    pub level: usize,
+    /// Files that are being run, each loaded by the one before it.
+    pub loading: Vec<String>,
     /// Calls so far on the current line, by constructor.
     line: u32,
     on_line: Vec<(&'static str, u32)>,
@@ -83,7 +83,7 @@ impl Recorder {
             undefined: FxHashSet::default(),
             parsing: false,
             loads: None,
-            level: 0,
+            loading: Vec::new(),
             line: 0,
             on_line: Vec::new(),
         }
