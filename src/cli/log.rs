@@ -82,7 +82,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             entry["events"]
         ),
         "slow" => format!(
-            "{}       {} has been in a function for {:.1} s",
+            "{}       coordinator `{}` has been in a function for {:.1} s",
             out.paint(Style::Care, "slow"),
             text(&entry["coordinator"]),
             entry["seconds"].as_f64().unwrap_or_default()

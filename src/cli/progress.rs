@@ -103,7 +103,9 @@ impl Progress {
             }
             Happening::Slow { coordinator, seconds } => {
                 let word = out.paint(Style::Care, "slow");
-                self.line(format!("{time}  {word}  {coordinator} has been in a function for {seconds:.1} s"));
+                self.line(format!(
+                    "{time}  {word}  coordinator `{coordinator}` has been in a function for {seconds:.1} s"
+                ));
             }
             Happening::Phase { phase: Phase::Broken } => {
                 self.line(format!("{time}  {}", out.paint(Style::Bad, "broken")));

@@ -139,7 +139,8 @@ if table.concat then
       -- What is absent ends it with an error.
       if count ~= 0 and rawget(list, first) == nil then count = 0
       elseif count ~= 0 and rawget(list, last) == nil then count = rawlen(list) end
-      if count > FEW then charge(count) end
+      -- Numbers are written out: each takes as long as an instruction or two.
+      if count > FEW then charge(4 * count) end
       return answered("concat", pcall(concat, list, separator, i, j))
     end
     local values, count = {}, 0
@@ -151,7 +152,7 @@ if table.concat then
       count = count + 1
       values[count] = value
     end
-    if count > FEW then charge(count) end
+    if count > FEW then charge(4 * count) end
     return answered("concat", pcall(concat, values, separator, 1, count))
   end
 end
