@@ -6,6 +6,7 @@ use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
 use super::outcome::{Ended, Mode, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
+use crate::model::finding::nearest;
 use crate::model::names::{EventName, NameError};
 use crate::time::Time;
 use serde::Serialize;
@@ -46,6 +47,9 @@ pub enum SimError {
     #[error(transparent)]
     Event(#[from] NameError),
 }
+
+/// Events of a line that no transition lists and that are named in one remark.
+const UNKNOWN_SHOWN: usize = 4;
 
 /// A machine that is stepped by lines of text, on a clock of its own.
 #[derive(Debug, Clone)]
@@ -114,10 +118,14 @@ impl<'c, F: Hook> Sim<'c, F> {
             _ => {
                 let names: Vec<EventName> = words.iter().map(|word| EventName::new(word)).collect::<Result<_, _>>()?;
                 let events: Vec<EventId> =
-                    names.into_iter().map(|name| self.functions.event(self.machine.chart(self.chart), name)).collect();
+                    names.iter().map(|name| self.functions.event(self.machine.chart(self.chart), *name)).collect();
                 lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
                 let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
-                self.machine.step(self.chart, self.now, 1, &mut hook)
+                let stepped = self.machine.step(self.chart, self.now, 1, &mut hook);
+                if !stepped.transition {
+                    self.remark_unknown(&names, &mut trace);
+                }
+                stepped
             }
         };
         if lost > 0 {
@@ -125,6 +133,23 @@ impl<'c, F: Hook> Sim<'c, F> {
             trace.note(format!("{lost} events found no room: a set holds at most {most}"));
         }
         Ok(self.observe(stepped, trace))
+    }
+
+    /// An event that is spelt wrongly does as little as one that is only not enabled.
+    fn remark_unknown(&self, names: &[EventName], trace: &mut Trace) {
+        let chart = self.chart();
+        let mut unknown: Vec<&str> = Vec::new();
+        for name in names.iter().filter(|name| chart.event(**name) == EventId::OTHER).map(EventName::as_str) {
+            if name != "e_init_fsm" && !unknown.contains(&name) && unknown.len() <= UNKNOWN_SHOWN {
+                unknown.push(name);
+            }
+        }
+        let more = if unknown.len() > UNKNOWN_SHOWN { " and others" } else { "" };
+        unknown.truncate(UNKNOWN_SHOWN);
+        let Some(last) = unknown.last() else { return };
+        let near = nearest(last, chart.events().iter().map(EventName::as_str)).filter(|_| unknown.len() == 1);
+        let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+        trace.note(format!("no transition lists `{}`{more}{near}", unknown.join("`, `")));
     }
 
     fn observe(&mut self, stepped: Stepped, mut trace: Trace) -> Observation {

@@ -39,3 +39,20 @@ fn a_set_too_large_is_cut_and_said() {
     assert_eq!(seen.notes.len(), 1, "one place was taken by the event of the first entry");
     assert!(seen.notes[0].starts_with("5 events found no room"));
 }
+
+#[test]
+fn an_event_that_no_transition_lists_is_told_from_one_that_is_not_enabled() {
+    let chart = compiled(vec![
+        s("a", vec![]),
+        s("b", vec![]),
+        t("initial", "a", ""),
+        t("a", "b", "e_slip"),
+        t("b", "a", "e_back"),
+    ]);
+    let mut sim = Sim::new(&chart);
+    line(&mut sim, "run");
+    assert_eq!(line(&mut sim, "e_slipd").notes, ["no transition lists `e_slipd`; did you mean `e_slip`?"]);
+    assert_eq!(line(&mut sim, "undo x y z w v x").notes, ["no transition lists `undo`, `x`, `y`, `z` and others"]);
+    assert!(line(&mut sim, "e_back").notes.is_empty(), "known, and not enabled");
+    assert!(line(&mut sim, "e_slip x").notes.is_empty(), "a transition is taken");
+}
