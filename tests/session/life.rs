@@ -91,8 +91,15 @@ fn one_coordinator_drives_two_platforms() {
 }
 
 #[test]
-fn the_whole_story_runs_as_a_script() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/youbot_story.lua");
+fn the_examples_stories_run_as_scripts() {
+    for story in ["examples/youbot_story.lua", "examples/side_by_side/story.lua"] {
+        runs(story);
+    }
+}
+
+/// A script that ends well, with nothing left and nothing forced.
+fn runs(story: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(story);
     let said = Arc::new(Mutex::new(Vec::new()));
     let heard = said.clone();
     let clock = Clock::simulated();

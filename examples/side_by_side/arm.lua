@@ -1,0 +1,32 @@
+-- While something is held, the arm is slow. It learns of it from the gripper's `e_held` and `e_let_go`.
+return state {
+  off = state {},
+  up = state { config = "arm_base",
+    starting = state {},
+    ready = state {},
+    careful = state { config = "arm_slow" },
+    trans { src = "initial", tgt = "starting" },
+    trans { src = "starting", tgt = "ready", events = { "arm_base.ok" } },
+    trans { src = "ready", tgt = "careful", events = { "e_held" } },
+    trans { src = "careful", tgt = "ready", events = { "e_let_go", "arm_slow.failed", "arm_slow.broken" } },
+  },
+  leaving = state {},
+  fault = state {},
+  -- What an undo that failed has left is tried once more, in order.
+  clearing = state {
+    inner = state { entry = "arm_slow.undo" },
+    outer = state { entry = "arm_base.undo" },
+    trans { src = "initial", tgt = "inner" },
+    trans { src = "inner", tgt = "outer", events = { "arm_slow.undone" } },
+  },
+  trans { src = "initial", tgt = "off" },
+  trans { src = "off", tgt = "up", events = { "e_start" } },
+  trans { src = "up", tgt = "fault", events = { "arm_base.failed", "arm_base.broken" } },
+  trans { src = "up", tgt = "leaving", events = { "e_stop" } },
+  trans { src = "leaving", tgt = "off", events = { "arm_base.undone" } },
+  trans { src = "leaving", tgt = "fault", events = { "arm_base.undo.failed", "arm_base.undo.broken" } },
+  trans { src = "fault", tgt = "clearing", events = { "e_stop" } },
+  trans { src = "clearing", tgt = "off", events = { "arm_base.undone" } },
+  trans { src = "clearing", tgt = "fault",
+          events = { "arm_slow.undo.failed", "arm_slow.undo.broken", "arm_base.undo.failed", "arm_base.undo.broken" } },
+}

@@ -1,0 +1,32 @@
+-- Holds on `e_grasp`, and tells the others when it does.
+return state {
+  off = state {},
+  up = state { config = "gripper_base",
+    starting = state {},
+    open = state {},
+    closing = state { config = "gripper_hold" },
+    trans { src = "initial", tgt = "starting" },
+    trans { src = "starting", tgt = "open", events = { "gripper_base.ok" } },
+    trans { src = "open", tgt = "closing", events = { "e_grasp" }, effect = "e_held" },
+    trans { src = "closing", tgt = "open", events = { "e_release", "gripper_hold.failed", "gripper_hold.broken" }, effect = "e_let_go" },
+  },
+  leaving = state {},
+  fault = state {},
+  -- What an undo that failed has left is tried once more, in order.
+  clearing = state {
+    inner = state { entry = "gripper_hold.undo" },
+    outer = state { entry = "gripper_base.undo" },
+    trans { src = "initial", tgt = "inner" },
+    trans { src = "inner", tgt = "outer", events = { "gripper_hold.undone" } },
+  },
+  trans { src = "initial", tgt = "off" },
+  trans { src = "off", tgt = "up", events = { "e_start" } },
+  trans { src = "up", tgt = "fault", events = { "gripper_base.failed", "gripper_base.broken" } },
+  trans { src = "up", tgt = "leaving", events = { "e_stop" } },
+  trans { src = "leaving", tgt = "off", events = { "gripper_base.undone" } },
+  trans { src = "leaving", tgt = "fault", events = { "gripper_base.undo.failed", "gripper_base.undo.broken" } },
+  trans { src = "fault", tgt = "clearing", events = { "e_stop" } },
+  trans { src = "clearing", tgt = "off", events = { "gripper_base.undone" } },
+  trans { src = "clearing", tgt = "fault",
+          events = { "gripper_hold.undo.failed", "gripper_hold.undo.broken", "gripper_base.undo.failed", "gripper_base.undo.broken" } },
+}
