@@ -136,7 +136,10 @@ impl<'c, F: Hook> Sim<'c, F> {
     }
 
     /// An event that is spelt wrongly does as little as one that is only not enabled.
-    fn remark_unknown(&self, names: &[EventName], trace: &mut Trace) {
+    fn remark_unknown(&mut self, names: &[EventName], trace: &mut Trace) {
+        let mut said = Vec::new();
+        self.functions.said(&mut said);
+        trace.heard(&mut said);
         let chart = self.chart();
         let mut unknown: Vec<&str> = Vec::new();
         for name in names.iter().filter(|name| chart.event(**name) == EventId::OTHER).map(EventName::as_str) {

@@ -69,6 +69,7 @@ fn a_models_own_dbg_hears_of_all_in_order() {
             "CHECKING depth: 2 root.b.b1",
             "TRANSITION none is enabled",
             "DOO begins: root.b.b1",
+            "no transition lists `none`",
         ]
     );
     assert_eq!(seen[3], ["DOO is through: root.b.b1", "RAISED e_done@root.b.b1"]);
