@@ -87,7 +87,7 @@ fn the_latest_value_comes_with_its_age() {
     let lines = log::take(&b.clock);
     // The counter's activity was made first to run, so at common moments it goes first.
     assert_eq!(lines[0], "0 s u=1 at 0 s age 0ns");
-    assert_eq!(lines[9], "0.009000000000000001 s u=1 at 0 s age 9ms");
+    assert_eq!(lines[9], "0.009 s u=1 at 0 s age 9ms");
     assert_eq!(lines[12], "0.012 s u=2 at 0.01 s age 2ms");
     assert_eq!(lines.len(), 13);
 }
