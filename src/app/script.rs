@@ -7,6 +7,7 @@ mod sandbox;
 mod values;
 
 use super::{Refused, StartError};
+use crate::functions::message_within;
 use crate::lang::LoadOptions;
 use crate::limits;
 use crate::model::finding::did_you_mean;
@@ -121,7 +122,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
 fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure> {
     let failed = |error: mlua::Error| ScriptFailure::Lua {
         syntax: matches!(error, mlua::Error::SyntaxError { .. }),
-        message: sandbox::message(&error),
+        message: message_within(&error, limits::SCRIPT_MEMORY),
     };
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;

@@ -3,11 +3,16 @@
 use crate::limits;
 use mlua::Error;
 
-/// The text of an error, with file and line where Lua knows them.
+/// The text of an error of a coordinator's functions, with file and line where Lua knows them.
 pub fn message_of(error: &Error) -> String {
+    message_within(error, limits::FUNCTIONS_BYTES)
+}
+
+/// The same of any state, which may hold so many bytes.
+pub fn message_within(error: &Error, bytes: usize) -> String {
     let text = match error {
         Error::CallbackError { cause, traceback } => {
-            let text = message_of(cause);
+            let text = message_within(cause, bytes);
             return match place(traceback) {
                 Some(place) if !has_place(&text) => format!("{place}: {text}"),
                 _ => text,
@@ -22,8 +27,7 @@ pub fn message_of(error: &Error) -> String {
     let text = text.split("\nstack traceback:").next().unwrap_or_default();
     let text = text.strip_prefix("runtime error: ").unwrap_or(text);
     if text.contains("not enough memory") {
-        let mb = limits::FUNCTIONS_BYTES / 1024 / 1024;
-        return format!("needs more than the {mb} MB of memory that the coordinator's functions may hold");
+        return format!("needs more than the {} MB of memory that it may hold", bytes / 1024 / 1024);
     }
     match without_address(text) {
         Some(kind) => format!("the error is a {kind} and no text"),
@@ -47,7 +51,7 @@ pub fn undefined_global(message: &str) -> Option<&str> {
 const OURS: [&str; 2] = ["rfsm", "[davit]"];
 
 /// The innermost place in a stack trace that is not ours: `story.lua:12`.
-pub fn place(traceback: &str) -> Option<String> {
+fn place(traceback: &str) -> Option<String> {
     traceback.lines().map(str::trim).find_map(|line| {
         let (place, _) = line.split_once(": in ")?;
         let (file, number) = place.rsplit_once(':')?;

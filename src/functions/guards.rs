@@ -3,7 +3,7 @@
 //! (`lang`), and use only [`loops`].
 
 use super::budget::Budget;
-use super::errors::message_of;
+use super::errors::message_within;
 use super::{patterns, work};
 use mlua::thread::ThreadStatus;
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
@@ -37,8 +37,8 @@ pub fn install(lua: &Lua, native: &Table, bytes: usize, time: Duration) -> Resul
     native.raw_set("failure", lua.create_function(move |_, ()| Ok(ended.clone()))?)?;
     native.raw_set(
         "text_of",
-        lua.create_function(|lua, value: Value| match value {
-            Value::Error(error) => Ok(Value::String(lua.create_string(message_of(&error))?)),
+        lua.create_function(move |lua, value: Value| match value {
+            Value::Error(error) => Ok(Value::String(lua.create_string(message_within(&error, bytes))?)),
             other => Ok(other),
         })?,
     )?;

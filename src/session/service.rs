@@ -105,12 +105,14 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
     let within = within(params)?;
     let known = session.events();
     let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
-    let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
     let mut answer = json!({ "accepted": true });
-    if !known.contains(&event) {
-        if !session.sees_all_events() {
-            return Err(refused(format!("the coordinator knows no event `{name}`"), near()));
-        }
+    let listed = known.iter().any(|known| known.as_str() == name);
+    // Asked before it becomes a name: names are kept for ever.
+    if !listed && !session.sees_all_events() {
+        return Err(refused(format!("the coordinator knows no event `{name}`"), near()));
+    }
+    let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
+    if !listed {
         answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
     }
     let since = session.hub().heard();

@@ -170,6 +170,10 @@ fn a_script_that_fails_leaves_nothing_behind() {
             "million instructions",
         ),
         ("deploy('@generic_arm.yaml') local ok, why = pcall(wait, -1) error(type(why) .. ' ' .. why, 0)", "string"),
+        (
+            "deploy('@generic_arm.yaml') local t = {} while true do t[#t + 1] = ('x'):rep(1e6) .. #t end",
+            "more than the 256 MB",
+        ),
         ("deploy('@generic_arm.yaml') deploy('@generic_arm.yaml')", "already up"),
     ] {
         let (failure, clean) = run_text(script);

@@ -1,7 +1,7 @@
 //! The Lua that scripts run in: the language and its harmless libraries, no files, processes or network, and bounds on
 //! memory and on instructions, which nothing in a script outlives.
 
-use crate::functions::{self, Guards, place};
+use crate::functions::{self, Guards};
 use crate::limits;
 use mlua::{Lua, LuaOptions, Result, StdLib, Value};
 
@@ -17,25 +17,6 @@ pub fn state() -> Result<(Lua, Guards)> {
     }
     let guards = functions::guard(&lua, &lua.create_table()?, limits::SCRIPT_MEMORY, limits::SCRIPT_TIME)?;
     Ok((lua, guards))
-}
-
-/// The text of an error, with file and line where Lua knows them, without stack traces.
-pub fn message(error: &mlua::Error) -> String {
-    match error {
-        mlua::Error::CallbackError { cause, traceback } => {
-            let text = message(cause);
-            match place(traceback) {
-                Some(place) if !text.starts_with(&place) => format!("{place}: {text}"),
-                _ => text,
-            }
-        }
-        mlua::Error::SyntaxError { message, .. }
-        | mlua::Error::RuntimeError(message)
-        | mlua::Error::MemoryError(message) => {
-            message.split("\nstack traceback:").next().unwrap_or_default().to_owned()
-        }
-        other => other.to_string(),
-    }
 }
 
 /// The text without a first line `#!…`, which the shell reads and Lua does not; its line stays, for the numbers.
