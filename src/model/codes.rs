@@ -498,18 +498,34 @@ codes! {
         "The configuration has a `timeout`, and it was over before all steps were done. What had been done was undone. Raise the \
          timeout, or see in the log which step takes so long.";
     BROKEN = "run::broken", "the system is neither as before nor as asked for",
-        "An application failed and could not be undone completely (a step failed while undoing, something irreversible had been \
-         done, an outcome could not be settled, or the configuration says `on_failure = \"hold\"`). The finding names exactly what \
-         differs. Until that is recovered every request but a safe one is answered *failed*. Use `davit drift` and `davit recover`.";
-    STILL_BROKEN = "run::still_broken", "the system is broken since an earlier request",
-        "An earlier request left the system neither as before nor as asked for. Plans are made from a known system, so nothing \
-         but safe configurations is applied until the difference is recovered: `davit recover --back`, `--forward`, or a shutdown.";
+        "An application failed and was not undone completely: a step failed while undoing, taking it back would move something \
+         nobody asked to move, something irreversible had been done, an outcome could not be settled, or the configuration says \
+         `on_failure = \"hold\"`. What was done and not taken back is a frame marked *partial*; `davit undo ID` takes it back as far \
+         as that goes. What is not known, or differs from the model, stays claimed until it is recovered: `davit drift` shows it, \
+         `davit recover --back` undoes it, `davit recover --accept` takes it as it is.";
+    STILL_BROKEN = "run::still_broken", "what the request names is broken since an earlier request",
+        "An earlier request left components of which not all is known, or that are not as the model has them. Plans are made from \
+         what is known, so a request that names one of them is refused; everything else goes on. `ID.undo` of the configuration \
+         that broke repairs them, and so do `davit recover --back`, `davit recover --accept` and a shutdown.";
     INTERRUPTED = "run::interrupted", "a safe configuration went first",
         "A configuration marked `safe` was requested while this request was being carried out. No further step of it was issued, \
          the safe configuration was applied, and what it did not touch was rolled back. Ask again when it is safe to.";
     OVERTAKEN = "run::overtaken", "a queued request was overtaken by its own undo",
         "`ID` was still waiting when `ID.undo` of the same requester came: both cancel each other and nothing is done at all. \
          The first is answered `ID.cancelled`, the second `ID.undone`.";
+    GIVEN_UP = "run::given_up", "a request was given up by its own undo",
+        "`ID.undo` came from the same requester while `ID` was being carried out: no further step of it was begun, calls that \
+         were out were told to end, and what had been done was taken back, also what moves. It was answered `ID.cancelled`.";
+    MOVES_WHILE_SAFE = "run::moves_while_safe", "something would move while a safe configuration is in force",
+        "While a frame of a `safe` configuration is in force nothing moves, except by a request that the coordinator raises in \
+         a later step: an undo raised in the same step as the safe configuration is refused when a step of it moves, and so \
+         is an operator's request without `--force`. Nothing was done.";
+    BUSY = "run::busy", "what the request needs is being worked on",
+        "Undoing down to a number of frames, committing, recovering and undoing the frame of somebody else need that nothing \
+         is under way or waiting that concerns the same components. Nothing was done. Ask again when it is quiet.";
+    NEEDS_FORCE = "run::needs_force", "an operator's request concerns a coordinator's frame",
+        "An operator undoes the operator's own frames, and commits while no frame of a coordinator is in force. What belongs to a \
+         coordinator is taken back by that coordinator, which else would not know of it. With `--force` it is done all the same.";
     NOT_CONFIRMED = "run::not_confirmed", "a confirmation did not come",
         "The configuration says `confirm`: after it was applied an event had to come within a time, and it did not. Its frame was \
          popped and `ID.reverted` raised. Find out why the event did not come, or give it more time.";

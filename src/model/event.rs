@@ -35,6 +35,69 @@ impl fmt::Display for Ask {
     }
 }
 
+/// What a name means that a coordinator raises (design §7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Raise {
+    /// A request: a configuration's ID, one with `.undo` behind it, or `undo`.
+    Request(Ask),
+    /// `X.undo` where X is no configuration: answered `X.undo.failed`.
+    UnknownUndo,
+    /// No request; an event, if somebody takes it for one.
+    Event,
+}
+
+impl Raise {
+    /// What `name` means where `configured` tells which configurations there are.
+    pub fn of(name: EventName, configured: impl Fn(ConfigId) -> bool) -> Self {
+        let text = name.as_str();
+        if text == "undo" {
+            return Self::Request(Ask::Undo);
+        }
+        if let Some(id) = text.strip_suffix(".undo") {
+            return match ConfigId::new(id) {
+                Ok(id) if configured(id) => Self::Request(Ask::UndoOf(id)),
+                _ => Self::UnknownUndo,
+            };
+        }
+        match ConfigId::new(text) {
+            Ok(id) if configured(id) => Self::Request(Ask::Apply(id)),
+            _ => Self::Event,
+        }
+    }
+}
+
+impl Ask {
+    /// Whether it takes something back.
+    pub fn is_undo(self) -> bool {
+        matches!(self, Self::UndoOf(_) | Self::Undo | Self::UndoTo(_))
+    }
+
+    /// The verdict when it got what it asked for.
+    pub fn done(self) -> Verdict {
+        if self.is_undo() { Verdict::Undone } else { Verdict::Ok }
+    }
+
+    /// The verdict when nothing has changed.
+    pub fn failed(self) -> Verdict {
+        if self.is_undo() { Verdict::UndoFailed } else { Verdict::Failed }
+    }
+
+    /// The verdict when something is left in between.
+    pub fn broken(self) -> Verdict {
+        if self.is_undo() { Verdict::UndoBroken } else { Verdict::Broken }
+    }
+
+    /// Every verdict that it can be answered with, notices about its frame included.
+    pub fn verdicts(self) -> &'static [Verdict] {
+        use Verdict::{Broken, Cancelled, Failed, Lost, Ok, Reverted, UndoBroken, UndoFailed, Undone};
+        match self {
+            Self::Apply(_) => &[Ok, Failed, Broken, Cancelled, Reverted, Lost],
+            Self::Commit => &[Ok, Failed],
+            _ => &[Undone, UndoFailed, UndoBroken],
+        }
+    }
+}
+
 /// How an answer ends a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -55,6 +118,8 @@ pub enum Verdict {
     UndoBroken,
     /// Popped because its confirmation did not come: `ID.reverted`.
     Reverted,
+    /// What it stands for is no longer so: `ID.lost`.
+    Lost,
 }
 
 impl Verdict {
@@ -86,6 +151,7 @@ impl Verdict {
             Self::UndoBroken if plain => ".broken",
             Self::UndoBroken => ".undo.broken",
             Self::Reverted => ".reverted",
+            Self::Lost => ".lost",
         };
         EventName::new(&format!("{subject}{suffix}")).expect("a status event is a name")
     }

@@ -9,6 +9,7 @@ pub mod finding;
 pub mod functions;
 pub mod monitor;
 pub mod names;
+pub mod outcome;
 pub mod outline;
 pub mod program;
 pub mod run_state;
@@ -24,10 +25,11 @@ pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFail
 pub use deployment::{
     Activity, Beside, BringUp, Deployment, DeploymentLimits, Durability, SimulatedReaction, TakeDown,
 };
-pub use event::{Ask, RequestId, Verdict};
+pub use event::{Ask, Raise, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
 pub use monitor::Monitor;
 pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
+pub use outcome::{Cause, Execution, Outcome};
 pub use program::{Openings, Program};
 pub use run_state::{RunState, Transition};
 pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};

@@ -24,9 +24,14 @@ pub struct Item {
     pub stage: Stage,
     /// Where that was written.
     pub origin: Origin,
+    /// Its place in the list it was taken from; means nothing to the planner.
+    pub of: u32,
 }
 
 impl Item {
+    /// The place of what was taken from no list.
+    pub const NOWHERE: u32 = u32::MAX;
+
     /// A planned step as an item.
     pub fn of(planned: &PlannedStep) -> Self {
         let (call, was) = match &planned.undo {
@@ -34,22 +39,22 @@ impl Item {
             Undo::One(Step::Connect { policy, .. }) => (None, Some(*policy)),
             _ => (None, None),
         };
-        Self { step: planned.step.clone(), call, was, stage: planned.stage, origin: planned.origin }
+        Self { step: planned.step.clone(), call, was, stage: planned.stage, origin: planned.origin, of: planned.id }
     }
 
     /// A step of the inverse of `done`.
-    fn undoing(step: &Step, done: &PlannedStep) -> Self {
+    pub fn undoing(step: &Step, done: &PlannedStep) -> Self {
         let (call, was) = match &done.step {
             Step::Operation(call) => (Some(call.clone()), None),
             Step::Connect { policy, .. } => (None, Some(*policy)),
             _ => (None, None),
         };
-        Self { step: step.clone(), call, was, stage: done.stage, origin: done.origin }
+        Self { step: step.clone(), call, was, stage: done.stage, origin: done.origin, of: Self::NOWHERE }
     }
 
     /// A step by itself.
     fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
-        Self { step, call: None, was: None, stage, origin }
+        Self { step, call: None, was: None, stage, origin, of: Self::NOWHERE }
     }
 }
 
@@ -68,6 +73,8 @@ pub struct Script<'o, 's> {
     view: &'o mut Overlay<'s>,
     /// The steps so far.
     pub steps: Vec<PlannedStep>,
+    /// The place that each step's item had in the list it was taken from.
+    pub of: Vec<u32>,
     /// Where failed components are to go, once something needs them there.
     goals: BTreeMap<ComponentName, (RunState, Stage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
@@ -77,7 +84,7 @@ pub struct Script<'o, 's> {
 impl<'o, 's> Script<'o, 's> {
     /// An empty list over `view`.
     pub fn new(view: &'o mut Overlay<'s>) -> Self {
-        Self { view, steps: Vec::new(), goals: BTreeMap::new(), failed: BTreeSet::new() }
+        Self { view, steps: Vec::new(), of: Vec::new(), goals: BTreeMap::new(), failed: BTreeSet::new() }
     }
 
     /// The system after the steps so far.
@@ -163,6 +170,7 @@ impl<'o, 's> Script<'o, 's> {
         let undo = step::inverse(&item.step, item.call.as_ref(), self.view);
         step::effect(&item.step, self.view);
         let id = StepId::try_from(self.steps.len()).expect("fewer steps than that");
+        self.of.push(item.of);
         self.steps.push(PlannedStep {
             id,
             stage: item.stage,
@@ -186,6 +194,7 @@ impl<'o, 's> Script<'o, 's> {
             step.id += base;
             step.wave += wave;
             step.after.iter_mut().for_each(|id| *id += base);
+            self.of.push(Item::NOWHERE);
             self.steps.push(step);
         }
     }
@@ -206,14 +215,22 @@ impl<'o, 's> Script<'o, 's> {
     ///
     /// # Errors
     /// The false preconditions.
-    pub fn finish(mut self) -> Result<Vec<PlannedStep>, Vec<Violation>> {
+    pub fn finish(self) -> Result<Vec<PlannedStep>, Vec<Violation>> {
+        self.finish_placed().map(|(steps, _)| steps)
+    }
+
+    /// The same, with the place of each step's item.
+    ///
+    /// # Errors
+    /// The false preconditions.
+    pub fn finish_placed(mut self) -> Result<(Vec<PlannedStep>, Vec<u32>), Vec<Violation>> {
         self.settle_all()?;
         if !self.failed.is_empty() {
             for i in 0..self.steps.len() {
                 self.steps[i].after = i.checked_sub(1).map(|p| self.steps[p].id).into_iter().collect();
             }
         }
-        Ok(self.steps)
+        Ok((self.steps, self.of))
     }
 
     /// Brings every failed component to where it is to be.

@@ -6,57 +6,12 @@
 pub mod embedded;
 pub mod simulated;
 
+pub use crate::model::outcome::{Cause, Execution, Outcome};
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
 use crate::time::Time;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-/// How a step ended, as far as the platform knows.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// It happened. An operation's result, if it has one.
-    Done(Option<Value>),
-    /// It did not happen, and the component is as it was.
-    NotDone(Cause),
-    /// No answer in time, or the connection was lost: it may have happened, may yet happen, or not.
-    Unknown(Cause),
-}
-
-/// Why a step was not done, or is not known to be.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Cause {
-    /// The platform's precondition is false (no such component, wrong run state, …).
-    #[error("refused by the platform: {0}")]
-    Refused(String),
-    /// The component's own code answered with an error.
-    #[error("the component failed: {0}")]
-    Failed(String),
-    /// The component's own code panicked; it is faulted.
-    #[error("the component panicked: {0}")]
-    Panicked(String),
-    /// No answer before the deadline.
-    #[error("no answer in time")]
-    Timeout,
-    /// The connection to the component was lost.
-    #[error("the connection was lost: {0}")]
-    Lost(String),
-    /// The component is in quarantine: an earlier call never returned.
-    #[error("in quarantine: an earlier call has not returned")]
-    Quarantined,
-}
-
-/// How a primitive is carried out on this platform.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Execution {
-    /// Wait-free and bounded: may run in the configurator's own thread.
-    Immediate,
-    /// Hardly takes time, but runs code that is not the platform's: on a worker, several in one call
-    /// ([`Platform::execute_brief`]), since the way to the worker would cost more than they do.
-    Brief,
-    /// May take until its deadline: runs on a worker.
-    Blocking,
-}
 
 /// How one of several steps ended.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,61 +1,49 @@
-//! What is in force: frames, and how they are taken back (design §5).
+//! What is in force: frames, how they are taken back, and what a batch of requests means (design §5, §6).
 //!
 //! Pure: a stack never touches a platform, and it never changes by itself. [`transaction`] decides everything beforehand
-//! and gives the steps together with the stack as it will be; [`Stack::commit`] takes that over when the steps are done,
-//! and dropping the transaction leaves the stack as it was.
+//! and gives the steps together with the edits of the stack; [`Stack::apply`] takes those over when the steps are done, and
+//! dropping the plan leaves the stack as it was. What a batch of requests means is decided by [`take_up`]; which batch
+//! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
+//!
+//! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
+//!   batch come to. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
+//! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
+pub mod answer;
+mod batch;
+pub mod claims;
+mod desk;
 mod net;
 mod prepared;
+pub mod request;
 mod share;
 mod squash;
 #[cfg(test)]
 mod tests;
-mod transaction;
+mod work;
+mod world;
 
+pub use answer::{Answer, Reason, Residual};
+pub use batch::{Group, Rules, Told, take_up};
+pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
-pub use transaction::{Request, Transaction, transaction};
+pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
+pub use share::HandOver;
+pub use work::{Op, Part, Planned, transaction};
+pub use world::{Broken, World};
 
-use crate::model::{ComponentName, ConfigId, Finding, Ident, codes};
+use crate::model::{ConfigId, Finding, Ident, codes};
 use crate::plan::footprint::Footprint;
 use crate::plan::prepare::Act;
 use crate::plan::undo::Item;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
 use std::collections::BTreeSet;
-use std::fmt;
 use std::sync::Arc;
-
-/// Who asked for a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Requester {
-    /// A coordinator, by the name of its deployment or the path of its subsystem.
-    Coordinator(ComponentName),
-    /// Somebody at a terminal or behind the control socket.
-    Operator,
-}
-
-impl fmt::Display for Requester {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Coordinator(name) => write!(f, "{name}"),
-            Self::Operator => f.write_str("operator"),
-        }
-    }
-}
-
-impl serde::Serialize for Requester {
-    fn serialize<S: serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
-    }
-}
-
-/// The number of a frame; never used again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-pub struct FrameId(pub u64);
 
 /// A configuration that is contained in a squashed or committed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Part {
+pub struct Buried {
     /// The configuration.
     pub configuration: ConfigId,
     /// Who asked for it.
@@ -69,12 +57,13 @@ pub struct Part {
 pub enum Inverse {
     /// By undoing its steps, last first.
     Steps(Vec<PlannedStep>),
-    /// By this list: several frames squashed into one.
+    /// By this list: several frames squashed into one, or what is left of one.
     List(Vec<Item>),
 }
 
 /// An applied configuration.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::struct_excessive_bools)]
 pub struct Frame {
     /// Its number.
     pub id: FrameId,
@@ -95,9 +84,15 @@ pub struct Frame {
     /// Why undo does not pass it, if it does not.
     pub floor: Option<String>,
     /// What was squashed into it; empty for a frame of its own.
-    pub parts: BTreeSet<Part>,
+    pub parts: BTreeSet<Buried>,
     /// Of a frame that a prepared switch pushed: the switch's acts.
     pub acts: Vec<Act>,
+    /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
+    pub scope: Option<Scope>,
+    /// It is what was done and not taken back of something that ended *broken*.
+    pub partial: bool,
+    /// Its configuration is a `safe` one.
+    pub safe: bool,
 }
 
 impl Frame {
@@ -126,8 +121,8 @@ impl Frame {
         })
     }
 
-    fn part(&self) -> Part {
-        Part { configuration: self.configuration, requester: self.requester, group: self.group }
+    fn buried(&self) -> Buried {
+        Buried { configuration: self.configuration, requester: self.requester, group: self.group }
     }
 }
 
@@ -136,27 +131,31 @@ impl Frame {
 pub struct Stack {
     frames: Vec<Arc<Frame>>,
     /// What was committed: below the first frame.
-    committed: BTreeSet<Part>,
-    /// Frames of states of the coordinator that are active.
-    active: Vec<FrameId>,
+    committed: BTreeSet<Buried>,
     /// Popped frames of prepared switches, to be used again.
     spares: Vec<Arc<Frame>>,
     bound: usize,
     next: u64,
-    version: u64,
+}
+
+/// How a stack changes when a part of a transaction has ended: frames popped, with what they hand over, and pushed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Edits {
+    /// Frames that go.
+    pub pops: Vec<(FrameId, HandOver)>,
+    /// A frame that comes; its number is given when it does.
+    pub push: Option<Arc<Frame>>,
 }
 
 impl Stack {
-    /// An empty stack that squashes past `bound` frames (at least 2).
+    /// An empty stack that squashes past `bound` frames of one requester (at least 2).
     pub fn new(bound: usize) -> Self {
         Self {
             frames: Vec::with_capacity(bound.clamp(2, 4096) + 1),
             committed: BTreeSet::new(),
-            active: Vec::with_capacity(bound.clamp(2, 4096) + 1),
             spares: Vec::with_capacity(prepared::SPARES),
             bound: bound.max(2),
             next: 1,
-            version: 0,
         }
     }
 
@@ -187,56 +186,92 @@ impl Stack {
 
     /// The newest frame of a configuration, by this requester or (none) by anyone. Squashed frames are not found.
     pub fn newest_of(&self, configuration: ConfigId, by: Option<Requester>) -> Option<&Arc<Frame>> {
-        let fits = |f: &&Arc<Frame>| {
-            f.configuration == configuration && !f.is_squashed() && by.is_none_or(|by| f.requester == by)
-        };
-        self.frames.iter().rev().find(fits)
+        newest(&self.frames, configuration, by)
     }
 
     /// Whether a configuration is in a squashed frame or was committed: in force, and not to be undone by itself.
     pub fn is_buried(&self, configuration: ConfigId, by: Option<Requester>) -> bool {
-        let fits = |p: &Part| p.configuration == configuration && by.is_none_or(|by| p.requester == by);
+        let fits = |p: &Buried| p.configuration == configuration && by.is_none_or(|by| p.requester == by);
         self.committed.iter().any(fits) || self.frames.iter().any(|f| f.parts.iter().any(fits))
     }
 
-    /// Marks the frame of a state of the coordinator that is active (never squashed), or no longer is.
-    pub fn set_active(&mut self, frame: FrameId, active: bool) {
-        self.active.retain(|id| *id != frame);
-        if active {
-            self.active.push(frame);
+    /// The safe configurations in force.
+    pub fn safe(&self) -> impl Iterator<Item = ConfigId> + '_ {
+        self.frames.iter().filter(|frame| frame.safe).map(|frame| frame.configuration)
+    }
+
+    /// The state that a frame belongs to has been left, and the frame stays: from now on it is one like others.
+    pub fn unscope(&mut self, frame: FrameId) {
+        if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && f.scope.is_some()) {
+            Arc::make_mut(frame).scope = None;
         }
     }
 
     /// Makes the present state the floor: nothing that is in force now can be undone any more.
     pub fn make_floor(&mut self) {
         for frame in self.frames.drain(..) {
-            self.committed.insert(frame.part());
+            self.committed.insert(frame.buried());
             self.committed.extend(frame.parts.iter().copied());
         }
-        self.active.clear();
-        self.version += 1;
     }
 
-    /// Forgets everything: the system is empty, or is no longer what the frames say.
+    /// Forgets everything: the system is empty, or is no longer what the frames say. Numbers are not used again.
     pub fn discard(&mut self) {
         self.frames.clear();
         self.committed.clear();
-        self.active.clear();
-        self.version += 1;
     }
 
-    /// Takes over the stack as `transaction` leaves it, after its steps are done. Answers the frames it pushed.
-    ///
-    /// # Panics
-    /// When the stack changed since the transaction was made: there is one configurator for one stack.
-    pub fn commit(&mut self, transaction: Transaction) -> Vec<FrameId> {
-        assert!(transaction.version == self.version, "a transaction is committed to the stack it was made from");
-        self.version += 1;
-        self.next = transaction.next;
-        self.frames.clear();
-        self.frames.extend(transaction.frames);
-        self.active.extend(transaction.active);
-        self.active.retain(|id| self.frames.iter().any(|f| f.id == *id));
-        transaction.pushed
+    /// Takes over what the parts of a transaction do to the stack, in their order, now that their steps are done. Answers
+    /// the numbers of the frames pushed. `busy` are frames that others under way pop or hand over to.
+    pub fn apply<'e>(&mut self, edits: impl IntoIterator<Item = &'e Edits>, busy: &[FrameId]) -> Vec<FrameId> {
+        let mut pushed: Vec<FrameId> = Vec::new();
+        let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
+        for Edits { pops, push } in edits {
+            for (id, hand) in pops {
+                let real = |id: FrameId| numbers.iter().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
+                let popped = real(*id);
+                share::hand_over(&mut self.frames, hand, &real);
+                self.frames.retain(|frame| frame.id != popped);
+                pushed.retain(|id| *id != popped);
+            }
+            if let Some(frame) = push {
+                let id = FrameId(self.next);
+                self.next += 1;
+                numbers.push((frame.id, id));
+                pushed.push(id);
+                let mut frame = frame.clone();
+                Arc::make_mut(&mut frame).id = id;
+                let requester = frame.requester;
+                self.frames.push(frame);
+                // Room was made sure of when it began; where others hold on to frames since, there is one more for a while.
+                squash::fit(&mut self.frames, requester, self.bound, busy);
+            }
+        }
+        pushed
     }
+
+    /// Takes over all of a transaction.
+    pub fn commit(&mut self, planned: Planned) -> Vec<FrameId> {
+        self.apply(planned.parts.iter().map(|part| &part.edits), &[])
+    }
+
+    /// Puts another frame in the place of that of the same number.
+    pub fn replace(&mut self, frame: Frame) {
+        if let Some(at) = self.frames.iter().position(|f| f.id == frame.id) {
+            self.frames[at] = Arc::new(frame);
+        }
+    }
+
+    /// Pushes a frame as it is, but for its number.
+    pub fn push(&mut self, frame: Frame) -> FrameId {
+        let pushed = self.apply([&Edits { pops: Vec::new(), push: Some(Arc::new(frame)) }], &[]);
+        pushed.first().copied().unwrap_or(FrameId(0))
+    }
+}
+
+/// The newest frame of a configuration among `frames`, by this requester or (none) by anyone.
+fn newest(frames: &[Arc<Frame>], configuration: ConfigId, by: Option<Requester>) -> Option<&Arc<Frame>> {
+    let fits =
+        |f: &&Arc<Frame>| f.configuration == configuration && !f.is_squashed() && by.is_none_or(|by| f.requester == by);
+    frames.iter().rev().find(fits)
 }

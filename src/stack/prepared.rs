@@ -1,6 +1,6 @@
 //! Frames of prepared switches: pushed and popped without an allocation, from frames that were popped before.
 
-use super::{Frame, FrameId, Inverse, Requester, Stack};
+use super::{Frame, FrameId, Inverse, Requester, Scope, Stack};
 use crate::plan::prepare::Switch;
 use crate::time::Time;
 use std::collections::BTreeSet;
@@ -20,13 +20,12 @@ impl Stack {
     }
 
     /// Pushes the frame of a switch whose acts are done. [`Stack::takes`] was asked before.
-    pub fn push_switch(&mut self, switch: &Switch, requester: Requester, at: Time, active: bool) -> FrameId {
+    pub fn push_switch(&mut self, switch: &Switch, requester: Requester, at: Time, scope: Option<Scope>) -> FrameId {
         let id = FrameId(self.next);
         self.next += 1;
-        self.version += 1;
         let fits = |f: &Arc<Frame>| f.configuration == switch.configuration() && f.acts == switch.acts();
         let spare = self.spares.iter().position(fits).map(|i| self.spares.swap_remove(i));
-        let frame = match spare.and_then(|mut frame| refreshed(&mut frame, switch, id, requester, at).then_some(frame))
+        let frame = match spare.and_then(|mut frame| refreshed(&mut frame, switch, id, requester, at, scope).then_some(frame))
         {
             Some(frame) => frame,
             None => {
@@ -44,13 +43,13 @@ impl Stack {
                     floor: None,
                     parts: BTreeSet::new(),
                     acts: switch.acts().to_vec(),
+                    scope,
+                    partial: false,
+                    safe: false,
                 })
             }
         };
         self.frames.push(frame);
-        if active {
-            self.active.push(id);
-        }
         id
     }
 
@@ -62,8 +61,6 @@ impl Stack {
     /// Pops the top, a frame of a switch whose undo is done, and keeps it for the next push.
     pub fn pop_switch(&mut self) {
         if let Some(frame) = self.frames.pop() {
-            self.version += 1;
-            self.active.retain(|id| *id != frame.id);
             if self.spares.len() < SPARES {
                 self.spares.push(frame);
             }
@@ -71,12 +68,20 @@ impl Stack {
     }
 }
 
-fn refreshed(frame: &mut Arc<Frame>, switch: &Switch, id: FrameId, requester: Requester, at: Time) -> bool {
+fn refreshed(
+    frame: &mut Arc<Frame>,
+    switch: &Switch,
+    id: FrameId,
+    requester: Requester,
+    at: Time,
+    scope: Option<Scope>,
+) -> bool {
     let Some(frame) = Arc::get_mut(frame) else { return false };
     let Inverse::Steps(steps) = &mut frame.inverse else { return false };
     frame.id = id;
     frame.requester = requester;
     frame.at = at;
+    frame.scope = scope;
     switch.refresh(steps, &mut frame.saved);
     true
 }

@@ -1,32 +1,58 @@
 //! Whether a frame below the top may be popped, and which values it then hands over (design §5).
 
-use super::{Frame, Inverse};
-use crate::model::{Finding, codes};
+use super::{Frame, FrameId, Inverse};
+use crate::model::{ComponentName, Finding, codes};
 use crate::plan::SavedValue;
-use crate::plan::footprint::{Access, Index, Saved, Slot};
-use crate::plan::undo::absolute;
-use crate::plan::undo::restoring;
+use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot};
+use crate::plan::undo::{absolute, restoring};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
 /// What becomes of a popped frame's absolute writes.
-#[derive(Debug, Default)]
-pub(super) struct HandOver {
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HandOver {
     /// Slots that a frame above wrote: nothing is sent for them.
     pub(super) slots: FxHashSet<Slot>,
-    /// The frame (its place) that takes over the saved value.
-    takers: Vec<(usize, Slot, Saved)>,
+    /// The frame that takes over the saved value.
+    takers: Vec<(FrameId, Slot, Saved)>,
+}
+
+impl HandOver {
+    /// The frames that take something over.
+    pub fn takers(&self) -> impl Iterator<Item = FrameId> + '_ {
+        self.takers.iter().map(|(id, ..)| *id)
+    }
+}
+
+/// All components of a footprint.
+pub fn components(footprint: &Footprint) -> FxHashSet<ComponentName> {
+    let both = footprint.touches.iter().map(|touch| touch.slot.components());
+    both.flat_map(|(a, b)| [a, b]).collect()
+}
+
+/// Whether two footprints have a component in common.
+fn meet(mine: &FxHashSet<ComponentName>, theirs: &Footprint) -> bool {
+    theirs.touches.iter().any(|touch| {
+        let (a, b) = touch.slot.components();
+        mine.contains(&a) || mine.contains(&b)
+    })
 }
 
 /// Whether the frame at `at` may be popped.
 pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Finding>> {
     let frame = &frames[at];
-    for above in &frames[at..] {
-        if let Some(reason) = &above.floor {
-            let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
-            let finding = Finding::error(codes::STACK_FLOOR, message)
-                .help("apply a configuration that leads to the wanted state instead");
-            return Err(Box::new(finding));
+    if frames[at..].iter().any(|above| above.floor.is_some()) {
+        let mine = components(&frame.footprint);
+        for (place, above) in frames[at..].iter().enumerate() {
+            // A floor holds back what shares a component with it, and itself.
+            if let Some(reason) = &above.floor
+                && (place == 0 || meet(&mine, &above.footprint))
+            {
+                let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
+                let finding = Finding::error(codes::STACK_FLOOR, message)
+                    .help("apply a configuration that leads to the wanted state instead");
+                return Err(Box::new(finding));
+            }
         }
     }
     let mut hand = HandOver::default();
@@ -35,12 +61,12 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
         return Ok(hand);
     }
     let wanted: FxHashMap<Slot, &SavedValue> = frame.saved.iter().map(|s| (s.slot, s)).collect();
-    for (i, other) in above.iter().enumerate() {
+    for other in above {
         for saved in &other.saved {
             if let Some(mine) = wanted.get(&saved.slot)
                 && hand.slots.insert(saved.slot)
             {
-                hand.takers.push((at + 1 + i, saved.slot, mine.value.clone()));
+                hand.takers.push((other.id, saved.slot, mine.value.clone()));
             }
         }
     }
@@ -66,19 +92,27 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
     Ok(hand)
 }
 
-/// Gives the values of the frame at `at` to their takers and removes the frame.
-pub(super) fn remove(frames: &mut Vec<Arc<Frame>>, at: usize, hand: HandOver) {
-    for (taker, slot, value) in hand.takers {
-        let frame = Arc::make_mut(&mut frames[taker]);
-        for saved in frame.saved.iter_mut().filter(|s| s.slot == slot) {
+/// Gives the values that a popped frame leaves to their takers.
+pub(super) fn hand_over(frames: &mut [Arc<Frame>], hand: &HandOver, real: &dyn Fn(FrameId) -> FrameId) {
+    for (taker, slot, value) in &hand.takers {
+        let taker = real(*taker);
+        let Some(frame) = frames.iter_mut().find(|frame| frame.id == taker) else { continue };
+        let frame = Arc::make_mut(frame);
+        for saved in frame.saved.iter_mut().filter(|s| s.slot == *slot) {
             saved.value = value.clone();
             if let Inverse::List(items) = &mut frame.inverse
                 && let Some(step) = restoring(saved)
-                && let Some(item) = items.iter_mut().rev().find(|item| absolute(&item.step) == Some(slot))
+                && let Some(item) = items.iter_mut().rev().find(|item| absolute(&item.step) == Some(*slot))
             {
                 item.step = step;
             }
         }
     }
-    frames.remove(at);
+}
+
+/// Whether two frames share anything: then their order counts.
+pub fn shares(a: &Frame, b: &Frame) -> bool {
+    let index = Index::new(&a.footprint, |_| true);
+    let absolute: FxHashSet<Slot> = a.saved.iter().map(|saved| saved.slot).collect();
+    b.footprint.touches.iter().any(|touch| index.shares(touch)) || b.saved.iter().any(|s| absolute.contains(&s.slot))
 }

@@ -1,7 +1,7 @@
-//! Keeping the stack within its bound: the oldest frames become one, which is undone as one (design §5).
+//! Keeping each requester within its bound: its oldest frames become one, which is undone as one (design §5).
 
 use super::net::reduce;
-use super::{Frame, FrameId, Inverse};
+use super::{Frame, FrameId, Inverse, Requester, share};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
@@ -11,32 +11,47 @@ use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Squashes until at most `bound` frames are left. False: frames of active states leave no two that could be squashed.
-pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, bound: usize, active: &[FrameId]) -> bool {
-    while frames.len() > bound {
-        let Some(at) = pair(frames, active) else { return false };
-        let upper = frames.remove(at + 1);
-        frames[at] = Arc::new(squash(&frames[at], &upper));
+/// Squashes until `requester` has at most `bound` frames; `busy` ones stay as they are. False: no two could be squashed.
+pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, requester: Requester, bound: usize, busy: &[FrameId]) -> bool {
+    while frames.iter().filter(|f| f.requester == requester).count() > bound {
+        let Some((lower, upper)) = pair(frames, requester, busy) else { return false };
+        let upper = frames.remove(upper);
+        frames[lower] = Arc::new(squash(&frames[lower], &upper));
     }
     true
 }
 
-/// The lower of the two neighbours that are squashed next: the oldest, but such that as much as possible stays possible.
-fn pair(frames: &[Arc<Frame>], active: &[FrameId]) -> Option<usize> {
-    let free = |f: &Frame| !active.contains(&f.id);
-    let pairs =
-        || frames.windows(2).enumerate().filter(|(_, w)| free(&w[0]) && free(&w[1])).map(|(i, w)| (i, &w[0], &w[1]));
-    // Below a floor nothing can be undone anyway.
+/// Whether there are two that could be squashed.
+pub(super) fn possible(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> bool {
+    pair(frames, requester, busy).is_some()
+}
+
+/// The places of the two that are squashed next: the oldest, but such that as much as possible stays possible. The upper
+/// one moves down to the lower, so nothing between may share with it.
+fn pair(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> Option<(usize, usize)> {
+    // A partial frame is undone by its name.
+    let free = |f: &Frame| f.scope.is_none() && !f.partial && !busy.contains(&f.id);
+    let own: Vec<usize> = (0..frames.len()).filter(|at| frames[*at].requester == requester).collect();
+    let newest = own.last().copied();
+    let clear = |lower: usize, upper: usize| {
+        frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between))
+    };
+    let pairs: Vec<(usize, usize)> = own
+        .windows(2)
+        .map(|two| (two[0], two[1]))
+        .filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]) && clear(*a, *b))
+        .collect();
     // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
-    let older = || pairs().filter(|(i, _, _)| i + 2 < frames.len());
+    let older = || pairs.iter().copied().filter(|(_, upper)| Some(*upper) != newest);
+    let (floor, group) = (|at: usize| frames[at].floor.is_some(), |at: usize| frames[at].group.is_some());
+    // Below a floor nothing can be undone anyway.
     older()
-        .find(|(_, _, upper)| upper.floor.is_some())
+        .find(|(_, upper)| floor(*upper))
         // A group's frame is wanted when the group changes.
-        .or_else(|| older().find(|(_, a, b)| a.floor.is_none() && a.group.is_none() && b.group.is_none()))
-        .or_else(|| older().find(|(_, a, _)| a.floor.is_none()))
+        .or_else(|| older().find(|(a, b)| !floor(*a) && !group(*a) && !group(*b)))
+        .or_else(|| older().find(|(a, _)| !floor(*a)))
         .or_else(|| older().next())
-        .or_else(|| pairs().next())
-        .map(|(i, _, _)| i)
+        .or_else(|| pairs.first().copied())
 }
 
 /// The list that takes a frame back.
@@ -99,5 +114,8 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         floor,
         parts,
         acts: Vec::new(),
+        scope: None,
+        partial: false,
+        safe: lower.safe || upper.safe,
     }
 }

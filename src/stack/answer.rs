@@ -1,0 +1,283 @@
+//! What comes of requests: verdicts with their reasons, and what is left where something is broken.
+
+use super::request::Request;
+use crate::model::codes;
+use crate::model::{Cause, ComponentName, ConfigId, EventName, Finding, Findings, Step, Verdict};
+use crate::time::Time;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The answer to a request. Every request gets exactly one; a later [`Verdict::Reverted`] (or an undo verdict in its
+/// place, when the frame could not be popped) about a configuration whose confirmation did not come is a notice and
+/// carries the number of the request that had pushed it.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// Which request.
+    pub request: Request,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// When.
+    pub at: Time,
+    /// How long after the configurator took it up.
+    pub took: Duration,
+    /// Why, where it is not simply a success; also what a success could not do (a safe configuration's failed steps).
+    pub reason: Option<Arc<Reason>>,
+}
+
+impl Answer {
+    /// The status event that tells it.
+    pub fn event(&self) -> EventName {
+        self.verdict.event(self.request.ask)
+    }
+
+    /// The reason in findings; empty for a success.
+    pub fn findings(&self) -> Findings {
+        self.reason.as_ref().map(|reason| reason.findings()).unwrap_or_default()
+    }
+}
+
+/// Why a request did not simply succeed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// No configuration of that name.
+    Unknown(ConfigId),
+    /// The queue was full.
+    Full,
+    /// There is no plan: every violation. Nothing was done.
+    Refused(Findings),
+    /// A step failed.
+    Step {
+        /// The step.
+        step: Step,
+        /// Why.
+        cause: Cause,
+    },
+    /// The configuration's own time was over before it was applied.
+    Timeout(Duration),
+    /// Stopped for a `safe` configuration.
+    Interrupted(ConfigId),
+    /// Overtaken by its own undo while it was queued.
+    Overtaken,
+    /// Given up: its undo came while it was being carried out.
+    GivenUp,
+    /// A `safe` configuration was asked for while it waited.
+    SafeCame(ConfigId),
+    /// It would move something while a `safe` configuration is in force.
+    Moves(Step),
+    /// What it needs is being worked on.
+    Busy,
+    /// A coordinator's frames are in force, and force was not asked for.
+    NeedsForce(ConfigId),
+    /// The system is neither as before nor as asked for.
+    Broken(Arc<Residual>),
+    /// Nothing is done while the system is broken.
+    StillBroken(Arc<Residual>),
+    /// The confirming event did not come within that time.
+    NotConfirmed(EventName, Duration),
+    /// The configurator itself failed.
+    Panic(String),
+    /// No frame to undo.
+    NothingToUndo,
+    /// Everything is being taken down.
+    TakenDown,
+    /// The configurator has ended.
+    Ended,
+}
+
+/// What is left of an application that is neither done nor undone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residual {
+    /// What it began with.
+    pub cause: Reason,
+    /// What was done and not taken back: the steps of the partial frame. The model has them.
+    pub left: Vec<Step>,
+    /// The step back that was withheld, with all behind it: it moves, and nobody asked for that.
+    pub withheld: Option<Step>,
+    /// The steps from the system as the model has it to the system as it is.
+    pub difference: Vec<Step>,
+    /// Steps of which nobody knows whether they happened.
+    pub unsettled: Vec<Step>,
+    /// Steps that were done and that nothing undoes.
+    pub irreversible: Vec<Step>,
+    /// Components that are faulted and should not be. The difference takes them for unconfigured: a fault is nothing a
+    /// step can bring about.
+    pub faulted: Vec<ComponentName>,
+    /// Components whose call has not returned.
+    pub quarantined: Vec<ComponentName>,
+    /// Whether the difference was read from the platform; if not, the platform did not answer and it is what the
+    /// configurator believes.
+    pub observed: bool,
+}
+
+impl Residual {
+    /// Nothing but its cause.
+    pub fn of(cause: Reason) -> Self {
+        Self {
+            cause,
+            left: Vec::new(),
+            withheld: None,
+            difference: Vec::new(),
+            unsettled: Vec::new(),
+            irreversible: Vec::new(),
+            faulted: Vec::new(),
+            quarantined: Vec::new(),
+            observed: true,
+        }
+    }
+
+    /// Whether everything is known and as the model has it: then nothing is left but a partial frame, if that.
+    pub fn is_settled(&self) -> bool {
+        self.observed
+            && self.difference.is_empty()
+            && self.unsettled.is_empty()
+            && self.faulted.is_empty()
+            && self.quarantined.is_empty()
+    }
+
+    /// Whether nothing at all is left.
+    pub fn is_empty(&self) -> bool {
+        self.is_settled() && self.left.is_empty() && self.irreversible.is_empty()
+    }
+
+    /// The components of which not all is known, or that are not as the model has them.
+    pub fn components(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        let steps = self.difference.iter().chain(&self.unsettled);
+        let of = |step: &Step| match step {
+            Step::Connect { from, to, .. } | Step::Disconnect { from, to } => [from.component, to.component],
+            other => [other.component(); 2],
+        };
+        steps.flat_map(of).chain(self.faulted.iter().copied()).chain(self.quarantined.iter().copied())
+    }
+}
+
+fn list(steps: &[Step]) -> String {
+    let shown: Vec<String> = steps.iter().take(12).map(|step| format!("`{step}`")).collect();
+    let more = if steps.len() > 12 { format!(" and {} more", steps.len() - 12) } else { String::new() };
+    format!("{}{more}", shown.join(", "))
+}
+
+impl Reason {
+    /// As findings, each with its code and help.
+    pub fn findings(&self) -> Findings {
+        match self {
+            Self::Refused(findings) => findings.clone(),
+            Self::Broken(residual) => {
+                let mut all = vec![residual.finding(codes::BROKEN)];
+                all.extend(residual.cause.findings());
+                all
+            }
+            Self::StillBroken(residual) => vec![residual.finding(codes::STILL_BROKEN)],
+            _ => vec![self.single()],
+        }
+    }
+
+    fn single(&self) -> Finding {
+        match self {
+            Self::Unknown(id) => Finding::error(codes::UNKNOWN_REQUEST, self.to_string())
+                .help(format!("add a configuration `{id}` to the deployment, or ask for one it has")),
+            Self::Full => Finding::error(codes::QUEUE_FULL, self.to_string())
+                .help("wait for the answers to earlier requests before asking for more"),
+            Self::Step { cause: Cause::Timeout, .. } => Finding::error(codes::STEP_TIMEOUT, self.to_string())
+                .help("look at what the component does there, or raise `limits.step_timeout_s`"),
+            Self::Step { .. } => Finding::error(codes::STEP_FAILED, self.to_string())
+                .help("the component's own message says why; mend that and ask again"),
+            Self::Timeout(_) => Finding::error(codes::CONFIGURATION_TIMEOUT, self.to_string())
+                .help("raise the configuration's `timeout`, or find the step that takes so long with `davit log`"),
+            Self::Interrupted(_) => Finding::error(codes::INTERRUPTED, self.to_string())
+                .help("ask again when the safe configuration is no longer needed"),
+            Self::Overtaken => Finding::info(codes::OVERTAKEN, self.to_string()),
+            Self::GivenUp => Finding::info(codes::GIVEN_UP, self.to_string()),
+            Self::SafeCame(_) => Finding::error(codes::INTERRUPTED, self.to_string())
+                .help("ask again when the safe configuration is no longer needed"),
+            Self::Moves(_) => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
+                "let the coordinator ask for it in a later step, when it is meant to move again; an operator says `--force`",
+            ),
+            Self::Busy => Finding::error(codes::BUSY, self.to_string()).help("ask again when `davit status` shows nothing outstanding"),
+            Self::NeedsForce(_) => Finding::error(codes::NEEDS_FORCE, self.to_string())
+                .help("undo only your own, or say `--force` if the coordinator's is meant"),
+            Self::NotConfirmed(..) => Finding::error(codes::NOT_CONFIRMED, self.to_string())
+                .help("find out why the event did not come, or give it more time with `within`"),
+            Self::NothingToUndo => {
+                Finding::error(codes::NOTHING_TO_UNDO, self.to_string()).help("`davit stack` shows the frames in force")
+            }
+            Self::TakenDown | Self::Ended => {
+                Finding::error(codes::ENDED, self.to_string()).help("deploy again before asking for configurations")
+            }
+            Self::Panic(_) => Finding::error(codes::CONFIGURATOR_PANIC, self.to_string())
+                .help("this is a defect of the configurator itself; compare model and platform with `davit drift`"),
+            Self::Refused(_) | Self::Broken(_) | Self::StillBroken(_) => {
+                Finding::error(codes::STEP_FAILED, self.to_string())
+            }
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown(id) => write!(f, "there is no configuration `{id}` in this deployment"),
+            Self::Full => f.write_str("the configurator's queue is full"),
+            Self::Refused(findings) => {
+                for (i, finding) in findings.iter().filter(|finding| finding.is_error()).enumerate() {
+                    write!(f, "{}{}", if i == 0 { "" } else { "; " }, finding.message)?;
+                }
+                Ok(())
+            }
+            Self::Step { step, cause } => write!(f, "`{step}`: {cause}"),
+            Self::Timeout(limit) => write!(f, "not applied within {} s", limit.as_secs_f64()),
+            Self::Interrupted(by) => write!(f, "interrupted by the safe configuration `{by}`"),
+            Self::Overtaken => f.write_str("overtaken by its own undo before it began"),
+            Self::GivenUp => f.write_str("given up: its undo was asked for"),
+            Self::SafeCame(by) => write!(f, "the safe configuration `{by}` was asked for while it waited"),
+            Self::Moves(step) => write!(f, "`{step}` moves, and a safe configuration is in force"),
+            Self::Busy => f.write_str("requests are under way that it would meddle with"),
+            Self::NeedsForce(id) => write!(f, "`{id}` is a frame of a coordinator"),
+            Self::Broken(residual) => write!(f, "{residual}"),
+            Self::StillBroken(residual) => write!(f, "what it names is broken since an earlier request: {residual}"),
+            Self::NotConfirmed(event, within) => {
+                write!(f, "the confirming event `{event}` did not come within {} s", within.as_secs_f64())
+            }
+            Self::Panic(text) => write!(f, "the configurator itself failed: {text}"),
+            Self::NothingToUndo => f.write_str("there is no frame to undo"),
+            Self::TakenDown => f.write_str("the system is being taken down"),
+            Self::Ended => f.write_str("the configurator has ended"),
+        }
+    }
+}
+
+impl Residual {
+    fn finding(&self, code: crate::model::Code) -> Finding {
+        Finding::error(code, self.to_string())
+            .help("`davit undo ID` takes back what is partial, `davit drift` shows what differs, `davit recover --back` undoes all of it")
+    }
+}
+
+impl fmt::Display for Residual {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.cause)?;
+        if !self.left.is_empty() {
+            write!(f, "; done and not taken back: {}", list(&self.left))?;
+        }
+        if let Some(step) = &self.withheld {
+            write!(f, "; not done unasked, since it moves: `{step}`")?;
+        }
+        if !self.difference.is_empty() {
+            let seen = if self.observed { "what differs" } else { "what differs, as far as is known" };
+            write!(f, "; {seen}: {}", list(&self.difference))?;
+        }
+        if !self.unsettled.is_empty() {
+            write!(f, "; nobody knows whether it happened: {}", list(&self.unsettled))?;
+        }
+        if !self.irreversible.is_empty() {
+            write!(f, "; cannot be undone: {}", list(&self.irreversible))?;
+        }
+        for (what, components) in [("faulted", &self.faulted), ("in quarantine", &self.quarantined)] {
+            if !components.is_empty() {
+                let names: Vec<&str> = components.iter().map(ComponentName::as_str).collect();
+                write!(f, "; {what}: {}", names.join(", "))?;
+            }
+        }
+        Ok(())
+    }
+}

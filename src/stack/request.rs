@@ -1,0 +1,103 @@
+//! What is asked of a configurator: requests, who makes them, and which belong together (design §6).
+
+use crate::model::{Ask, ComponentName, EventName, RequestId};
+use smallvec::SmallVec;
+use std::fmt;
+use std::time::Duration;
+
+/// Who asked for a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Requester {
+    /// A coordinator, by the name of its deployment or the path of its subsystem.
+    Coordinator(ComponentName),
+    /// Somebody at a terminal or behind the control socket. All of them are one requester.
+    Operator,
+}
+
+impl fmt::Display for Requester {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coordinator(name) => write!(f, "{name}"),
+            Self::Operator => f.write_str("operator"),
+        }
+    }
+}
+
+impl serde::Serialize for Requester {
+    fn serialize<S: serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_str(self)
+    }
+}
+
+/// The number of a frame; never used again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+pub struct FrameId(pub u64);
+
+/// The state of a coordinator that a state-scoped request belongs to, by its number in the chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Scope(pub u32);
+
+/// Why a request is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Why {
+    /// Somebody asked for it.
+    Asked,
+    /// The frame of an earlier request was not confirmed by this event within this time: it is taken back.
+    Unconfirmed(FrameId, EventName, Duration),
+    /// The coordinator has come to its *down* state.
+    Down,
+}
+
+/// One request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Request {
+    /// Its number, given by who asks.
+    pub id: RequestId,
+    /// What is asked.
+    pub ask: Ask,
+    /// Who asks.
+    pub requester: Requester,
+    /// The state of the coordinator that asks by being entered, or takes back by being left.
+    pub scope: Option<Scope>,
+    /// What is refused for the operator's sake is done all the same.
+    pub force: bool,
+    /// Raised in the same step as a `safe` configuration: nothing of it may move.
+    pub still: bool,
+    /// Why it is there.
+    pub why: Why,
+    /// Comes back with the answer; means nothing to the configurator.
+    pub tag: (u64, u64),
+}
+
+impl Request {
+    /// What `requester` asks.
+    pub fn new(id: RequestId, ask: Ask, requester: Requester) -> Self {
+        Self { id, ask, requester, scope: None, force: false, still: false, why: Why::Asked, tag: (0, 0) }
+    }
+}
+
+/// Requests that belong together: raised in one step of a coordinator. They are carried out undos first, then pushes, each
+/// in the order they were raised, and answered in that order.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Batch {
+    /// The requests.
+    pub requests: SmallVec<[Request; 2]>,
+}
+
+impl Batch {
+    /// A batch of one.
+    pub fn one(request: Request) -> Self {
+        Self { requests: SmallVec::from_iter([request]) }
+    }
+
+    /// Brings the requests into the order in which they are carried out.
+    pub fn arrange(&mut self) {
+        self.requests.sort_by_key(|request| !request.ask.is_undo());
+    }
+}
+
+impl FromIterator<Request> for Batch {
+    fn from_iter<I: IntoIterator<Item = Request>>(requests: I) -> Self {
+        Self { requests: requests.into_iter().collect() }
+    }
+}

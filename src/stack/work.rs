@@ -1,0 +1,357 @@
+//! Operations on the stack become one plan: every step decided, and how the stack changes with each part of it.
+
+use super::share::{self, HandOver};
+use super::{Edits, Frame, FrameId, Inverse, Requester, Scope, Stack, net, newest, squash};
+use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
+use crate::plan::undo::{Item, Script, undo};
+use crate::plan::{Context, Plan, PlannedStep, Refusal, StepId, plan_on};
+use crate::system::{Overlay, System, View, Violation};
+use crate::time::Time;
+use smallvec::SmallVec;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// One operation on the stack: a request with its names looked up.
+#[derive(Debug, Clone, Copy)]
+pub enum Op<'a> {
+    /// Apply a configuration. Its group's frame, if there is one, is popped in the same transaction.
+    Push {
+        /// The configuration.
+        configuration: &'a Configuration,
+        /// Who asks.
+        requester: Requester,
+        /// When.
+        at: Time,
+        /// The state of the coordinator that is being entered, where it belongs to one.
+        scope: Option<Scope>,
+    },
+    /// Pop this frame, from wherever it lies.
+    Undo(FrameId),
+    /// Pop the top.
+    UndoTop,
+    /// Pop until so many frames are left.
+    UndoTo(usize),
+}
+
+/// What one operation is of the whole: which steps, and what it does to the stack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Its steps in [`Planned::whole`].
+    pub range: Range<u32>,
+    /// What it does to the stack.
+    pub edits: Edits,
+    /// The configuration that is pushed; none: something is undone.
+    pub pushes: Option<ConfigId>,
+    /// What a failure of it leads to.
+    pub on_failure: OnFailure,
+    /// Its frame as it will be, without a number: what is pushed, or what is being popped.
+    pub frame: Option<Arc<Frame>>,
+}
+
+/// Steps, and how the stack changes when they are done. Take it over with [`Stack::commit`]; dropped, nothing happened.
+#[must_use = "a plan does nothing until its steps are executed and the stack has taken it over"]
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// What is done, in an order in which it may happen; `wave` and `after` tell what may happen in parallel.
+    pub steps: Vec<PlannedStep>,
+    /// Of each of them the place in `whole`; empty: they are the whole.
+    pub of: Vec<u32>,
+    /// All steps, one operation after the other, where `steps` are the net of them; else empty.
+    pub whole: Vec<PlannedStep>,
+    /// The operations, in order.
+    pub parts: Vec<Part>,
+    /// The revision of the system it was made from.
+    pub revision: u64,
+    /// Of each plan that is pushed: what is allowed and worth saying.
+    pub warnings: Findings,
+    /// The frames that will be popped, as they are now.
+    pub popped: Vec<Arc<Frame>>,
+}
+
+impl Planned {
+    /// All steps, one operation after the other.
+    pub fn whole(&self) -> &[PlannedStep] {
+        if self.of.is_empty() { &self.steps } else { &self.whole }
+    }
+
+    /// The place of a step in [`Self::whole`]; none: it is there for no one of them alone.
+    pub fn place(&self, step: usize) -> Option<u32> {
+        if self.of.is_empty() { u32::try_from(step).ok() } else { self.of.get(step).copied().filter(|of| *of != Item::NOWHERE) }
+    }
+
+    /// The number of the operation that the step at a place of the whole belongs to.
+    pub fn part_of(&self, place: Option<u32>) -> usize {
+        let last = self.parts.len().saturating_sub(1);
+        place.map_or(last, |place| self.parts.iter().position(|part| part.range.contains(&place)).unwrap_or(last))
+    }
+}
+
+/// What `ops`, one after the other, mean as one transaction. Where something is undone and something is pushed, the steps
+/// are the net of both. All or nothing: if one is refused, the whole is.
+///
+/// # Errors
+/// [`Refusal`], with the place of the refused operation.
+pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Context) -> Result<Planned, Refusal> {
+    let mut view = Overlay::new(system);
+    let mut work = Work::new(&mut view, stack);
+    for (i, op) in ops.iter().enumerate() {
+        work.add(op, context).map_err(|refusal| Refusal { request: i, ..refusal })?;
+    }
+    work.finish(system)
+}
+
+/// A plan in the making.
+pub(super) struct Work<'o, 's, 'k> {
+    script: Script<'o, 's>,
+    /// The frames as they are after the operations so far; those that are pushed have numbers from the top of the range.
+    pub(super) frames: Vec<Arc<Frame>>,
+    stack: &'k Stack,
+    warnings: Findings,
+    popped: Vec<Arc<Frame>>,
+    parts: Vec<Part>,
+    pushed: Vec<FrameId>,
+    replaced: bool,
+}
+
+impl<'o, 's, 'k> Work<'o, 's, 'k> {
+    pub(super) fn new(view: &'o mut Overlay<'s>, stack: &'k Stack) -> Self {
+        Self {
+            script: Script::new(view),
+            frames: stack.frames.clone(),
+            stack,
+            warnings: Vec::new(),
+            popped: Vec::new(),
+            parts: Vec::new(),
+            pushed: Vec::new(),
+            replaced: false,
+        }
+    }
+
+    /// The newest frame of a configuration, after the operations so far.
+    pub(super) fn newest_of(&self, configuration: ConfigId, by: Option<Requester>) -> Option<&Arc<Frame>> {
+        newest(&self.frames, configuration, by)
+    }
+
+    fn place(&self) -> u32 {
+        u32::try_from(self.script.steps.len()).expect("fewer steps than that")
+    }
+
+    /// Adds an operation.
+    ///
+    /// # Errors
+    /// [`Refusal`]; what is in the making is then of no further use.
+    pub(super) fn add(&mut self, op: &Op<'_>, context: &Context) -> Result<(), Refusal> {
+        let from = self.place();
+        let mut edits = Edits::default();
+        let (mut pushes, mut on_failure, mut frame) = (None, OnFailure::default(), None);
+        match op {
+            Op::Push { configuration, requester, at, scope } => {
+                pushes = Some(configuration.id);
+                on_failure = configuration.on_failure;
+                self.push(configuration, *requester, *at, *scope, context, &mut edits)?;
+                frame.clone_from(&edits.push);
+            }
+            Op::Undo(id) => match self.frames.iter().position(|f| f.id == *id) {
+                Some(at) => {
+                    frame = Some(self.frames[at].clone());
+                    self.pop(at, &mut edits)?;
+                }
+                None => {
+                    let finding = Finding::error(codes::STACK_NO_FRAME, format!("there is no frame {}", id.0));
+                    return Err(Refusal::one(finding.help("`davit stack` shows the frames")));
+                }
+            },
+            Op::UndoTop => match self.frames.len().checked_sub(1) {
+                Some(top) => {
+                    frame = Some(self.frames[top].clone());
+                    self.pop(top, &mut edits)?;
+                }
+                None => {
+                    return Err(Refusal::one(if self.stack.committed.is_empty() {
+                        Finding::error(codes::STACK_EMPTY, "there is nothing to undo")
+                    } else {
+                        Finding::error(codes::STACK_FLOOR, "there is nothing to undo above the committed floor")
+                    }));
+                }
+            },
+            Op::UndoTo(left) => {
+                while self.frames.len() > *left {
+                    self.pop(self.frames.len() - 1, &mut edits)?;
+                }
+            }
+        }
+        self.parts.push(Part { range: from..self.place(), edits, pushes, on_failure, frame });
+        Ok(())
+    }
+
+    fn pop(&mut self, at: usize, edits: &mut Edits) -> Result<(), Refusal> {
+        let hand = share::examine(&self.frames, at).map_err(|finding| Refusal::one(*finding))?;
+        let frame = self.frames[at].clone();
+        self.take_back(&frame, &hand).map_err(|found| drifted(&found))?;
+        share::hand_over(&mut self.frames, &hand, &|id| id);
+        self.frames.remove(at);
+        // A frame that this very transaction pushes and pops leaves no trace.
+        if let Some(i) = self.pushed.iter().position(|id| *id == frame.id) {
+            self.pushed.remove(i);
+        } else {
+            self.popped.push(frame.clone());
+        }
+        edits.pops.push((frame.id, hand));
+        Ok(())
+    }
+
+    fn take_back(&mut self, frame: &Frame, hand: &HandOver) -> Result<(), Vec<Violation>> {
+        let skip = |slot| hand.slots.contains(&slot);
+        match &frame.inverse {
+            Inverse::Steps(steps) => undo(&mut self.script, steps, &frame.saved, &skip),
+            Inverse::List(items) => {
+                let wave = self.script.next_wave();
+                for item in items {
+                    if crate::plan::undo::absolute(&item.step).is_some_and(skip) {
+                        continue;
+                    }
+                    let after: SmallVec<[StepId; 1]> =
+                        self.script.steps.last().filter(|s| s.wave == wave).map(|s| s.id).into_iter().collect();
+                    self.script.add(item.clone(), wave, &after)?;
+                }
+                self.script.settle_all()
+            }
+        }
+    }
+
+    fn push(
+        &mut self,
+        configuration: &Configuration,
+        requester: Requester,
+        at: Time,
+        scope: Option<Scope>,
+        context: &Context,
+        edits: &mut Edits,
+    ) -> Result<(), Refusal> {
+        if let Some(group) = configuration.group {
+            self.replace(group, configuration, requester, edits)?;
+        }
+        let plan = plan_on(self.script.view_mut(), configuration, context)?;
+        let Plan { configuration: id, group, steps, footprint, saved, warnings, .. } = plan;
+        let floor = crate::plan::irreversible(&steps).map(str::to_owned);
+        self.warnings.extend(warnings);
+        self.script.append(steps.iter().cloned());
+        let number = FrameId(u64::MAX - self.pushed.len() as u64);
+        self.pushed.push(number);
+        let frame = Arc::new(Frame {
+            id: number,
+            configuration: id,
+            group,
+            requester,
+            at,
+            inverse: Inverse::Steps(steps),
+            footprint,
+            saved,
+            floor,
+            parts: std::collections::BTreeSet::new(),
+            acts: Vec::new(),
+            scope,
+            partial: false,
+            safe: configuration.safe,
+        });
+        self.frames.push(frame.clone());
+        edits.push = Some(frame);
+        Ok(())
+    }
+
+    /// Pops the group's frame, unless another coordinator asked for it.
+    fn replace(
+        &mut self,
+        group: crate::model::Ident,
+        configuration: &Configuration,
+        requester: Requester,
+        edits: &mut Edits,
+    ) -> Result<(), Refusal> {
+        let refused = |cause: Findings, old: &str| {
+            let message = format!("`{}` would replace `{old}` of the group `{group}`", configuration.id);
+            let mut findings = vec![
+                Finding::error(codes::STACK_GROUP, message)
+                    .at(configuration.origin)
+                    .help("undo what stands in the way first; nothing has changed"),
+            ];
+            findings.extend(cause);
+            Refusal { findings, request: 0 }
+        };
+        if let Some(at) = self.frames.iter().rposition(|f| f.group == Some(group)) {
+            let old = self.frames[at].configuration;
+            if let Some(cause) = self.frames[at].foreign_to(requester) {
+                return Err(refused(vec![cause], old.as_str()));
+            }
+            self.replaced = true;
+            return self.pop(at, edits).map_err(|refusal| refused(refusal.findings, old.as_str()));
+        }
+        let buried = self.frames.iter().flat_map(|f| &f.parts).find(|p| p.group == Some(group));
+        if let Some(part) = buried {
+            let message = format!("`{}` was squashed together with other frames", part.configuration);
+            let cause = Finding::error(codes::STACK_SQUASHED, message).help("undo down to the squashed frame");
+            return Err(refused(vec![cause], part.configuration.as_str()));
+        }
+        Ok(())
+    }
+
+    /// Ends the plan: the net of what is undone and pushed, and room on the stack.
+    ///
+    /// # Errors
+    /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
+    pub(super) fn finish(self, system: &System) -> Result<Planned, Refusal> {
+        let Self { script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
+        let view = script.view().clone();
+        let whole = script.finish().map_err(|found| drifted(&found))?;
+        let mixed = replaced || parts.iter().any(|p| p.pushes.is_none()) && parts.iter().any(|p| p.pushes.is_some());
+        let net = if mixed { shorter(system, &view, &whole) } else { None };
+        for id in &pushed {
+            let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
+            let own = frames.iter().filter(|f| f.requester == frame.requester).count();
+            if own > stack.bound && !squash::possible(&frames, frame.requester, &[]) {
+                let message = format!("there are {own} frames of `{}`, and none can be squashed", frame.requester);
+                let finding = Finding::error(codes::STACK_FULL, message)
+                    .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");
+                return Err(Refusal { findings: vec![finding], request: parts.len().saturating_sub(1) });
+            }
+        }
+        let revision = system.revision();
+        let (steps, of, whole) = match net {
+            Some((steps, of)) => (steps, of, whole),
+            None => (whole, Vec::new(), Vec::new()),
+        };
+        Ok(Planned { steps, of, whole, parts, revision, warnings, popped })
+    }
+}
+
+fn drifted(found: &[Violation]) -> Refusal {
+    let findings = found
+        .iter()
+        .map(|violation| {
+            Finding::error(codes::STACK_DRIFTED, format!("the system is not as the frame left it: {violation}"))
+                .help("`davit drift` shows the difference")
+        })
+        .collect();
+    Refusal { findings, request: 0 }
+}
+
+/// The net of `whole` with the places of its steps in it, when it ends in the same system (`end`) and is shorter.
+fn shorter(system: &System, end: &Overlay<'_>, whole: &[PlannedStep]) -> Option<(Vec<PlannedStep>, Vec<u32>)> {
+    let bound = |property: MemberRef| {
+        // The property of a component that is neither now nor at the end there: taken as bound.
+        let node = system.component(property.component).or_else(|| end.component(property.component));
+        let declared = node.and_then(|n| n.property(property.member));
+        declared.is_none_or(|(_, p)| p.tunable != Tunable::Always)
+    };
+    let reduced = net::reduce(whole.iter().map(Item::of).collect(), Some(system), &bound);
+    if reduced.len() >= whole.len() {
+        return None;
+    }
+    let mut view = Overlay::new(system);
+    let mut script = Script::new(&mut view);
+    for item in reduced {
+        let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
+        script.add(item, 0, &after).ok()?;
+    }
+    let net = script.finish_placed().ok()?;
+    view.same(end).then_some(net)
+}
