@@ -5,6 +5,7 @@ use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeNam
 use super::run_state::RunState;
 use super::value::Value;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
@@ -183,6 +184,17 @@ pub struct Call {
     pub args: Vec<Value>,
 }
 
+/// `A.open(0.5, "fast")`.
+impl fmt::Display for Call {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}(", self.operation)?;
+        for (i, arg) in self.args.iter().enumerate() {
+            write!(f, "{}{arg}", if i == 0 { "" } else { ", " })?;
+        }
+        f.write_str(")")
+    }
+}
+
 impl ChangeKind {
     /// The primitive's name as it is written in both languages.
     pub fn verb(&self) -> &'static str {
@@ -194,6 +206,36 @@ impl ChangeKind {
             Self::PropertySet { .. } => "property_set",
             Self::PortWrite { .. } => "port_write",
             Self::OperationCall { .. } => "operation_call",
+        }
+    }
+
+    /// The components it names, each once: of a connection both ends, of a call that of its undo as well.
+    pub fn components(&self) -> SmallVec<[ComponentName; 2]> {
+        let (one, other) = match self {
+            Self::Create { component, .. } | Self::Destroy { component } => (*component, None),
+            Self::Connect { from, to, .. } | Self::Disconnect { from, to } => (from.component, Some(to.component)),
+            Self::PropertySet { property: member, .. } | Self::PortWrite { port: member, .. } => {
+                (member.component, None)
+            }
+            Self::OperationCall { call, undo } => {
+                (call.operation.component, undo.as_ref().map(|undo| undo.operation.component))
+            }
+        };
+        std::iter::once(one).chain(other.filter(|other| *other != one)).collect()
+    }
+}
+
+/// As it is written, for messages: `connect A.y -> B.u (data)`, `operation_call A.open(0.5)`.
+impl fmt::Display for ChangeKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Create { component, ty, .. } => write!(f, "create {component} : {ty}"),
+            Self::Destroy { component } => write!(f, "destroy {component}"),
+            Self::Connect { from, to, policy } => write!(f, "connect {from} -> {to} ({policy})"),
+            Self::Disconnect { from, to } => write!(f, "disconnect {from} -> {to}"),
+            Self::PropertySet { property, value } => write!(f, "property_set {property} = {value}"),
+            Self::PortWrite { port, value } => write!(f, "port_write {port} = {value}"),
+            Self::OperationCall { call, .. } => write!(f, "operation_call {call}"),
         }
     }
 }

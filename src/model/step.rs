@@ -107,13 +107,7 @@ impl fmt::Display for Step {
             Self::PropertySet { property, value } => write!(f, "property_set {property} = {value}"),
             Self::PortWrite { port, value: Some(value) } => write!(f, "port_write {port} = {value}"),
             Self::PortWrite { port, value: None } => write!(f, "port_write {port} = never written"),
-            Self::Operation(call) => {
-                write!(f, "operation_call {}(", call.operation)?;
-                for (i, arg) in call.args.iter().enumerate() {
-                    write!(f, "{}{arg}", if i == 0 { "" } else { ", " })?;
-                }
-                f.write_str(")")
-            }
+            Self::Operation(call) => write!(f, "operation_call {call}"),
         }
     }
 }

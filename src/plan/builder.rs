@@ -1,11 +1,9 @@
 //! The planner's workbench: the steps so far, simulated on an overlay, with everything that is found on the way.
 
-use super::footprint::{Access, Footprint, Saved, Slot};
+use super::footprint::{Footprint, Saved};
 use super::{Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order};
 use crate::model::codes;
-use crate::model::{
-    Call, ChangeKind, ComponentName, Configuration, Finding, Findings, MemberRef, Origin, Policy, Step, Tunable,
-};
+use crate::model::{Call, ComponentName, Configuration, Finding, Findings, MemberRef, Origin, Step};
 use crate::system::{Overlay, Reversibility, Undo, View, Violation, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -64,19 +62,6 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
     })
 }
 
-/// A change as it is written: for messages.
-pub(super) fn show(kind: &ChangeKind) -> String {
-    match kind {
-        ChangeKind::Create { component, ty, .. } => format!("create {component} : {ty}"),
-        ChangeKind::Destroy { component } => format!("destroy {component}"),
-        ChangeKind::Connect { from, to, policy } => format!("connect {from} -> {to} ({policy})"),
-        ChangeKind::Disconnect { from, to } => format!("disconnect {from} -> {to}"),
-        ChangeKind::PropertySet { property, value } => format!("property_set {property} = {value}"),
-        ChangeKind::PortWrite { port, value } => format!("port_write {port} = {value}"),
-        ChangeKind::OperationCall { call, .. } => Step::Operation(call.clone()).to_string(),
-    }
-}
-
 impl Builder<'_, '_, '_> {
     /// The number that the next step gets.
     pub(super) fn next(&self) -> StepId {
@@ -99,7 +84,7 @@ impl Builder<'_, '_, '_> {
     /// Plans one step whose precondition was looked at.
     pub(super) fn allowed(&mut self, what: Step, undo: Option<&Call>, origin: Origin, after: &[StepId]) -> StepId {
         let inverse = step::inverse(&what, undo, self.view);
-        self.touch(&what, &inverse);
+        self.record(&what, undo, &inverse, true);
         step::effect(&what, self.view);
         let id = self.next();
         self.steps.push(PlannedStep {
@@ -159,65 +144,24 @@ impl Builder<'_, '_, '_> {
         origin.filter(|o| o.is_some())
     }
 
-    /// Records what a step touches and what its inverse will need. The system is the one before the step.
-    fn touch(&mut self, what: &Step, inverse: &Undo) {
-        match what {
-            Step::State { component, .. } => self.footprint.touch(Slot::State(*component), Access::Write),
-            Step::Create { component, .. } | Step::Destroy { component } => {
-                self.footprint.touch(Slot::Component(*component), Access::Write);
-            }
-            Step::Connect { from, to, policy } => self.touch_link(*from, *to, *policy),
-            Step::Disconnect { from, to } => {
-                if let Some(policy) = self.view.link(*from, *to) {
-                    self.touch_link(*from, *to, policy);
-                }
-            }
-            Step::PropertySet { property, .. } => {
-                if let Undo::One(Step::PropertySet { value, .. }) = inverse {
-                    let value = Saved::Property(value.clone());
-                    self.write_property(*property, value, true);
-                }
-            }
-            Step::PortWrite { port, .. } => {
-                if let Undo::One(Step::PortWrite { value, .. }) = inverse {
-                    let value = Saved::Port(value.clone());
-                    self.write_port(*port, value, true);
-                }
-            }
-            Step::Operation(call) => {
-                self.footprint.touch(Slot::Operation(call.operation), Access::Write);
-                if let Undo::One(Step::Operation(undo)) = inverse {
-                    self.footprint.touch(Slot::Operation(undo.operation), Access::Write);
-                }
-            }
+    /// Records a demand that is true already: it needs no step, and counts as a write of the value that is there.
+    pub(super) fn fulfilled(&mut self, what: &Step) {
+        let inverse = step::inverse(what, None, self.view);
+        self.record(what, None, &inverse, false);
+    }
+
+    /// Records what a step touches and what it overwrites; `step` is false when its demand is fulfilled without it. The
+    /// system is the one before it.
+    fn record(&mut self, what: &Step, undo: Option<&Call>, inverse: &Undo, step: bool) {
+        self.footprint.touches.extend(step::touches(what, undo, self.view));
+        let value = match inverse {
+            Undo::One(Step::PropertySet { value, .. }) => Saved::Property(value.clone()),
+            Undo::One(Step::PortWrite { value, .. }) => Saved::Port(value.clone()),
+            _ => return,
+        };
+        if let Some(slot) = step::absolute(what) {
+            self.saved.push(SavedValue { slot, value, at: self.next(), step });
         }
-    }
-
-    fn touch_link(&mut self, from: MemberRef, to: MemberRef, policy: Policy) {
-        let event =
-            self.view.component(to.component).and_then(|n| n.port(to.member)).is_some_and(|(_, p)| p.is_event());
-        let access = if policy == Policy::Data && !event { Access::Write } else { Access::Join };
-        self.footprint.touch(Slot::Link(from, to), Access::Write);
-        self.footprint.touch(Slot::Drive(to), access);
-    }
-
-    /// Records an absolute write to a property; `step` is false when it holds the value already.
-    pub(super) fn write_property(&mut self, property: MemberRef, value: Saved, step: bool) {
-        let slot = Slot::Property(property);
-        self.saved.push(SavedValue { slot, value, at: self.next(), step });
-        self.footprint.touch(slot, Access::Write);
-        let node = self.view.component(property.component);
-        if node.and_then(|n| n.property(property.member)).is_some_and(|(_, p)| p.tunable != Tunable::Always) {
-            self.footprint.serve(Slot::State(property.component), Access::Need, slot);
-        }
-    }
-
-    /// Records an absolute write to a port; `step` is false when it holds the value already.
-    pub(super) fn write_port(&mut self, port: MemberRef, value: Saved, step: bool) {
-        let slot = Slot::Port(port);
-        self.saved.push(SavedValue { slot, value, at: self.next(), step });
-        self.footprint.touch(slot, Access::Write);
-        self.footprint.serve(Slot::Drive(port), Access::Need, slot);
     }
 
     fn warn_irreversible(&mut self) {

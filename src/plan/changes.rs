@@ -7,7 +7,6 @@
 use super::StepId;
 use super::builder::Builder;
 use super::conflicts::{Sorted, Use, clash};
-use super::footprint::{Access, Saved, Slot};
 use crate::model::codes;
 use crate::model::finding::did_you_mean;
 use crate::model::{
@@ -273,7 +272,7 @@ fn set(
     if fulfilled {
         // A demand that is true already. On a component that is created here, the create is the write.
         if create.is_none() && rival.is_none() {
-            b.write_property(property, Saved::Property(fitted), false);
+            b.fulfilled(&what);
         }
     } else if let Some(other) = initial.or(rival) {
         b.findings.push(clash(other, change));
@@ -299,7 +298,7 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, value: &Value,
     } else if fulfilled {
         let found = step::precondition(&what, b.view);
         if found.is_empty() {
-            b.write_port(port, Saved::Port(Some(fitted)), false);
+            b.fulfilled(&what);
         } else {
             b.refuse(&what, found, change.origin);
         }
@@ -328,9 +327,6 @@ fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, call: &Call, undo: Option<&
     let undo = undo.map(|u| fit(b, u));
     let what = Step::Operation(fit(b, call));
     b.step(what, undo.as_ref(), origin, &after);
-    if let Some(undo) = undo {
-        b.footprint.touch(Slot::Operation(undo.operation), Access::Write);
-    }
 }
 
 fn connect(

@@ -1,6 +1,5 @@
 //! Changes of one configuration against each other: what counts once, and what does not commute.
 
-use super::builder::show;
 use crate::model::codes;
 use crate::model::{Change, ChangeKind, ComponentName, Configuration, Finding, MemberRef};
 use rustc_hash::FxHashMap;
@@ -53,7 +52,7 @@ pub(super) struct Sorted {
 }
 
 pub(super) fn clash(first: &Change, second: &Change) -> Finding {
-    Finding::error(codes::CLASH, format!("`{}` and `{}` do not commute", show(&first.kind), show(&second.kind)))
+    Finding::error(codes::CLASH, format!("`{}` and `{}` do not commute", first.kind, second.kind))
         .at(second.origin)
         .labelled("this change")
         .also(first.origin, "and this one")
@@ -121,17 +120,12 @@ pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -
 /// Changes to a component that is destroyed and not created again.
 fn destroyed(changes: &[Change], sorted: &mut Sorted, findings: &mut Vec<Finding>) {
     for (i, change) in changes.iter().enumerate() {
-        let touched: [Option<ComponentName>; 2] = match &change.kind {
-            ChangeKind::PropertySet { property: m, .. } | ChangeKind::PortWrite { port: m, .. } => {
-                [Some(m.component), None]
-            }
-            ChangeKind::OperationCall { call, undo } => {
-                [Some(call.operation.component), undo.as_ref().map(|u| u.operation.component)]
-            }
-            ChangeKind::Connect { from, to, .. } => [Some(from.component), Some(to.component)],
-            _ => [None, None],
-        };
-        for component in touched.into_iter().flatten() {
+        // A disconnect concerns the old component.
+        use ChangeKind::{Create, Destroy, Disconnect};
+        if matches!(change.kind, Create { .. } | Destroy { .. } | Disconnect { .. }) {
+            continue;
+        }
+        for component in change.kind.components() {
             let Some(destroy) = sorted.destroyed.get(&component) else { continue };
             if sorted.created.contains_key(&component) || sorted.uses[i] == Use::No {
                 continue;
@@ -140,7 +134,7 @@ fn destroyed(changes: &[Change], sorted: &mut Sorted, findings: &mut Vec<Finding
             findings.push(
                 Finding::error(
                     codes::TOUCHES_DESTROYED,
-                    format!("`{}` touches `{component}`, which this configuration destroys", show(&change.kind)),
+                    format!("`{}` touches `{component}`, which this configuration destroys", change.kind),
                 )
                 .at(change.origin)
                 .labelled("this change")

@@ -12,6 +12,7 @@ use crate::model::{
     ChangeKind, ComponentName, ConfigId, Configuration, Direction, Ident, MemberRef, Origin, RunState, StateEntry,
     Step, Target, Transition, Tunable, Value,
 };
+use crate::system::touch::Touches;
 use crate::system::{System, Undo, View, step};
 use petgraph::stable_graph::NodeIndex;
 use smallvec::SmallVec;
@@ -37,6 +38,7 @@ struct Write {
     slot: Slot,
     value: Value,
     tunable: Tunable,
+    touches: Touches,
     /// What it overwrites, and whether that is a value ("never written" is none).
     old: Value,
     was: bool,
@@ -170,7 +172,13 @@ impl Switch {
             system.reserve_port_at(index, at, &value);
         }
         let old = value.clone();
-        self.writes.push(Write { part, at, slot, value, tunable, old, was: false });
+        let what = match slot {
+            Slot::Property(property) => Step::PropertySet { property, value: value.clone() },
+            Slot::Port(port) => Step::PortWrite { port, value: Some(value.clone()) },
+            _ => return None,
+        };
+        let touches = step::touches(&what, None, &*system);
+        self.writes.push(Write { part, at, slot, value, tunable, touches, old, was: false });
         Some(())
     }
 
@@ -411,16 +419,7 @@ impl Switch {
             let access = if moved(entry.part) { Access::Write } else { Access::Need };
             footprint.touch(Slot::State(self.parts[entry.part].name), access);
         }
-        for write in &self.writes {
-            footprint.touch(write.slot, Access::Write);
-            match write.slot {
-                Slot::Port(port) => footprint.serve(Slot::Drive(port), Access::Need, write.slot),
-                slot if write.tunable != Tunable::Always => {
-                    footprint.serve(Slot::State(slot.components().0), Access::Need, slot);
-                }
-                _ => {}
-            }
-        }
+        footprint.touches.extend(self.writes.iter().flat_map(|write| write.touches.iter().copied()));
         footprint
     }
 

@@ -6,6 +6,7 @@
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition};
+pub use crate::system::step::absolute;
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -55,15 +56,6 @@ impl Item {
     /// A step by itself.
     fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
         Self { step, call: None, was: None, stage, origin, of: Self::NOWHERE }
-    }
-}
-
-/// The slot of an absolute write.
-pub fn absolute(step: &Step) -> Option<Slot> {
-    match step {
-        Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
-        Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
-        _ => None,
     }
 }
 

@@ -8,6 +8,7 @@ mod node;
 mod overlay;
 pub mod step;
 mod system_graph;
+pub mod touch;
 mod violation;
 
 pub use diff::diff;
@@ -15,6 +16,7 @@ pub use node::{Driven, Link, Node, Written};
 pub use overlay::Overlay;
 pub use step::{Reversibility, Undo};
 pub use system_graph::{System, UnknownType};
+pub use touch::{Access, Slot, Touch};
 pub use violation::Violation;
 
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Value};

@@ -1,7 +1,9 @@
 //! What a step means: when it may happen, what it does to the picture of a system, and which steps undo it.
 //!
 //! The three stand together, one kind of step after the other, because each is the other two's specification (design §4).
+//! What it touches stands beside them, in [`touch`](super::touch).
 
+pub use super::touch::{absolute, components, touches};
 use super::{Driven, Node, View, ViewMut, Violation};
 use crate::model::{
     Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, RunState, Step, Transition, TypeName,

@@ -3,12 +3,13 @@
 use crate::generate::{self, ConfigGene, TypeGene, context, read};
 use crate::plain::Plain;
 use crate::settings;
+use davit::model::{MemberRef, Snapshot};
 use davit::plan::{PlannedStep, plan, plan_on};
 use davit::stack::{Request, Requester, Stack, transaction};
-use davit::system::{Overlay, Reversibility, View, step};
+use davit::system::{Access, Overlay, Reversibility, Slot, View, step};
 use davit::time::Time;
 use proptest::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Beyond so many steps in one wave orders are sampled.
 const FREE: usize = 7;
@@ -104,6 +105,33 @@ fn case() -> impl Strategy<Value = (Vec<TypeGene>, Vec<ConfigGene>, ConfigGene, 
     (generate::types(), generate::configs(1..5), generate::config(), any::<u64>())
 }
 
+/// The slots that two observations differ in; of a component that came or went, its existence.
+fn changed(was: &Snapshot, is: &Snapshot) -> Vec<Slot> {
+    let mut slots = Vec::new();
+    let names: BTreeSet<_> = was.components.keys().chain(is.components.keys()).collect();
+    for name in names {
+        let (Some(a), Some(b)) = (was.components.get(name), is.components.get(name)) else {
+            slots.push(Slot::Component(*name));
+            continue;
+        };
+        if a.state != b.state {
+            slots.push(Slot::State(*name));
+        }
+        let differ = b.properties.iter().filter(|(property, value)| a.properties.get(property) != Some(value));
+        slots.extend(differ.map(|(property, _)| Slot::Property(name.member(*property))));
+    }
+    let links: BTreeSet<_> = was.connections.keys().chain(is.connections.keys()).collect();
+    for link in links.into_iter().filter(|link| was.connections.get(link) != is.connections.get(link)) {
+        slots.extend([Slot::Link(link.0, link.1), Slot::Drive(link.1)]);
+    }
+    let there =
+        |port: &&MemberRef| was.components.contains_key(&port.component) && is.components.contains_key(&port.component);
+    let ports: BTreeSet<_> = was.ports.keys().chain(is.ports.keys()).collect();
+    let ports = ports.into_iter().filter(there).filter(|port| was.ports.get(port) != is.ports.get(port));
+    slots.extend(ports.map(|port| Slot::Port(*port)));
+    slots
+}
+
 pub fn operator(configuration: &davit::model::Configuration) -> Request<'_> {
     Request::Push { configuration, requester: Requester::Operator, at: Time(1), active: false }
 }
@@ -133,8 +161,22 @@ proptest! {
                     _ => None,
                 };
                 prop_assert_eq!(&step::inverse(&s.step, call, &system), &s.undo);
+                let touches = step::touches(&s.step, call, &system);
+                let was = system.snapshot();
                 plain.make(&s.step);
                 step::effect(&s.step, &mut system);
+                // Every slot that it changed is among those it touches, and no other component is.
+                for slot in changed(&was, &system.snapshot()) {
+                    let told = touches.iter().any(|t| t.slot == slot && t.access != Access::Need);
+                    prop_assert!(told, "{} changes {slot}, and touches {touches:?}", s.step);
+                    prop_assert!(plan.footprint.writes(slot), "{} changes {slot}", s.step);
+                }
+                let of = step::components(&s.step);
+                let elsewhere = call.map(|call| call.operation.component);
+                for touch in &touches {
+                    let (a, b) = touch.slot.components();
+                    prop_assert!([a, b].iter().all(|c| of.contains(c) || elsewhere == Some(*c)), "{}: {touch:?}", s.step);
+                }
                 prop_assert_eq!(&plain.is, &system.snapshot());
             }
             // The overlay that was planned on shows the same, also in what is counted and not observed.

@@ -1,0 +1,164 @@
+//! What a step touches, slot by slot, and what its inverse will need: the fourth part of a step's meaning, beside [`step`].
+//!
+//! [`step`]: super::step
+
+use super::View;
+use crate::model::{Call, ComponentName, Effect, MemberRef, Policy, Step, Tunable};
+use smallvec::{SmallVec, smallvec};
+use std::fmt;
+
+/// A thing of a system that can be read and written by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Slot {
+    /// The existence of a component; a write to it touches everything of the component.
+    Component(ComponentName),
+    /// Its run state.
+    State(ComponentName),
+    /// A property.
+    Property(MemberRef),
+    /// What was written to a port.
+    Port(MemberRef),
+    /// What drives an in-port.
+    Drive(MemberRef),
+    /// A connection.
+    Link(MemberRef, MemberRef),
+    /// What an operation does.
+    Operation(MemberRef),
+}
+
+impl Slot {
+    /// The components it belongs to (a connection belongs to two).
+    pub fn components(self) -> (ComponentName, ComponentName) {
+        match self {
+            Self::Component(c) | Self::State(c) => (c, c),
+            Self::Property(m) | Self::Port(m) | Self::Drive(m) | Self::Operation(m) => (m.component, m.component),
+            Self::Link(from, to) => (from.component, to.component),
+        }
+    }
+
+    /// Whether writes to it are absolute: they say what it holds afterwards whatever it held before.
+    pub fn is_absolute(self) -> bool {
+        matches!(self, Self::Property(_) | Self::Port(_))
+    }
+}
+
+impl fmt::Display for Slot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Component(c) => write!(f, "the component `{c}`"),
+            Self::State(c) => write!(f, "the run state of `{c}`"),
+            Self::Property(m) => write!(f, "the property `{m}`"),
+            Self::Port(m) => write!(f, "the written value of `{m}`"),
+            Self::Drive(m) => write!(f, "what drives `{m}`"),
+            Self::Link(from, to) => write!(f, "the connection {from} -> {to}"),
+            Self::Operation(m) => write!(f, "the operation `{m}`"),
+        }
+    }
+}
+
+/// How a slot is touched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Access {
+    /// It must stay as it is.
+    Need,
+    /// One source among many is added or removed: two of these do not disturb each other.
+    Join,
+    /// It is changed.
+    Write,
+}
+
+impl Access {
+    /// Whether two touches of one slot disturb each other.
+    pub fn shares(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Need, Self::Need) | (Self::Join, Self::Join) => false,
+            (a, b) => a != Self::Need || b != Self::Need,
+        }
+    }
+}
+
+/// One touched slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Touch {
+    /// The slot.
+    pub slot: Slot,
+    /// How.
+    pub access: Access,
+    /// The absolute write this is needed for; when that write's value is handed over, it is not needed.
+    pub serves: Option<Slot>,
+}
+
+impl Touch {
+    /// A touch for its own sake.
+    pub fn new(slot: Slot, access: Access) -> Self {
+        Self { slot, access, serves: None }
+    }
+}
+
+/// What a step touches; never more than two slots.
+pub type Touches = SmallVec<[Touch; 2]>;
+
+/// What `step` touches in the system `before` it, and what its inverse will need. `undo` is the call that a configuration
+/// names for an operation's call, as for [`inverse`](super::step::inverse).
+///
+/// What `before` does not know (a component that an earlier step of a list makes) counts as the most that it can be: a
+/// property as bound to run states, an in-port as the data port of its only connection.
+pub fn touches(step: &Step, undo: Option<&Call>, before: &impl View) -> Touches {
+    match step {
+        Step::State { component, .. } => smallvec![Touch::new(Slot::State(*component), Access::Write)],
+        Step::Create { component, .. } | Step::Destroy { component } => {
+            smallvec![Touch::new(Slot::Component(*component), Access::Write)]
+        }
+        Step::Connect { from, to, policy } => link(*from, *to, *policy, before),
+        Step::Disconnect { from, to } => link(*from, *to, before.link(*from, *to).unwrap_or_default(), before),
+        Step::PropertySet { property, .. } => {
+            let declared = before.component(property.component).and_then(|n| n.property(property.member));
+            let bound = declared.is_none_or(|(_, p)| p.tunable != Tunable::Always);
+            absolute_write(Slot::Property(*property), bound.then_some(Slot::State(property.component)))
+        }
+        Step::PortWrite { port, .. } => absolute_write(Slot::Port(*port), Some(Slot::Drive(*port))),
+        Step::Operation(call) => {
+            let of = call.operation;
+            let declared = || before.component(of.component).and_then(|n| n.ty.operations.get(&of.member));
+            let inverse = match (undo, declared().map(|o| &o.effect)) {
+                (Some(undo), _) => Some(undo.operation),
+                (None, Some(Effect::Undo(name))) => Some(of.component.member(*name)),
+                (None, _) => None,
+            };
+            let called = std::iter::once(of).chain(inverse.filter(|inverse| *inverse != of));
+            called.map(|operation| Touch::new(Slot::Operation(operation), Access::Write)).collect()
+        }
+    }
+}
+
+fn link(from: MemberRef, to: MemberRef, policy: Policy, before: &impl View) -> Touches {
+    let event = before.component(to.component).and_then(|n| n.port(to.member)).is_some_and(|(_, p)| p.is_event());
+    let access = if policy == Policy::Data && !event { Access::Write } else { Access::Join };
+    smallvec![Touch::new(Slot::Link(from, to), Access::Write), Touch::new(Slot::Drive(to), access)]
+}
+
+/// A write whose inverse needs that `needs` is as it was.
+fn absolute_write(slot: Slot, needs: Option<Slot>) -> Touches {
+    let mut touches: Touches = smallvec![Touch::new(slot, Access::Write)];
+    touches.extend(needs.map(|needed| Touch { slot: needed, access: Access::Need, serves: Some(slot) }));
+    touches
+}
+
+/// The slot of an absolute write.
+pub fn absolute(step: &Step) -> Option<Slot> {
+    match step {
+        Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
+        Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
+        _ => None,
+    }
+}
+
+/// The components that `step` is done to, each once: of a connection both ends.
+pub fn components(step: &Step) -> SmallVec<[ComponentName; 2]> {
+    match step {
+        Step::Connect { from, to, .. } | Step::Disconnect { from, to } if from.component != to.component => {
+            smallvec![from.component, to.component]
+        }
+        other => smallvec![other.component()],
+    }
+}
