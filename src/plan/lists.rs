@@ -106,7 +106,11 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, 
     let scope = b.configuration.id.prefix();
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
-        if node.state != entry.state && in_scope(node.name, scope) && !named.contains(&node.name) {
+        if node.state != entry.state
+            && in_scope(node.name, scope)
+            && !named.contains(&node.name)
+            && !b.context.avoid.contains(&node.name)
+        {
             moving.push(node.name);
         }
     });

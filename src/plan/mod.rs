@@ -15,7 +15,7 @@ mod tests;
 pub mod undo;
 
 use crate::model::codes;
-use crate::model::{ConfigId, Configuration, Finding, Findings, Ident, Origin, Step};
+use crate::model::{ComponentName, ConfigId, Configuration, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
 use footprint::{Footprint, Saved, Slot};
 use smallvec::SmallVec;
@@ -26,6 +26,8 @@ use std::collections::BTreeSet;
 pub struct Context {
     /// The deployment's activities.
     pub activities: BTreeSet<Ident>,
+    /// Components that `_default` passes over: in quarantine, or not known well enough.
+    pub avoid: BTreeSet<ComponentName>,
 }
 
 /// The stage a step belongs to. Stages are barriers.

@@ -299,11 +299,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
     pub(super) fn finish(self, system: &System) -> Result<Planned, Refusal> {
-        let Self { script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
-        let view = script.view().clone();
-        let whole = script.finish().map_err(|found| drifted(&found))?;
+        let Self { mut script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
+        script.settle_all().map_err(|found| drifted(&found))?;
         let mixed = replaced || parts.iter().any(|p| p.pushes.is_none()) && parts.iter().any(|p| p.pushes.is_some());
-        let net = if mixed { shorter(system, &view, &whole) } else { None };
+        let end = mixed.then(|| script.view().clone());
+        let whole = script.finish().map_err(|found| drifted(&found))?;
+        let net = end.and_then(|end| shorter(system, &end, &whole));
         for id in &pushed {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
             let own = frames.iter().filter(|f| f.requester == frame.requester).count();

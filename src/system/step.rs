@@ -184,6 +184,12 @@ pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
     }
 }
 
+/// Whether `step` moves hardware: it is run when somebody asks for it, and not by itself.
+pub fn moves(step: &Step, view: &impl View) -> bool {
+    let _ = (step, view);
+    false
+}
+
 /// Makes `step` happen in the picture, when its precondition holds.
 ///
 /// # Errors

@@ -1,0 +1,316 @@
+//! What the requests of a batch come to: written once. The configurator carries out what stands here, `check` follows it.
+//!
+//! A batch ends as if its requests had been carried out one after the other, undos first, then pushes, each in the order
+//! they were raised. Undos and pushes of one batch are carried out together, by their net difference; where one of them
+//! fails, those before it stand, and those behind it are taken up anew. A request that is refused by itself is answered and
+//! left out, and the rest is planned anew.
+
+use super::work::{Op, Planned, Work};
+use super::{FrameId, Reason, Request, Requester, Why, World, claims, share};
+
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
+use crate::plan::{Context, PlannedStep};
+use crate::system::{Overlay, step};
+use crate::time::Time;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+/// What requests are judged by, beside the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules<'a> {
+    /// The configurations.
+    pub configurations: &'a FxHashMap<ConfigId, Configuration>,
+    /// What plans are made with.
+    pub context: &'a Context,
+    /// When.
+    pub at: Time,
+    /// Whether other requests are under way.
+    pub busy: bool,
+}
+
+/// A request of a batch that is answered.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Its place in the batch.
+    pub place: usize,
+    /// How; none: it was no request of anybody, and nobody is told.
+    pub verdict: Option<Verdict>,
+    /// Why, where it is not simply a success.
+    pub reason: Option<Reason>,
+}
+
+/// The first requests of a batch, which are carried out together.
+#[derive(Debug, Clone, Default)]
+pub struct Group {
+    /// So many requests of the batch are settled by it.
+    pub takes: usize,
+    /// Those that are answered without being carried out: told with the others, in the order of the batch.
+    pub told: SmallVec<[Told; 2]>,
+    /// What is done for the others; none: nothing needs to be.
+    pub planned: Option<Planned>,
+    /// Of each operation of the plan, the place of its request in the batch.
+    pub places: SmallVec<[usize; 2]>,
+    /// What is repaired before the plan is carried out, by its place in [`World::broken`].
+    pub repairs: Option<usize>,
+    /// The present state becomes the floor.
+    pub commits: bool,
+    /// A coordinator has come to its *down* state.
+    pub down: bool,
+}
+
+/// What one request comes to.
+enum Resolved<'a> {
+    Op(Op<'a>),
+    Tell(Option<Verdict>, Option<Reason>),
+    Commit,
+    Down,
+}
+
+/// What the first requests of a batch (arranged, not empty) come to in `world`: as many as are carried out together.
+pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group {
+    let together = together(world, requests);
+    let repairs = (together == 1).then(|| repairs(world, &requests[0])).flatten();
+    let avoiding;
+    let context = if world.broken.is_empty() && world.quarantined.is_empty() {
+        rules.context
+    } else {
+        avoiding = Context { avoid: world.avoided(), ..rules.context.clone() };
+        &avoiding
+    };
+    let mut refused: SmallVec<[Told; 2]> = SmallVec::new();
+    'anew: loop {
+        let mut group = Group { takes: together, told: refused.clone(), repairs, ..Group::default() };
+        let mut view = Overlay::new(&world.system);
+        let mut work = Work::new(&mut view, &world.stack);
+        for (place, request) in requests[..together].iter().enumerate() {
+            if refused.iter().any(|told| told.place == place) {
+                continue;
+            }
+            match resolve(world, &work, request, rules, repairs.is_some()) {
+                Resolved::Tell(verdict, reason) => group.told.push(Told { place, verdict, reason }),
+                Resolved::Commit => group.commits = true,
+                Resolved::Down => group.down = true,
+                Resolved::Op(op) => {
+                    if let Err(refusal) = work.add(&op, context) {
+                        refused.push(no(place, request, Reason::Refused(refusal.findings)));
+                        continue 'anew;
+                    }
+                    group.places.push(place);
+                }
+            }
+        }
+        if !group.places.is_empty() {
+            match work.finish(&world.system) {
+                Err(refusal) => {
+                    let place = group.places[refusal.request.min(group.places.len() - 1)];
+                    refused.push(no(place, &requests[place], Reason::Refused(refusal.findings)));
+                    continue 'anew;
+                }
+                Ok(planned) => {
+                    if let Some((part, reason)) = forbidden(world, requests, &group, &planned) {
+                        let place = group.places[part];
+                        refused.push(no(place, &requests[place], reason));
+                        continue 'anew;
+                    }
+                    group.planned = Some(planned);
+                }
+            }
+        }
+        group.told.sort_by_key(|told| told.place);
+        return group;
+    }
+}
+
+fn no(place: usize, request: &Request, reason: Reason) -> Told {
+    Told { place, verdict: Some(request.ask.failed()), reason: Some(reason) }
+}
+
+/// How many of the first requests are carried out together: undos and pushes of one batch, else one.
+fn together(world: &World, requests: &[Request]) -> usize {
+    let plain = |request: &Request| request.why == Why::Asked && matches!(request.ask, Ask::Apply(_) | Ask::UndoOf(_) | Ask::Undo);
+    let mixed = requests.iter().any(|r| r.ask.is_undo()) && requests.iter().any(|r| !r.ask.is_undo());
+    if !mixed || !requests.iter().all(plain) || !requests[0].ask.is_undo() {
+        return 1;
+    }
+    // What is repaired goes by itself.
+    let alone = requests.iter().position(|request| repairs(world, request).is_some());
+    alone.map_or(requests.len(), |at| at.max(1))
+}
+
+/// What a request repairs before anything else.
+fn repairs(world: &World, request: &Request) -> Option<usize> {
+    let Ask::UndoOf(id) = request.ask else { return None };
+    if world.broken.is_empty() {
+        return None;
+    }
+    let frame = world.stack.newest_of(id, own(request)).map(|frame| frame.id);
+    world.repaired_by(id, request.requester, frame)
+}
+
+/// Whose frames an undo finds: one's own, by force anybody's.
+fn own(request: &Request) -> Option<Requester> {
+    if request.force { None } else { Some(request.requester) }
+}
+
+fn tell<'a>(verdict: Verdict, reason: Reason) -> Resolved<'a> {
+    Resolved::Tell(Some(verdict), Some(reason))
+}
+
+fn resolve<'a>(world: &World, work: &Work<'_, '_, '_>, request: &Request, rules: &Rules<'a>, repaired: bool) -> Resolved<'a> {
+    let failed = request.ask.failed();
+    if request.why == Why::Down {
+        return Resolved::Down;
+    }
+    let still_broken = |components: &mut dyn Iterator<Item = ComponentName>| {
+        world.broken_at(components).map(|broken| Reason::StillBroken(broken.residual.clone()))
+    };
+    match request.ask {
+        Ask::Apply(id) => {
+            let Some(configuration) = rules.configurations.get(&id) else { return tell(failed, Reason::Unknown(id)) };
+            if !world.broken.is_empty()
+                && let Some(reason) = still_broken(&mut claims::components(configuration).into_iter())
+            {
+                return tell(failed, reason);
+            }
+            let Request { requester, scope, .. } = *request;
+            Resolved::Op(Op::Push { configuration, requester, at: rules.at, scope })
+        }
+        Ask::UndoOf(id) => {
+            if !rules.configurations.contains_key(&id) {
+                return tell(failed, Reason::Unknown(id));
+            }
+            let found = match (request.why, request.scope) {
+                (Why::Unconfirmed(frame, ..), _) => match work.frames.iter().find(|f| f.id == frame) {
+                    Some(frame) => Some(frame),
+                    None => return Resolved::Tell(None, None),
+                },
+                // Leaving a state undoes the frame of that visit and no other.
+                (_, Some(scope)) => {
+                    let of = |f: &&std::sync::Arc<super::Frame>| {
+                        f.scope == Some(scope) && f.configuration == id && f.requester == request.requester
+                    };
+                    work.frames.iter().rev().find(of)
+                }
+                _ => work.newest_of(id, own(request)),
+            };
+            match found {
+                Some(frame) => {
+                    if !repaired
+                        && !world.broken.is_empty()
+                        && let Some(reason) = still_broken(&mut share::components(&frame.footprint).into_iter())
+                    {
+                        return tell(failed, reason);
+                    }
+                    Resolved::Op(Op::Undo(frame.id))
+                }
+                None if request.scope.is_none() && world.stack.is_buried(id, own(request)) => tell(
+                    failed,
+                    Reason::Refused(vec![
+                        Finding::error(
+                            codes::STACK_SQUASHED,
+                            format!("`{id}` was committed, or squashed together with others"),
+                        )
+                        .help("`undo` takes the squashed frame back as one; what was committed is not undone any more"),
+                    ]),
+                ),
+                None if request.requester == Requester::Operator
+                    && !request.force
+                    && work.newest_of(id, None).is_some() =>
+                {
+                    tell(failed, Reason::NeedsForce(id))
+                }
+                None => Resolved::Tell(Some(Verdict::Undone), None),
+            }
+        }
+        Ask::Undo => match work.frames.iter().rev().find(|frame| frame.requester == request.requester) {
+            Some(frame) => match still_broken(&mut share::components(&frame.footprint).into_iter()) {
+                Some(reason) => tell(failed, reason),
+                None => Resolved::Op(Op::Undo(frame.id)),
+            },
+            None => tell(failed, Reason::NothingToUndo),
+        },
+        Ask::UndoTo(left) => {
+            if rules.busy {
+                return tell(failed, Reason::Busy);
+            }
+            if let Some(broken) = world.broken.first() {
+                return tell(failed, Reason::StillBroken(broken.residual.clone()));
+            }
+            match work.frames.get(left..) {
+                None | Some([]) => tell(failed, Reason::NothingToUndo),
+                Some(above) => match foreign(above, request) {
+                    Some(id) => tell(failed, Reason::NeedsForce(id)),
+                    None => Resolved::Op(Op::UndoTo(left)),
+                },
+            }
+        }
+        Ask::Commit => {
+            if rules.busy {
+                return tell(failed, Reason::Busy);
+            }
+            if let Some(broken) = world.broken.first() {
+                return tell(failed, Reason::StillBroken(broken.residual.clone()));
+            }
+            match foreign(&work.frames, request) {
+                Some(id) => tell(failed, Reason::NeedsForce(id)),
+                None => Resolved::Commit,
+            }
+        }
+    }
+}
+
+/// A frame of a coordinator that an operator without force does not meddle with.
+fn foreign(frames: &[std::sync::Arc<super::Frame>], request: &Request) -> Option<ConfigId> {
+    let others = |frame: &&std::sync::Arc<super::Frame>| frame.requester != request.requester;
+    if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
+}
+
+/// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would
+/// move that nobody may move.
+fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Planned) -> Option<(usize, Reason)> {
+    if !world.quarantined.is_empty() {
+        let hindered = hindered(world, planned.steps.iter());
+        if let Some((at, findings)) = hindered {
+            return Some((planned.part_of(planned.place(at)), Reason::Refused(findings)));
+        }
+    }
+    let safe = world.stack.safe().next().is_some();
+    let still = |request: &Request| {
+        request.still || safe && (request.requester == Requester::Operator || request.why != Why::Asked) && !request.force
+    };
+    for (part, place) in group.places.iter().enumerate().filter(|(_, place)| still(&requests[**place])) {
+        let _ = place;
+        let steps = planned.steps.iter().enumerate();
+        let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
+        if let Some((_, moving)) = own.find(|(_, planned)| step::moves(&planned.step, &world.system)) {
+            return Some((part, Reason::Moves(moving.step.clone())));
+        }
+    }
+    None
+}
+
+/// The first step that needs a component in quarantine, with the findings about all such components. A connection can be
+/// taken from any component.
+fn hindered<'a>(world: &World, steps: impl Iterator<Item = &'a PlannedStep> + Clone) -> Option<(usize, Vec<Finding>)> {
+    let needs = |planned: &PlannedStep| -> SmallVec<[ComponentName; 2]> {
+        if matches!(planned.step, Step::Disconnect { .. }) { SmallVec::new() } else { crate::system::touch::components(&planned.step) }
+    };
+    let hung = |planned: &PlannedStep| needs(planned).into_iter().any(|c| world.quarantined.contains(&c));
+    let first = steps.clone().position(hung)?;
+    let mut components: Vec<ComponentName> =
+        steps.flat_map(needs).filter(|component| world.quarantined.contains(component)).collect();
+    components.sort_unstable();
+    components.dedup();
+    let finding = |component| {
+        Finding::error(codes::QUARANTINED, format!("`{component}` is in quarantine: an earlier call has not returned"))
+            .help("wait until the call returns, restart what the component runs on, or leave it out")
+    };
+    Some((first, components.into_iter().map(finding).collect()))
+}
+
+/// The frames that a plan pops or hands values over to: nobody else squashes them meanwhile.
+pub fn held(planned: &Planned) -> Vec<FrameId> {
+    let pops = planned.parts.iter().flat_map(|part| &part.edits.pops);
+    pops.flat_map(|(id, hand)| std::iter::once(*id).chain(hand.takers())).collect()
+}
+

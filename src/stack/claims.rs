@@ -1,0 +1,122 @@
+//! What a request may touch, known from its text: requests that have nothing to do with each other are carried out at the
+//! same time (design §6, "Claims").
+
+use super::request::Request;
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Ident, Target};
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+
+/// A set of the components that the configurations of a deployment name.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Claim {
+    /// Everything there is.
+    all: bool,
+    bits: SmallVec<[u64; 4]>,
+}
+
+impl Claim {
+    /// Everything.
+    pub fn all() -> Self {
+        Self { all: true, bits: SmallVec::new() }
+    }
+
+    fn set(&mut self, at: usize) {
+        if self.bits.len() <= at / 64 {
+            self.bits.resize(at / 64 + 1, 0);
+        }
+        self.bits[at / 64] |= 1 << (at % 64);
+    }
+
+    /// Takes `other` in.
+    pub fn join(&mut self, other: &Self) {
+        self.all |= other.all;
+        if self.bits.len() < other.bits.len() {
+            self.bits.resize(other.bits.len(), 0);
+        }
+        self.bits.iter_mut().zip(&other.bits).for_each(|(a, b)| *a |= b);
+    }
+
+    /// Whether they have something in common. Nothing has nothing in common with anything.
+    pub fn meets(&self, other: &Self) -> bool {
+        let empty = |claim: &Self| !claim.all && claim.bits.iter().all(|bits| *bits == 0);
+        match (self.all, other.all) {
+            (true, _) => !empty(other),
+            (_, true) => !empty(self),
+            _ => self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0),
+        }
+    }
+}
+
+/// The claims of a deployment's configurations.
+#[derive(Debug, Clone, Default)]
+pub struct Claims {
+    of: FxHashMap<ConfigId, Claim>,
+}
+
+impl Claims {
+    /// What each configuration claims: the components that it and those of its group name; with `_default` all of its file.
+    pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone) -> Self {
+        let mut numbers: BTreeMap<ComponentName, usize> = BTreeMap::new();
+        for configuration in configurations.clone() {
+            for component in named(configuration) {
+                let next = numbers.len();
+                numbers.entry(component).or_insert(next);
+            }
+        }
+        let mut of: FxHashMap<ConfigId, Claim> = FxHashMap::default();
+        let mut groups: BTreeMap<Ident, Claim> = BTreeMap::new();
+        for configuration in configurations.clone() {
+            let mut claim = Claim::default();
+            named(configuration).for_each(|component| claim.set(numbers[&component]));
+            let mut states = configuration.pre.iter().chain(&configuration.post);
+            if states.any(|entry| entry.target == Target::Default) {
+                let scope = configuration.id.prefix();
+                numbers.iter().filter(|(name, _)| name.prefix() == scope).for_each(|(_, at)| claim.set(*at));
+            }
+            if let Some(group) = configuration.group {
+                groups.entry(group).or_default().join(&claim);
+            }
+            of.insert(configuration.id, claim);
+        }
+        for configuration in configurations {
+            if let (Some(group), Some(claim)) = (configuration.group, of.get_mut(&configuration.id)) {
+                claim.join(&groups[&group]);
+            }
+        }
+        Self { of }
+    }
+
+    /// What requests claim together. A configuration that is not there claims nothing.
+    pub fn of<'r>(&self, requests: impl IntoIterator<Item = &'r Request>) -> Claim {
+        let mut claim = Claim::default();
+        for request in requests {
+            match request.ask {
+                Ask::Apply(id) | Ask::UndoOf(id) => {
+                    if let Some(own) = self.of.get(&id) {
+                        claim.join(own);
+                    }
+                }
+                // Whose frame is the newest is not known from the text.
+                Ask::Undo | Ask::UndoTo(_) | Ask::Commit => claim.all = true,
+            }
+        }
+        claim
+    }
+}
+
+/// Components that a configuration names.
+fn named(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
+    let changes = configuration.changes.iter().flat_map(|change| change.kind.components());
+    let entries = configuration.pre.iter().chain(&configuration.post);
+    let states = entries.filter_map(|entry| match entry.target {
+        Target::Component(component) => Some(component),
+        Target::Default => None,
+    });
+    changes.chain(states)
+}
+
+/// Components that a configuration names, each once.
+pub fn components(configuration: &Configuration) -> std::collections::BTreeSet<ComponentName> {
+    named(configuration).collect()
+}

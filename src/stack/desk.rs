@@ -1,0 +1,204 @@
+//! Who waits for whom: batches that have come, in the order in which they begin (design §6, "Claims").
+//!
+//! A batch begins when no earlier one, under way or waiting, claims anything of what it claims, and when the one before of
+//! the same coordinator is over. Then it has all of that until its last request is answered. So no circle of waits can
+//! arise, and none starves.
+
+use super::claims::Claims;
+use super::request::{Batch, Request, Requester, Why};
+use super::{Reason, answer};
+use crate::model::{Ask, ConfigId, Verdict};
+use std::collections::VecDeque;
+
+/// A batch that has begun, by the number under which it is under way.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Turn {
+    /// The number: the smallest that was free.
+    pub number: u32,
+    /// Its requests that are not answered yet, arranged.
+    pub batch: Batch,
+}
+
+/// What waits and what is under way.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Desk {
+    waiting: VecDeque<Batch>,
+    under_way: Vec<Turn>,
+}
+
+/// What comes of a batch that has just come, beside what waits.
+#[derive(Debug, Default)]
+pub struct Arrival {
+    /// Answered at once.
+    pub told: Vec<(Request, Verdict, answer::Reason)>,
+    /// Requests for safe configurations: they wait for nothing.
+    pub safe: Vec<Request>,
+    /// Undos that give up what is under way, with its number.
+    pub given_up: Vec<(u32, Request)>,
+}
+
+impl Desk {
+    /// Batches that have not begun, the oldest first.
+    pub fn waiting(&self) -> impl Iterator<Item = &Batch> {
+        self.waiting.iter()
+    }
+
+    /// Batches that have begun.
+    pub fn under_way(&self) -> &[Turn] {
+        &self.under_way
+    }
+
+    /// How many requests have not begun.
+    pub fn len(&self) -> usize {
+        self.waiting.iter().map(|batch| batch.requests.len()).sum()
+    }
+
+    /// Whether nothing waits and nothing is under way.
+    pub fn is_empty(&self) -> bool {
+        self.waiting.is_empty() && self.under_way.is_empty()
+    }
+
+    /// A batch comes, in the order it was raised. `safe` tells which configurations are safe ones.
+    pub fn arrive(&mut self, batch: Batch, safe: impl Fn(ConfigId) -> bool, claims: &Claims) -> Arrival {
+        let mut arrival = Arrival::default();
+        let mut kept = Batch::default();
+        for request in batch.requests {
+            match request.ask {
+                Ask::Apply(id) if safe(id) => arrival.safe.push(request),
+                Ask::UndoOf(id) if request.why == Why::Asked => {
+                    if let Some(overtaken) = self.overtake(&mut kept, id, &request) {
+                        arrival.told.push((overtaken, Verdict::Cancelled, Reason::Overtaken));
+                        arrival.told.push((request, Verdict::Undone, Reason::Overtaken));
+                    } else if let Some(number) = self.given_up_by(id, &request, claims) {
+                        arrival.given_up.push((number, request));
+                    } else {
+                        kept.requests.push(request);
+                    }
+                }
+                _ => kept.requests.push(request),
+            }
+        }
+        for safe in &arrival.safe {
+            let Ask::Apply(id) = safe.ask else { continue };
+            kept.requests.iter_mut().for_each(|request| request.still = true);
+            for request in self.cancel_waiting(|request| concerns(id, request)) {
+                let verdict = if request.ask.is_undo() { Verdict::UndoFailed } else { Verdict::Cancelled };
+                arrival.told.push((request, verdict, Reason::SafeCame(id)));
+            }
+        }
+        if !kept.requests.is_empty() {
+            kept.arrange();
+            self.waiting.push_back(kept);
+        }
+        arrival
+    }
+
+    /// The push that an undo takes back before it has begun.
+    fn overtake(&mut self, kept: &mut Batch, id: ConfigId, undo: &Request) -> Option<Request> {
+        let batches = std::iter::once(kept).chain(self.waiting.iter_mut().rev());
+        for batch in batches {
+            if let Some(at) = batch.requests.iter().rposition(|request| takes_back(undo, request, id)) {
+                let overtaken = batch.requests.remove(at);
+                self.waiting.retain(|batch| !batch.requests.is_empty());
+                return Some(overtaken);
+            }
+        }
+        None
+    }
+
+    /// What is under way and is given up by an undo, unless a request between them claims the same: then the undo waits its
+    /// turn.
+    fn given_up_by(&self, id: ConfigId, undo: &Request, claims: &Claims) -> Option<u32> {
+        let turn = self.under_way.iter().find(|turn| turn.batch.requests.iter().any(|r| takes_back(undo, r, id)))?;
+        let claim = claims.of(&turn.batch.requests);
+        let between = self.waiting.iter().any(|batch| claims.of(&batch.requests).meets(&claim));
+        (!between).then_some(turn.number)
+    }
+
+    /// Takes out what waits and `out` says so of.
+    pub fn cancel_waiting(&mut self, out: impl Fn(&Request) -> bool) -> Vec<Request> {
+        let mut gone = Vec::new();
+        for batch in &mut self.waiting {
+            batch.requests.retain(|request| {
+                let out = out(request);
+                if out {
+                    gone.push(*request);
+                }
+                !out
+            });
+        }
+        self.waiting.retain(|batch| !batch.requests.is_empty());
+        gone
+    }
+
+    /// The next batch that may begin; it is under way from now on.
+    pub fn turn(&mut self, claims: &Claims) -> Option<Turn> {
+        let at = if self.under_way.is_empty() {
+            // Whatever else waits came later.
+            (!self.waiting.is_empty()).then_some(0)
+        } else {
+            self.free(claims)
+        }?;
+        let batch = self.waiting.remove(at)?;
+        let number = (0..).find(|n| self.under_way.iter().all(|turn| turn.number != *n))?;
+        let turn = Turn { number, batch };
+        self.under_way.push(turn.clone());
+        Some(turn)
+    }
+
+    fn free(&self, claims: &Claims) -> Option<usize> {
+        let coordinator = |batch: &Batch| batch.requests.first().map(|r| r.requester).filter(|r| *r != Requester::Operator);
+        let mut held = claims.of(self.under_way.iter().flat_map(|turn| &turn.batch.requests));
+        let mut asking: Vec<Requester> = self.under_way.iter().filter_map(|turn| coordinator(&turn.batch)).collect();
+        for (at, batch) in self.waiting.iter().enumerate() {
+            let claim = claims.of(&batch.requests);
+            if !claim.meets(&held) && coordinator(batch).is_none_or(|by| !asking.contains(&by)) {
+                return Some(at);
+            }
+            held.join(&claim);
+            asking.extend(coordinator(batch));
+        }
+        None
+    }
+
+    /// The request at a place of a batch under way is answered. True: that was the last of it, and it is over.
+    pub fn answered(&mut self, number: u32, place: usize) -> bool {
+        let Some(at) = self.under_way.iter().position(|turn| turn.number == number) else { return true };
+        let requests = &mut self.under_way[at].batch.requests;
+        if place < requests.len() {
+            requests.remove(place);
+        }
+        let over = requests.is_empty();
+        if over {
+            self.under_way.remove(at);
+        }
+        over
+    }
+
+    /// A batch under way is over, whatever of it was not answered.
+    pub fn over(&mut self, number: u32) {
+        self.under_way.retain(|turn| turn.number != number);
+    }
+}
+
+/// Whether `undo` (of `id`) takes back what `request` asks.
+fn takes_back(undo: &Request, request: &Request, id: ConfigId) -> bool {
+    request.ask == Ask::Apply(id)
+        && request.requester == undo.requester
+        // What a state brought with it is taken back by leaving that state.
+        && (undo.scope.is_none() || undo.scope == request.scope)
+}
+
+/// Whether a request belongs to the (sub)system of a safe configuration.
+fn concerns(safe: ConfigId, request: &Request) -> bool {
+    let prefix = safe.prefix();
+    let inside = |id: ConfigId| {
+        let own = id.prefix();
+        prefix.is_empty() || own == prefix || own.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'))
+    };
+    match (request.why, request.ask) {
+        (Why::Asked, Ask::Apply(id) | Ask::UndoOf(id)) => inside(id),
+        (Why::Asked, _) => prefix.is_empty(),
+        _ => false,
+    }
+}

@@ -1,0 +1,74 @@
+//! System, stack and what is broken, as one: all that requests are judged by and that they change.
+
+use super::{FrameId, Requester, Residual, Stack};
+use crate::model::{ComponentName, ConfigId};
+use crate::system::System;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Components of which not all is known, or that are not as the model has them, since a request ended *broken*.
+#[derive(Debug, Clone)]
+pub struct Broken {
+    /// What is left, and of what.
+    pub residual: Arc<Residual>,
+    /// The components; they stay claimed.
+    pub components: BTreeSet<ComponentName>,
+    /// The configuration that was being applied or undone, and who asked: its undo repairs them.
+    pub culprit: Option<(ConfigId, Requester)>,
+    /// Its partial frame, where there is one.
+    pub frame: Option<FrameId>,
+    /// May be mended without being asked, when a component comes back.
+    pub mendable: bool,
+}
+
+/// The configurator's half of a running deployment.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// The picture of the system.
+    pub system: System,
+    /// The frames in force.
+    pub stack: Stack,
+    /// What is broken, oldest first.
+    pub broken: Vec<Broken>,
+    /// Components whose call has not returned.
+    pub quarantined: Vec<ComponentName>,
+}
+
+impl World {
+    /// A system with nothing in force.
+    pub fn new(system: System, stack: Stack) -> Self {
+        Self { system, stack, broken: Vec::new(), quarantined: Vec::new() }
+    }
+
+    /// What is broken about one of these components, if anything is.
+    pub fn broken_at(&self, mut components: impl Iterator<Item = ComponentName>) -> Option<&Broken> {
+        if self.broken.is_empty() {
+            return None;
+        }
+        components.find_map(|component| self.broken.iter().find(|broken| broken.components.contains(&component)))
+    }
+
+    /// What the undo of `id` by `by` repairs (its place): that of this frame, or of this configuration.
+    pub fn repaired_by(&self, id: ConfigId, by: Requester, frame: Option<FrameId>) -> Option<usize> {
+        self.broken.iter().position(|broken| match (broken.frame, frame) {
+            (Some(broken), Some(frame)) => broken == frame,
+            (Some(_), None) => false,
+            (None, _) => {
+                broken.culprit.is_some_and(|(culprit, asked)| culprit == id && (by == Requester::Operator || by == asked))
+            }
+        })
+    }
+
+    /// Components that `_default` passes over.
+    pub fn avoided(&self) -> BTreeSet<ComponentName> {
+        let broken = self.broken.iter().flat_map(|broken| broken.components.iter().copied());
+        broken.chain(self.quarantined.iter().copied()).collect()
+    }
+
+    /// Nothing is there any more, and all coordinators are down: what was in force in one life is not in force in the next.
+    pub fn settle_down(&mut self) {
+        if self.system.is_empty() {
+            self.stack.discard();
+        }
+    }
+}

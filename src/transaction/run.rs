@@ -1,0 +1,321 @@
+//! One list of steps being carried out: which may begin, what came of those that did, what is not known yet.
+
+use super::order::Order;
+use crate::limits;
+use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
+use crate::plan::PlannedStep;
+use crate::stack::Reason;
+use crate::system::{System, Undo, View as _, Violation, step};
+use crate::time::Time;
+use rustc_hash::FxHashSet;
+use smallvec::{SmallVec, smallvec};
+
+/// How a step stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Waiting,
+    /// Begun at this revision of the model.
+    Out(u64),
+    Over,
+}
+
+/// A list of steps and how far it is.
+#[derive(Debug)]
+pub(super) struct Run {
+    pub list: Vec<PlannedStep>,
+    state: Vec<State>,
+    /// As long as no step is blocking the list's own order serves, from here on.
+    at: usize,
+    order: Option<Order>,
+    /// Steps that were done, in the order they were.
+    pub done: Vec<u32>,
+    pub failures: Vec<(u32, Reason)>,
+    /// Components that steps of this made faulted, with the state they were in.
+    pub faulted: Vec<(ComponentName, RunState)>,
+    /// Steps of which nobody knows.
+    pub unsettled: Vec<u32>,
+    /// Unknown outcomes that wait to be settled.
+    pub unread: Vec<(u32, Cause)>,
+    /// How many steps are out.
+    pub out: usize,
+    /// Failures do not stop it: a best effort.
+    pub tries_all: bool,
+    /// No step begins later.
+    pub until: Time,
+    /// What took back steps that came in after it was to stop, seen when they came in.
+    pub late: Vec<(u32, Undo)>,
+    pub late_from_now: bool,
+}
+
+impl Run {
+    pub fn new(list: Vec<PlannedStep>, until: Time) -> Self {
+        Self {
+            state: vec![State::Waiting; list.len()],
+            done: Vec::with_capacity(list.len()),
+            list,
+            at: 0,
+            order: None,
+            failures: Vec::new(),
+            faulted: Vec::new(),
+            unsettled: Vec::new(),
+            unread: Vec::new(),
+            out: 0,
+            tries_all: false,
+            until,
+            late: Vec::new(),
+            late_from_now: false,
+        }
+    }
+
+    /// Whether no further step of it begins.
+    pub fn stops(&self) -> bool {
+        !self.tries_all && !(self.failures.is_empty() && self.unsettled.is_empty())
+    }
+
+    /// Whether every step is over.
+    pub fn is_over(&self) -> bool {
+        match &self.order {
+            Some(order) => order.is_over(),
+            None => self.at >= self.list.len() && self.out == 0,
+        }
+    }
+
+    /// Whether a step is over, done or not.
+    pub fn is_over_at(&self, i: u32) -> bool {
+        self.state[i as usize] == State::Over
+    }
+
+    /// The steps that are out.
+    pub fn outstanding(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..).zip(&self.state).filter(|(_, state)| matches!(state, State::Out(_))).map(|(i, _)| i)
+    }
+
+    fn finish(&mut self, i: u32) {
+        self.state[i as usize] = State::Over;
+        if let Some(order) = &mut self.order {
+            order.ended(i);
+        }
+    }
+
+    /// The next steps that begin now: an immediate one, a blocking one, or several brief ones. Those that must not begin
+    /// fail here. Empty: nothing can begin.
+    pub fn begin(
+        &mut self,
+        live: &System,
+        now: Time,
+        execution: &dyn Fn(&Step) -> Execution,
+        room: bool,
+        timeout: std::time::Duration,
+    ) -> SmallVec<[u32; 1]> {
+        let kind = |planned: &PlannedStep| execution(&planned.step);
+        while self.order.is_none() && self.at < self.list.len() {
+            if self.stops() {
+                return smallvec![];
+            }
+            let at = self.at;
+            if self.state[at] != State::Waiting {
+                // Brief ones that are out, or over.
+                if matches!(self.state[at], State::Out(_)) {
+                    return smallvec![];
+                }
+                self.at += 1;
+                continue;
+            }
+            match kind(&self.list[at]) {
+                Execution::Blocking => {
+                    let state = &self.state;
+                    self.order = Some(Order::new(&self.list, &|i| state[i] == State::Over, &kind));
+                }
+                Execution::Immediate => {
+                    if self.out > 0 {
+                        return smallvec![];
+                    }
+                    let i = at as u32;
+                    if self.gate(i, live, now, timeout) {
+                        self.state[at] = State::Out(live.revision());
+                        self.out += 1;
+                        return smallvec![i];
+                    }
+                    self.at += 1;
+                }
+                Execution::Brief => {
+                    if self.out > 0 || !room {
+                        return smallvec![];
+                    }
+                    let begun = self.brief(live, now, &kind, timeout);
+                    if !begun.is_empty() {
+                        return begun;
+                    }
+                }
+            }
+        }
+        if self.order.is_some() { self.side_by_side(live, now, room, timeout) } else { smallvec![] }
+    }
+
+    /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
+    fn brief(
+        &mut self,
+        live: &System,
+        now: Time,
+        kind: &dyn Fn(&PlannedStep) -> Execution,
+        timeout: std::time::Duration,
+    ) -> SmallVec<[u32; 1]> {
+        let mut items: SmallVec<[u32; 1]> = SmallVec::new();
+        let mut about = FxHashSet::<ComponentName>::default();
+        for at in self.at..self.list.len() {
+            if self.state[at] != State::Waiting {
+                continue;
+            }
+            let step = &self.list[at].step;
+            if items.len() == limits::BRIEF_STEPS
+                || kind(&self.list[at]) != Execution::Brief
+                || !about.insert(step.component())
+            {
+                break;
+            }
+            // What is wrong with a later one is found when its turn comes.
+            let allowed = now < self.until && step::precondition(step, live).is_empty();
+            if !allowed {
+                if items.is_empty() {
+                    self.gate(at as u32, live, now, timeout);
+                    return items;
+                }
+                break;
+            }
+            items.push(at as u32);
+        }
+        for i in &items {
+            self.state[*i as usize] = State::Out(live.revision());
+        }
+        self.out += items.len();
+        items
+    }
+
+    fn side_by_side(&mut self, live: &System, now: Time, room: bool, timeout: std::time::Duration) -> SmallVec<[u32; 1]> {
+        loop {
+            if self.stops() {
+                return smallvec![];
+            }
+            let Some(order) = &mut self.order else { return smallvec![] };
+            let mut ready = SmallVec::<[u32; 1]>::new();
+            if let Some(i) = order.next(Execution::Immediate) {
+                ready.push(i);
+            } else if room {
+                if let Some(i) = order.next(Execution::Blocking) {
+                    ready.push(i);
+                } else {
+                    let brief = std::iter::from_fn(|| order.next(Execution::Brief));
+                    ready.extend(brief.take(limits::BRIEF_STEPS));
+                }
+            }
+            if ready.is_empty() {
+                return ready;
+            }
+            ready.retain(|i| self.gate(*i, live, now, timeout));
+            if !ready.is_empty() {
+                for i in &ready {
+                    self.state[*i as usize] = State::Out(live.revision());
+                }
+                self.out += ready.len();
+                return ready;
+            }
+        }
+    }
+
+    /// Whether a step may be given to the platform now: its precondition on the live model, and the time. If not, it has
+    /// failed.
+    fn gate(&mut self, i: u32, live: &System, now: Time, timeout: std::time::Duration) -> bool {
+        let refused = if now >= self.until {
+            Some(Reason::Timeout(timeout))
+        } else {
+            false_precondition(&self.list[i as usize].step, live)
+        };
+        let Some(reason) = refused else { return true };
+        self.finish(i);
+        self.failures.push((i, reason));
+        false
+    }
+
+    /// A step that was taken did not begin.
+    pub fn not_begun(&mut self, i: u32) {
+        self.out -= 1;
+        self.state[i as usize] = State::Waiting;
+        if let Some(order) = &mut self.order {
+            order.again(i);
+        }
+    }
+
+    /// A step that was out is back.
+    pub fn ended(&mut self, i: u32, outcome: Outcome, live: &mut System) {
+        let State::Out(revision) = self.state[i as usize] else { return };
+        self.out -= 1;
+        match outcome {
+            Outcome::Done(_) => self.happened(i, live, live.revision() == revision),
+            Outcome::NotDone(cause) => self.did_not_happen(i, cause, live),
+            Outcome::Unknown(cause) => {
+                // Neither over nor out, until it is settled.
+                self.unread.push((i, cause));
+            }
+        }
+    }
+
+    /// A step happened; `known`: nothing touched the model since its precondition was looked at.
+    pub fn happened(&mut self, i: u32, live: &mut System, known: bool) {
+        let step = &self.list[i as usize].step;
+        // While the call was out, its component may have failed by itself; then the model's precondition is gone.
+        if !known && let Some(reason) = false_precondition(step, live) {
+            self.finish(i);
+            self.failures.push((i, reason));
+            return;
+        }
+        if self.late_from_now {
+            let call = match &self.list[i as usize].undo {
+                Undo::One(Step::Operation(call)) => Some(call.clone()),
+                _ => None,
+            };
+            self.late.push((i, step::inverse(step, call.as_ref(), live)));
+        }
+        step::effect(step, live);
+        self.finish(i);
+        self.done.push(i);
+    }
+
+    pub fn did_not_happen(&mut self, i: u32, cause: Cause, live: &mut System) {
+        let step = self.list[i as usize].step.clone();
+        self.finish(i);
+        if matches!(cause, Cause::Panicked(_)) {
+            self.made_faulted(step.component(), live);
+        }
+        self.failures.push((i, Reason::Step { step, cause }));
+    }
+
+    pub fn made_faulted(&mut self, component: ComponentName, live: &mut System) {
+        // The state before the first fault: a second one is none of that.
+        if let Some(node) = live.component(component).filter(|node| node.state != RunState::Faulted) {
+            self.faulted.push((component, node.state));
+            live.set_state(component, RunState::Faulted);
+        }
+    }
+
+    /// Nobody will know of a step whether it happened.
+    pub fn leave_unsettled(&mut self, i: u32) {
+        self.finish(i);
+        self.unsettled.push(i);
+    }
+}
+
+/// Why the precondition of a step is false on the model, if it is.
+pub(super) fn false_precondition(step: &Step, live: &System) -> Option<Reason> {
+    let violations = step::precondition(step, live);
+    if violations.is_empty() {
+        return None;
+    }
+    let finding = |violation: &Violation| {
+        let finding = Finding::error(violation.code(), format!("`{step}`: {violation}"));
+        match violation.help(live) {
+            Some(help) => finding.help(help),
+            None => finding,
+        }
+    };
+    Some(Reason::Refused(violations.iter().map(finding).collect()))
+}

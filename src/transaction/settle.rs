@@ -1,0 +1,89 @@
+//! Unknown outcomes, settled by what was read back; what cannot be settled is named.
+
+use super::run::Run;
+use crate::model::{Effect, RunState, Snapshot, Step};
+use crate::system::{System, View as _};
+
+/// Whether a step happened.
+enum Settled {
+    Happened,
+    DidNot,
+    Nobody,
+}
+
+/// What is known of a step of unknown outcome without reading anything; none: it must be read.
+fn unread(step: &Step, live: &System) -> Option<Settled> {
+    let Step::Operation(call) = step else { return None };
+    // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known.
+    let declared = live.component(step.component()).and_then(|node| node.ty.operations.get(&call.operation.member));
+    let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None);
+    Some(if leaves_nothing { Settled::DidNot } else { Settled::Nobody })
+}
+
+impl Run {
+    /// Settles what can be settled without reading. Answers whether something is left that must be read.
+    pub(super) fn settle_blind(&mut self, live: &mut System) -> bool {
+        let mut at = 0;
+        while at < self.unread.len() {
+            let i = self.unread[at].0;
+            match unread(&self.list[i as usize].step, live) {
+                None => at += 1,
+                Some(settled) => self.settle(at, settled, live),
+            }
+        }
+        !self.unread.is_empty()
+    }
+
+    /// Settles everything by what was read of its components; none: nobody answered.
+    pub(super) fn settle_by(&mut self, seen: Option<&Snapshot>, live: &mut System) {
+        while let Some((i, _)) = self.unread.last() {
+            let i = *i;
+            let settled = match seen {
+                Some(seen) => self.judge(i, seen, live),
+                None => Settled::Nobody,
+            };
+            self.settle(self.unread.len() - 1, settled, live);
+        }
+    }
+
+    fn settle(&mut self, at: usize, settled: Settled, live: &mut System) {
+        let (i, cause) = self.unread.remove(at);
+        match settled {
+            Settled::Happened => self.happened(i, live, false),
+            Settled::DidNot => self.did_not_happen(i, cause, live),
+            Settled::Nobody => self.leave_unsettled(i),
+        }
+    }
+
+    /// Whether a step, which the model does not have yet, happened, from what was observed.
+    fn judge(&mut self, i: u32, seen: &Snapshot, live: &mut System) -> Settled {
+        let step = self.list[i as usize].step.clone();
+        let component = step.component();
+        let one = seen.components.get(&component);
+        let is = match &step {
+            Step::State { transition, .. } => match one {
+                Some(seen) if seen.state == transition.target() => Some(true),
+                Some(seen) if seen.state == RunState::Faulted => {
+                    self.made_faulted(component, live);
+                    Some(false)
+                }
+                Some(seen) => (live.component(component).map(|node| node.state) == Some(seen.state)).then_some(false),
+                None => None,
+            },
+            Step::Create { ty, .. } => Some(one.is_some_and(|seen| seen.ty == *ty)),
+            Step::Destroy { .. } => Some(one.is_none()),
+            Step::PropertySet { property, value } => {
+                one.and_then(|seen| seen.properties.get(&property.member).map(|now| now == value))
+            }
+            Step::Connect { from, to, policy } => Some(seen.connections.get(&(*from, *to)) == Some(policy)),
+            Step::Disconnect { from, to } => Some(!seen.connections.contains_key(&(*from, *to))),
+            Step::PortWrite { port, value } => Some(seen.ports.get(port) == value.as_ref()),
+            Step::Operation(_) => None,
+        };
+        match is {
+            Some(true) => Settled::Happened,
+            Some(false) => Settled::DidNot,
+            None => Settled::Nobody,
+        }
+    }
+}
