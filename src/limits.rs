@@ -268,8 +268,8 @@ pub const DOO_IDLE: Duration = Duration::from_millis(10);
 /// a tenth of a second of work.
 pub const CHECK_TRANSITIONS: usize = 100_000;
 
-/// Requests that `check` lets wait at once: while so many wait, it follows no further events from outside. What goes
-/// wrong when requests queue up goes wrong with two of them.
+/// Batches of one coordinator that `check` lets be unanswered at once: while so many are, it follows no event from outside
+/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with two of them.
 pub const CHECK_WAITING: usize = 2;
 
 /// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
@@ -284,8 +284,15 @@ pub const CHECK_FRAMES: usize = 3;
 /// coordinator. What one left frame under another leads to, further ones do too.
 pub const CHECK_LEFT: usize = 2;
 
-/// Coordinators side by side that `check` follows together: the states of their product are soon past any budget.
-pub const CHECK_TOGETHER: usize = 3;
+/// States of a circle of answers that `check` looks for, and of a way from a safety event to a safe configuration.
+pub const CHECK_CIRCLE: usize = 128;
+
+/// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes
+/// round for ever.
+pub const CHECK_DRIVEN: usize = 10_000;
+
+/// Circles of answers that are told; more of them say nothing new.
+pub const CHECK_TOLD: usize = 4;
 
 /// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
 pub const CHECK_INBOX: usize = 6;

@@ -1,16 +1,13 @@
-//! Several coordinators side by side: what each of them is checked as, and when that is all there is to know.
-//!
-//! Each coordinator is followed alone, with the events that the others emit counted among those that can come at any time
-//! (which is more than can happen). As long as the configurations of one touch no component that those of another touch,
-//! no request of the one is ever answered otherwise because of the other: their frames share nothing, and steps on
-//! different components commute. So what holds of each alone holds of them together. Where they do touch the same
-//! component, that is said; a few coordinators are then followed together as well (`joint`).
+//! Several coordinators side by side: what each of them is checked as by itself, and what they touch in common.
 
 use super::coordinator::ask_of;
-use crate::model::codes::{COORD_REQUEST_REFUSED, COORD_SHARED, DEPLOY_EVENT_UNHEARD, UNKNOWN_COMPONENT};
+use super::members::requester;
+use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
 use crate::model::{
-    Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Severity, Target,
+    Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, RequestId, Severity, Target,
 };
+use crate::stack::Request;
+use crate::stack::claims::{self, Claims};
 use crate::statechart::{Chart, EventId};
 use std::collections::BTreeSet;
 
@@ -32,33 +29,10 @@ pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option
     Some(seen)
 }
 
-/// Components that a configuration names, or may touch by `_default`.
+/// Components that a configuration names, and whether it may touch all by `_default`.
 fn touched(configuration: &Configuration) -> (BTreeSet<ComponentName>, bool) {
-    let mut components = BTreeSet::new();
-    for change in &configuration.changes {
-        match &change.kind {
-            ChangeKind::Create { component, .. } | ChangeKind::Destroy { component } => {
-                _ = components.insert(*component)
-            }
-            ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
-                components.extend([from.component, to.component]);
-            }
-            ChangeKind::PropertySet { property, .. } => _ = components.insert(property.component),
-            ChangeKind::PortWrite { port, .. } => _ = components.insert(port.component),
-            ChangeKind::OperationCall { call, undo } => {
-                components.insert(call.operation.component);
-                components.extend(undo.iter().map(|undo| undo.operation.component));
-            }
-        }
-    }
-    let mut everything = false;
-    for entry in configuration.pre.iter().chain(&configuration.post) {
-        match entry.target {
-            Target::Component(component) => _ = components.insert(component),
-            Target::Default => everything = true,
-        }
-    }
-    (components, everything)
+    let mut entries = configuration.pre.iter().chain(&configuration.post);
+    (claims::components(configuration), entries.any(|entry| entry.target == Target::Default))
 }
 
 /// Configurations that a coordinator asks for.
@@ -71,58 +45,20 @@ pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
     .collect()
 }
 
-/// Who asks for a configuration that makes the component which a finding of the `number`-th coordinator alone misses: that
-/// coordinator's number, and the configuration with the component.
-pub fn maker(
-    deployment: &Deployment,
-    charts: &[&Chart],
-    number: usize,
-    finding: &Finding,
-) -> Option<(usize, ConfigId, ComponentName)> {
-    let makes = |configuration: &Configuration| {
-        configuration.changes.iter().find_map(|change| match &change.kind {
-            ChangeKind::Create { component, .. } if misses(finding, *component) => Some((configuration.id, *component)),
-            _ => None,
-        })
-    };
-    let others = (0..charts.len()).filter(|other| *other != number);
-    others.into_iter().find_map(|other| {
-        let asked = asked(deployment, charts[other]);
-        let own = deployment.configurations.iter().filter(|c| asked.contains(&c.id));
-        own.into_iter().find_map(makes).map(|(id, component)| (other, id, component))
-    })
-}
-
-/// Whether a finding is that this component is not there.
-fn misses(finding: &Finding, component: ComponentName) -> bool {
-    matches!(finding.code, UNKNOWN_COMPONENT | COORD_REQUEST_REFUSED)
-        && finding.message.ends_with(&format!("there is no component `{component}`"))
-}
-
 /// What the configurations of different coordinators touch together: one finding for each pair of coordinators. `verified`:
 /// they were followed together, so that what comes of it is told by findings of its own.
-pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Findings {
-    if charts.len() < 2 {
+pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], verified: bool) -> Findings {
+    if numbers.len() < 2 {
         return Vec::new();
     }
-    let names: Vec<Ident> = deployment.coordinators.iter().map(|c| c.name).collect();
+    let names: Vec<Ident> = numbers.iter().map(|number| deployment.coordinators[*number].name).collect();
     let of = |chart: &Chart| -> Vec<(&Configuration, BTreeSet<ComponentName>, bool)> {
         let ids = asked(deployment, chart);
         let configurations = deployment.configurations.iter().filter(|c| ids.contains(&c.id));
         configurations.map(|c| (c, touched(c).0, touched(c).1)).collect()
     };
-    let all: Vec<_> = charts.iter().map(|chart| of(chart)).collect();
+    let all: Vec<_> = numbers.iter().map(|number| of(charts[*number])).collect();
     let mut findings = Vec::new();
-    for (chart, name) in charts.iter().zip(&names) {
-        if let Some(site) = chart.raises().iter().find(|site| site.name.as_str() == "undo") {
-            let message = format!("`undo` of `{name}` is refused when the newest frame is another coordinator's");
-            findings.push(
-                Finding::warning(COORD_SHARED, message)
-                    .at(site.origin)
-                    .help("name the configuration to undo: `ID.undo` undoes one's own newest frame of it"),
-            );
-        }
-    }
     for (a, mine) in all.iter().enumerate() {
         for (b, theirs) in all.iter().enumerate().skip(a + 1) {
             let found = mine.iter().find_map(|(one, components, everything)| {
@@ -142,7 +78,7 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Fin
             if let Some((one, other, what)) = found {
                 let (severity, rest) = match verified {
                     true => (Severity::Info, "they were followed together"),
-                    false => (Severity::Warning, "what they do together is not verified"),
+                    false => (Severity::Warning, "what they do together was not followed to the end"),
                 };
                 let message = format!(
                     "`{}` of the coordinator `{}` and `{}` of `{}` touch {what}: {rest}",
@@ -167,4 +103,35 @@ pub fn forgive_unheard(deployment: &Deployment, charts: &[&Chart], findings: &mu
             findings.retain(|f| f.code != DEPLOY_EVENT_UNHEARD || f.path != key);
         }
     }
+}
+
+/// The coordinators in groups that have nothing to do with each other: they touch nothing in common, hear nothing of each
+/// other, and no safe configuration of one interrupts another. What holds of each group holds of all together.
+pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
+    let claims = Claims::new(deployment.configurations.iter());
+    let requests = |chart: &Chart| -> Vec<Request> {
+        let ids = asked(deployment, chart).into_iter();
+        ids.map(|id| Request::new(RequestId(0), Ask::Apply(id), requester(deployment.coordinators[0].name))).collect()
+    };
+    let all: Vec<_> = charts.iter().map(|chart| claims.of(&requests(chart))).collect();
+    let hears = |a: &Chart, b: &Chart| a.raises().iter().any(|site| b.event(site.name) != EventId::OTHER);
+    let is_safe = |id: &ConfigId| deployment.configuration(*id).is_some_and(|c| c.safe);
+    let safe: Vec<bool> = charts.iter().map(|chart| asked(deployment, chart).iter().any(is_safe)).collect();
+    let own: Vec<_> = charts.iter().map(|chart| asked(deployment, chart)).collect();
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for number in 0..charts.len() {
+        let meets = |other: &usize| {
+            let (a, b) = (number, *other);
+            let same = own[a].intersection(&own[b]).next().is_some();
+            let heard = hears(charts[a], charts[b]) || hears(charts[b], charts[a]);
+            same || heard || safe[a] || safe[b] || all[a].meets(&all[b])
+        };
+        let (with, without): (Vec<_>, Vec<_>) = groups.into_iter().partition(|group| group.iter().any(meets));
+        groups = without;
+        let mut group: Vec<usize> = with.into_iter().flatten().chain([number]).collect();
+        group.sort_unstable();
+        groups.push(group);
+    }
+    groups.sort_unstable();
+    groups
 }

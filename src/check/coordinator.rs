@@ -5,20 +5,16 @@ use crate::model::codes::{
     DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
 use crate::model::finding::{did_you_mean, nearest};
-use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Verdict};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, NodeId, When};
 use std::collections::BTreeSet;
 
 /// What a raised name asks for; none when it is no request.
 pub fn ask_of(deployment: &Deployment, name: EventName) -> Option<Ask> {
-    let text = name.as_str();
-    if text == "undo" {
-        return Some(Ask::Undo);
+    match Raise::of(name, |id| deployment.configuration(id).is_some()) {
+        Raise::Request(ask) => Some(ask),
+        Raise::UnknownUndo | Raise::Event => None,
     }
-    if let Some(id) = text.strip_suffix(".undo") {
-        return ConfigId::new(id).ok().map(Ask::UndoOf);
-    }
-    ConfigId::new(text).ok().filter(|id| deployment.configuration(*id).is_some()).map(Ask::Apply)
 }
 
 /// The answers to `ask` that need somebody to hear them.
@@ -103,8 +99,8 @@ pub fn is_internal(event: &str) -> bool {
     event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
 }
 
-const SUFFIXES: [&str; 8] =
-    [".undo.failed", ".undo.broken", ".ok", ".failed", ".broken", ".cancelled", ".undone", ".reverted"];
+const SUFFIXES: [&str; 9] =
+    [".undo.failed", ".undo.broken", ".ok", ".failed", ".broken", ".cancelled", ".undone", ".reverted", ".lost"];
 
 /// The configuration that an event seems to be an answer about, with the suffix.
 fn split_answer(event: &str) -> Option<(&str, &'static str)> {
@@ -122,19 +118,14 @@ pub fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
     }
 }
 
-/// All answers to what the chart asks for.
-fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
-    use Verdict::{Broken, Cancelled, Failed, Ok, Reverted, UndoBroken, UndoFailed, Undone};
-    let mut answers = BTreeSet::new();
-    for site in chart.raises() {
-        if let Some(ask) = ask_of(deployment, site.name) {
-            let verdicts: &[Verdict] = match ask {
-                Ask::Apply(_) => &[Ok, Failed, Broken, Cancelled, Reverted],
-                _ => &[Undone, UndoFailed, UndoBroken],
-            };
-            answers.extend(verdicts.iter().map(|v| v.event(ask)));
-        }
-    }
+/// All answers to what the chart asks for, and what it is told about that later.
+pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
+    let asks = chart.raises().iter().filter_map(|site| ask_of(deployment, site.name));
+    let mut answers: BTreeSet<EventName> =
+        asks.flat_map(|ask| ask.verdicts().iter().map(move |verdict| verdict.event(ask))).collect();
+    // Told in whatever state it is, whoever asked.
+    let holds = deployment.configurations.iter().filter(|c| c.holds.is_some());
+    answers.extend(holds.map(|c| Verdict::Lost.event(Ask::Apply(c.id))));
     answers
 }
 
@@ -142,10 +133,10 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
-        let known = match ask_of(deployment, site.name) {
-            Some(Ask::UndoOf(id)) => deployment.configuration(id).is_some(),
-            Some(_) => true,
-            None => emits.contains(&site.name),
+        let known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
+            Raise::Request(_) => true,
+            Raise::UnknownUndo => false,
+            Raise::Event => emits.contains(&site.name),
         };
         // The undo of a state-scoped configuration was not written by anybody; its entry is reported.
         if known || (site.scoped && matches!(site.when, When::Exit(_))) {

@@ -1,22 +1,19 @@
 //! Bring-up and shutdown with every request answered *ok*: what `plan --bringup` and `--shutdown` show, and the least that
-//! must work.
+//! must work. All coordinators are driven together.
 //!
 //! Where nothing is waited for but events of components or operators, the shortest series of events is taken that leads
 //! to the goal.
 
-use super::coordinator;
-use super::product::{Move, Product, State};
-use super::reactions::Reactions;
-use super::world::{self, Applied, World, Worlds};
+use super::beside;
+use super::members::Member;
+use super::product::{Move, Next, Product, State};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Snapshot};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
-use crate::stack::Stack;
-use crate::statechart::{Chart, EventId, NodeId};
-use crate::system::System;
+use crate::stack::Request;
+use crate::statechart::{Chart, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 /// One thing that happens on the way.
 #[derive(Debug, Clone)]
@@ -25,18 +22,20 @@ pub enum Happening {
     Event {
         /// The event.
         event: String,
-        /// The state the coordinator is in then.
+        /// The state the coordinator is in then; of several, where each of them is.
         state: String,
     },
     /// Requests made together are carried out.
     Applied {
-        /// The requests, as they were raised.
+        /// The coordinator that asks.
+        coordinator: Ident,
+        /// The requests, as they are carried out.
         asks: Vec<Ask>,
         /// What is done.
         steps: Vec<PlannedStep>,
         /// The system after it.
         result: Snapshot,
-        /// The state the coordinator is in then.
+        /// The state the coordinator is in then; of several, where each of them is.
         state: String,
     },
 }
@@ -46,9 +45,11 @@ pub enum Happening {
 pub struct Drive {
     /// What happens, in order.
     pub happenings: Vec<Happening>,
+    /// Whether there is more than one coordinator.
+    pub several: bool,
     /// Whether it arrives.
     pub reached: bool,
-    /// The state it ends in.
+    /// The state it ends in; of several coordinators, where each of them is.
     pub state: String,
     /// The system it ends with.
     pub system: Snapshot,
@@ -67,62 +68,90 @@ pub enum Until {
     Down,
 }
 
-/// Configurations whose frames the coordinator may undo; none: any (it pops the top).
-pub(super) fn undone(deployment: &Deployment, chart: &Chart) -> Option<FxHashSet<ConfigId>> {
-    let mut ids: FxHashSet<ConfigId> =
-        deployment.configurations.iter().filter(|c| c.group.is_some()).map(|c| c.id).collect();
-    for site in chart.raises() {
-        match coordinator::ask_of(deployment, site.name) {
-            Some(Ask::Undo | Ask::UndoTo(_)) => return None,
-            Some(Ask::UndoOf(id)) => _ = ids.insert(id),
-            _ => {}
-        }
-    }
-    Some(ids)
-}
-
-/// The product of a deployment's coordinator and configurator, where nothing has happened yet.
-pub(super) fn product<'a>(deployment: &'a Deployment, chart: &'a Chart, catalogue: &Catalogue) -> Product<'a> {
-    let outside = coordinator::outside_events(deployment, chart);
-    Product {
-        deployment,
-        chart,
-        reactions: Reactions::new(deployment, chart, &outside),
-        worlds: Worlds::new(deployment, catalogue, undone(deployment, chart)),
-        down: chart.find(&deployment.first_coordinator().down).ok(),
-    }
-}
-
-/// A way: states with the moves that lead to them.
+/// A way: states with what leads to them.
 pub(super) struct Way {
     pub(super) from: State,
-    pub(super) moves: Vec<(Move, State)>,
+    pub(super) moves: Vec<Next>,
     pub(super) reached: bool,
-    pub(super) refused: Option<(Ask, Findings)>,
+    pub(super) refused: Option<(Request, Findings)>,
 }
 
 impl Way {
     /// The state at the end.
     pub(super) fn end(&self) -> &State {
-        self.moves.last().map_or(&self.from, |(_, state)| state)
+        self.moves.last().map_or(&self.from, |next| &next.state)
     }
 }
 
-/// The shortest way from `from` to a state inside `goal` with no request waiting, every request answered *ok*, that
+/// Which state of a coordinator is the goal.
+type Goal = fn(&Member<'_>) -> Option<NodeId>;
+
+impl Product<'_> {
+    /// What happens next by itself when every request is answered *ok*; none: nothing does, or it is refused.
+    fn by_itself(&mut self, state: &State) -> Result<Option<Next>, (Request, Findings)> {
+        if let Some(turn) = state.desk.under_way().first().filter(|_| state.safe.is_empty() && state.due.is_empty()) {
+            let requests = turn.batch.requests.clone();
+            if self.worlds.get(state.world).is_some() {
+                let comes = self.comes(state, &requests);
+                if let Some((place, reasons)) = comes.refused.first() {
+                    return Err((requests[*place], reasons.to_vec()));
+                }
+            }
+        }
+        if let Some(request) = state.safe.first().copied()
+            && let Err(reasons) = &self.worlds.safe(state.world, &request).done
+        {
+            return Err((request, reasons.to_vec()));
+        }
+        // Answers on their way, then safe configurations, then what is under way, then what lies in the inboxes.
+        let nexts = self.nexts(state).all.into_iter();
+        Ok(nexts.into_iter().find(|next| matches!(next.by, Move::Answer | Move::Taken(..))))
+    }
+
+    /// Lets everything happen that does by itself, and appends it. Stops early where all are at the goal.
+    fn rest(&mut self, state: State, goal: Goal, moves: &mut Vec<Next>) -> Result<State, (Request, Findings)> {
+        let mut state = state;
+        let mut seen: FxHashSet<State> = FxHashSet::default();
+        while !(state.is_at_rest() && self.all_in(&state, goal))
+            && state.waiting() <= limits::CHECK_PILED
+            && seen.len() < limits::CHECK_DRIVEN
+            && seen.insert(state.clone())
+        {
+            let Some(next) = self.by_itself(&state)? else { break };
+            state = next.state.clone();
+            moves.push(next);
+        }
+        Ok(state)
+    }
+
+    /// What comes when this event does, or none of these is heard.
+    fn outside_moves(&mut self, state: &State, only: Option<EventName>, never: EventName) -> Vec<Next> {
+        let outside = self.outside.clone();
+        let fits = |next: &Next| match next.by {
+            Move::Event(at) => {
+                let name = outside[usize::from(at)];
+                only.is_none_or(|only| only == name) && name != never
+            }
+            Move::Time(..) | Move::Confirmed(_) => only.is_none(),
+            _ => false,
+        };
+        self.nexts(state).all.into_iter().filter(fits).collect()
+    }
+}
+
+/// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*, that
 /// begins with `first` and has `never` nowhere. When there is none, the way to where it stops.
-pub(super) fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventName, goal: NodeId) -> Way {
-    let first = product.chart.event(first);
-    let never = product.chart.event(never);
-    let begin = product.event(&from, first);
-    let mut states = vec![(begin.clone(), None::<(usize, Move)>)];
-    let mut index: FxHashMap<State, usize> = std::iter::once((begin, 0)).collect();
-    let mut queue: VecDeque<usize> = std::iter::once(0).collect();
-    let mut refused: Option<(usize, Ask, Findings)> = None;
-    let mut last = 0;
-    let mut reached = None;
+fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventName, goal: Goal) -> Way {
+    let mut states: Vec<(State, Option<usize>, Vec<Next>)> = Vec::new();
+    let mut index: FxHashSet<State> = FxHashSet::default();
+    let mut queue: VecDeque<usize> = VecDeque::new();
+    let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
+    states.push((from.clone(), None, Vec::new()));
+    queue.push_back(0);
+    let (mut last, mut reached) = (0, None);
     while let Some(at) = queue.pop_front() {
         let state = states[at].0.clone();
-        if state.waiting.is_empty() && product.chart.is_inside(state.leaf, goal) {
+        if at > 0 && state.is_at_rest() && product.all_in(&state, goal) {
             reached = Some(at);
             break;
         }
@@ -130,144 +159,147 @@ pub(super) fn way(product: &mut Product<'_>, from: State, first: EventName, neve
             break;
         }
         last = at;
-        let mut next: Vec<(Move, State)> = Vec::new();
-        if state.waiting.len() > limits::CHECK_PILED {
-            continue;
-        }
-        if let Some(unit) = state.waiting.first() {
-            let asks = unit.asks.clone();
-            match product.head(&state) {
-                Applied::Done { world, .. } => {
-                    next.push((Move::Answer { asks, ok: true }, product.answer(&state, true, world)));
+        for next in product.outside_moves(&state, (at == 0).then_some(first), never) {
+            let mut moves = vec![next.clone()];
+            match product.rest(next.state, goal, &mut moves) {
+                Ok(rest) => {
+                    if index.insert(rest.clone()) {
+                        queue.push_back(states.len());
+                        states.push((rest, Some(at), moves));
+                    }
                 }
-                Applied::Refused { which, findings } => {
-                    refused.get_or_insert((at, asks[which.min(asks.len() - 1)], findings.to_vec()));
-                }
-                Applied::TooDeep(_) => {}
-            }
-        } else {
-            let offers: Vec<EventId> =
-                product.reactions.offers(state.leaf).iter().copied().filter(|e| *e != never).collect();
-            for event in offers {
-                next.push((Move::Event(event), product.event(&state, event)));
-            }
-        }
-        for (by, state) in next {
-            if !index.contains_key(&state) {
-                index.insert(state.clone(), states.len());
-                queue.push_back(states.len());
-                states.push((state, Some((at, by))));
+                Err(why) => _ = refused.get_or_insert((at, moves, why)),
             }
         }
     }
-    let mut at = reached.or(refused.as_ref().map(|(at, ..)| *at)).unwrap_or(last);
-    let mut moves = Vec::new();
-    while let Some((before, by)) = states[at].1.clone() {
-        moves.push((by, states[at].0.clone()));
+    let (mut at, mut moves) = match (reached, &refused) {
+        (Some(at), _) => (at, Vec::new()),
+        (None, Some((at, moves, _))) => (*at, moves.clone()),
+        (None, None) => (last, Vec::new()),
+    };
+    while let Some(before) = states[at].1 {
+        let mut way = states[at].2.clone();
+        way.append(&mut moves);
+        moves = way;
         at = before;
     }
-    moves.push((Move::Event(first), states[0].0.clone()));
-    moves.reverse();
-    let refused = if reached.is_some() { None } else { refused.map(|(_, ask, findings)| (ask, findings)) };
+    let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
     Way { from, moves, reached: reached.is_some(), refused }
 }
 
-/// Where the coordinator comes to by what it asks for by itself, before anybody wants it up. Where it goes round for ever:
-/// where on that round it listens to who wants it up.
-fn settled(product: &mut Product<'_>, start: State) -> State {
-    let wanted = product.chart.event(product.deployment.deploy.event);
-    let mut way = vec![start.clone()];
-    let mut seen: FxHashSet<State> = std::iter::once(start).collect();
+/// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round
+/// for ever: to where on that round one listens to who wants them up.
+fn settled(product: &mut Product<'_>, start: &State) -> Vec<Next> {
+    let wanted = product.deployment.deploy.event;
+    let mut way: Vec<Next> = Vec::new();
+    let mut seen: FxHashMap<State, usize> = std::iter::once((start.clone(), 0)).collect();
     loop {
-        let last = way[way.len() - 1].clone();
-        if last.waiting.is_empty() || last.waiting.len() > limits::CHECK_PILED {
-            return last;
+        let last = way.last().map_or(start, |next| &next.state).clone();
+        if last.waiting() > limits::CHECK_PILED || way.len() >= limits::CHECK_DRIVEN {
+            return way;
         }
-        let Applied::Done { world, .. } = product.head(&last) else { return last };
-        let next = product.answer(&last, true, world);
-        if !seen.insert(next.clone()) || way.len() >= limits::CHECK_TRANSITIONS {
-            let round = way.iter().position(|state| *state == next).unwrap_or(0);
-            let listens = |state: &&State| product.reactions.react(state.leaf, wanted).taken;
-            return way[round..].iter().find(listens).cloned().unwrap_or(next);
-        }
+        let Ok(Some(next)) = product.by_itself(&last) else { return way };
+        let round = seen.get(&next.state).copied();
+        seen.insert(next.state.clone(), way.len() + 1);
         way.push(next);
+        if let Some(round) = round {
+            let listens = |next: &Next| {
+                let members = product.members.iter_mut().zip(&next.state.leaves);
+                members.into_iter().any(|(member, leaf)| member.takes(*leaf, wanted))
+            };
+            let from = round.saturating_sub(1);
+            if let Some(at) = way[from..].iter().position(listens) {
+                way.truncate(from + at + 1);
+            }
+            return way;
+        }
     }
 }
 
-/// The ways up and, when that arrives, down. None when the coordinator cannot be entered or a state is not there.
+/// The ways up and, when that arrives, down. None when a coordinator cannot be entered or a state is not there.
 pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let deployment = product.deployment;
-    let up = product.chart.find(&deployment.first_coordinator().up).ok()?;
-    let down = product.chart.find(&deployment.first_coordinator().down).ok()?;
+    if product.members.iter().any(|member| member.up.is_none() || member.down.is_none()) {
+        return None;
+    }
     let start = product.start()?;
-    let start = settled(product, start);
-    let rise = way(product, start, deployment.deploy.event, deployment.shutdown.event, up);
+    let mut moves = settled(product, &start);
+    let ready = moves.last().map_or(&start, |next| &next.state).clone();
+    let (deploy, shutdown) = (deployment.deploy.event, deployment.shutdown.event);
+    let mut rise = way(product, ready, deploy, shutdown, |member| member.up);
+    // From the start, not from where it was ready.
+    moves.append(&mut rise.moves);
+    let rise = Way { from: start, moves, ..rise };
     if !rise.reached {
         return Some((rise, None));
     }
     let top = rise.end().clone();
-    let fall = way(product, top, deployment.shutdown.event, deployment.deploy.event, down);
+    let fall = way(product, top, shutdown, deploy, |member| member.down);
     Some((rise, Some(fall)))
 }
 
 /// Drives a deployment that was checked, on the planner's picture of the system.
 ///
-/// None when the coordinator cannot be entered, or a state that the deployment names is not there.
+/// None when a coordinator cannot be entered, or a state that the deployment names is not there.
 pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Option<Drive> {
-    let chart = crate::statechart::compile(&deployment.first_coordinator().chart).0?;
-    let mut product = product(deployment, &chart, catalogue);
+    let charts: Option<Vec<Chart>> = deployment.charts().map(|chart| crate::statechart::compile(chart).0).collect();
+    let charts = charts?;
+    let charts: Vec<&Chart> = charts.iter().collect();
+    let numbers: Vec<usize> = (0..charts.len()).collect();
+    let views: Vec<Deployment> = numbers.iter().filter_map(|n| beside::view(deployment, &charts, *n)).collect();
+    let mut product = Product::new(deployment, &views, &charts, &numbers, catalogue);
+    product.operator.clear();
     let (rise, fall) = ways(&mut product)?;
-    let mut world =
-        World { system: System::new(Arc::new(catalogue.clone())), stack: Stack::new(deployment.limits.stack) };
-    let mut refused = None;
-    let mut happenings = replay(deployment, &chart, &rise, &mut world, &mut refused);
-    let mut end = &rise;
-    if let (Until::Down, Some(fall)) = (until, &fall) {
-        happenings = replay(deployment, &chart, fall, &mut world, &mut refused);
-        end = fall;
-    }
+    let end = match (until, &fall) {
+        (Until::Down, Some(fall)) => fall,
+        _ => &rise,
+    };
     let reached = end.reached && (until == Until::Up || fall.is_some());
+    let world = product.worlds.get(end.end().world)?;
     Some(Drive {
-        happenings,
+        several: charts.len() > 1,
         reached,
-        state: chart.fqn(end.end().leaf).to_string(),
+        state: product.place(end.end()),
         system: world.system.snapshot(),
         frames: world.stack.frames().iter().map(|f| f.configuration).collect(),
-        refused: refused.or_else(|| end.refused.clone()),
+        refused: end.refused.clone().map(|(request, findings)| (request.ask, findings)),
+        happenings: happenings(&product, end),
     })
 }
 
-/// The same way with real values: worlds that `Worlds` takes for one may differ in them.
-fn replay(
-    deployment: &Deployment,
-    chart: &Chart,
-    way: &Way,
-    world: &mut World,
-    refused: &mut Option<(Ask, Findings)>,
-) -> Vec<Happening> {
-    let context = world::context(deployment);
-    let requester = world::requester(deployment);
+/// What happens on a way.
+fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
     let mut happenings = Vec::new();
-    for (by, state) in &way.moves {
-        let place = chart.fqn(state.leaf).to_string();
-        match by {
-            Move::Event(event) => happenings.push(Happening::Event { event: chart.event_text(*event), state: place }),
-            Move::Answer { asks, .. } => match world::apply(deployment, &context, requester, world, asks) {
-                Ok(change) => {
-                    *world = change.world;
+    let mut before = &way.from;
+    for next in &way.moves {
+        let state = product.place(&next.state);
+        match next.by {
+            Move::Answer => {
+                let requests: Vec<Request> = next.answers.iter().map(|(request, _)| *request).collect();
+                if let Some(first) = requests.first()
+                    && let Some(world) = product.worlds.get(next.state.world)
+                    && let Some(member) = product.member(first.requester)
+                {
                     happenings.push(Happening::Applied {
-                        asks: asks.to_vec(),
-                        steps: change.steps,
+                        coordinator: product.members[member].name,
+                        asks: requests.iter().map(|request| request.ask).collect(),
+                        steps: product.worlds.steps(before.world, &requests),
                         result: world.system.snapshot(),
-                        state: place,
+                        state,
                     });
                 }
-                Err(refusal) => {
-                    *refused = Some((asks[0], refusal.findings));
-                    return happenings;
-                }
-            },
+            }
+            Move::Event(at) => {
+                let event = product.outside[usize::from(at)].to_string();
+                happenings.push(Happening::Event { event, state });
+            }
+            Move::Time(number, event) => {
+                let event = product.members[usize::from(number)].chart.event_text(event);
+                happenings.push(Happening::Event { event, state });
+            }
+            _ => {}
         }
+        before = &next.state;
     }
     happenings
 }

@@ -1,336 +1,324 @@
 //! The product, followed through every order of events and answers.
 //!
-//! What can be reached with every request answered *ok* is followed first, the shortest way first; then what failures lead
-//! to. So a finding's trace is short, and has a failure in it only where it needs one.
+//! What can be reached without anything failing is followed first, the shortest way first; then what failed applications
+//! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::Explored;
-use super::coordinator::place;
-use super::product::{Move, Product, State, Trouble};
-use super::world::Applied;
+use super::product::{Failed, Move, Next, Product, State, Trouble};
+use super::trace::{Answered, Happened, Place, TraceStep};
+use super::world::Top;
 use crate::limits;
-use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK};
-use crate::model::{Ask, ComponentName, ConfigId, Finding, Findings};
-use crate::statechart::{NodeId, RaiseSite, When};
-use crate::system::View;
-use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::VecDeque;
+use crate::model::{Ask, ConfigId};
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
+use smallvec::SmallVec;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::hash::{Hash, Hasher};
 
-/// What was found, with the way there.
-pub struct Exploration {
-    /// Findings; each with a trace of its own.
-    pub findings: Vec<(Finding, Vec<String>)>,
-    /// How far it went.
-    pub explored: Explored,
-    /// Requests that were refused, with the first reason.
-    pub refused: FxHashSet<(Ask, String)>,
-    /// With nothing waiting: where the coordinator was, and which frames that it may undo were in force.
-    pub rest: FxHashSet<(NodeId, Vec<ConfigId>)>,
+/// A move that was followed.
+#[derive(Debug, Clone, Copy)]
+pub struct Edge {
+    /// From where.
+    pub from: u32,
+    /// To where.
+    pub to: u32,
+    /// Its place among the moves from there.
+    pub place: u32,
+    /// What failed in it.
+    pub failed: Failed,
+    /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
+    pub quiet: bool,
 }
 
-/// The worst that failed on a way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Failed {
-    /// Nothing did.
-    Nothing,
-    /// A configuration was not applied: to be expected, and the coordinator's to deal with.
-    Apply,
-    /// Something could not be undone: it stays in force, and not every coordinator can go on from there. A shutdown that
-    /// gets stuck on it is forced.
-    Undo,
+/// A bound that cut something off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Bound {
+    /// [`limits::CHECK_TRANSITIONS`].
+    Budget,
+    /// [`limits::CHECK_WAITING`].
+    Waiting,
+    /// [`limits::CHECK_PILED`].
+    Piled,
+    /// [`limits::CHECK_FRAMES`].
+    Frames,
+    /// [`limits::CHECK_INBOX`].
+    Inbox,
+    /// A coordinator could not be entered.
+    Entered,
 }
 
-impl Failed {
-    /// What the failure of these is.
-    pub fn of(asks: &[Ask]) -> Self {
-        if asks.iter().all(|ask| matches!(ask, Ask::Apply(_))) { Self::Apply } else { Self::Undo }
-    }
+/// Everything that was followed.
+pub struct Graph<'p, 'a> {
+    /// The product.
+    pub product: &'p mut Product<'a>,
+    /// The states, in the order they were met.
+    pub states: Vec<State>,
+    /// The worst that failed on the best way to each.
+    pub failed: Vec<Failed>,
+    /// Whether each was followed further.
+    pub followed: Vec<bool>,
+    /// What leads from one to another.
+    pub edges: Vec<Edge>,
+    /// What is wrong, and where.
+    pub troubles: Vec<(u32, Trouble)>,
+    /// Going round adds frames of this configuration.
+    pub deep: Vec<(u32, ConfigId)>,
+    /// States that are not followed on some way for a reason.
+    pub ends: FxHashSet<u32>,
+    /// What was cut off, and of what class it was.
+    pub bounds: FxHashMap<Bound, Failed>,
+    depth: Vec<u32>,
+    index: FxHashMap<u64, SmallVec<[u32; 1]>>,
+    open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
+    /// For each class the first edge to each state, on the shortest ways with nothing worse.
+    ways: FxHashMap<Failed, Vec<u32>>,
 }
 
-struct Search<'p, 'a> {
-    product: &'p mut Product<'a>,
-    states: Vec<State>,
-    index: FxHashMap<State, u32>,
-    /// How each state was first reached: from where, by what.
-    from: Vec<Option<(u32, Move)>>,
-    /// The worst that failed on the way to each, and whether it was followed further.
-    with_failure: Vec<Failed>,
-    followed: Vec<bool>,
-    edges: Vec<(u32, u32)>,
-    /// To be followed: reached without a failure, and with one.
-    clean: VecDeque<u32>,
-    failed: VecDeque<u32>,
-    troubles: Vec<(u32, Trouble)>,
-    cut: bool,
-}
+const NOWHERE: u32 = u32::MAX;
 
 /// Follows everything, within the budget.
-pub fn explore(product: &mut Product<'_>) -> Exploration {
-    let mut search = Search {
+pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
+    let mut graph = Graph {
         product,
         states: Vec::new(),
-        index: FxHashMap::default(),
-        from: Vec::new(),
-        with_failure: Vec::new(),
+        failed: Vec::new(),
         followed: Vec::new(),
         edges: Vec::new(),
-        clean: VecDeque::new(),
-        failed: VecDeque::new(),
         troubles: Vec::new(),
-        cut: false,
+        deep: Vec::new(),
+        ends: FxHashSet::default(),
+        bounds: FxHashMap::default(),
+        depth: Vec::new(),
+        index: FxHashMap::default(),
+        open: BinaryHeap::new(),
+        ways: FxHashMap::default(),
     };
-    search.run();
-    search.judge()
+    match graph.product.start() {
+        Some(start) => {
+            graph.reach(start, Failed::Nothing, 0);
+            graph.run();
+        }
+        None => graph.cut(Bound::Entered, Failed::Nothing),
+    }
+    if graph.product.overflow {
+        graph.cut(Bound::Inbox, Failed::Nothing);
+    }
+    graph
 }
 
-impl Search<'_, '_> {
+impl Graph<'_, '_> {
     fn run(&mut self) {
-        let Some(start) = self.product.start() else {
-            self.cut = true;
-            return;
-        };
-        self.reach(start, None, Failed::Nothing);
-        loop {
-            if self.edges.len() >= limits::CHECK_TRANSITIONS && (!self.clean.is_empty() || !self.failed.is_empty()) {
-                self.cut = true;
+        while let Some(Reverse((failed, _, at))) = self.open.pop() {
+            if self.followed[at as usize] || failed > self.failed[at as usize] {
+                continue;
+            }
+            if self.edges.len() >= limits::CHECK_TRANSITIONS {
+                self.cut(Bound::Budget, failed);
                 return;
             }
-            let Some(at) = self.clean.pop_front().or_else(|| self.failed.pop_front()) else { return };
-            self.expand(at);
+            self.expand(at, failed);
         }
     }
 
-    fn reach(&mut self, state: State, from: Option<(u32, Move)>, failed: Failed) {
-        let next = u32::try_from(self.states.len()).unwrap_or(u32::MAX);
-        let id = *self.index.entry(state).or_insert_with_key(|state| {
-            self.states.push(state.clone());
-            next
-        });
-        let source = from.as_ref().map(|(at, _)| *at);
-        if id == next {
-            self.from.push(from);
-            self.with_failure.push(failed);
+    fn cut(&mut self, bound: Bound, failed: Failed) {
+        let known = self.bounds.entry(bound).or_insert(failed);
+        *known = failed.min(*known);
+    }
+
+    /// The number of a state that is reached with at worst this failing.
+    fn reach(&mut self, state: State, failed: Failed, depth: u32) -> u32 {
+        let mut hasher = FxHasher::default();
+        state.hash(&mut hasher);
+        let bucket = self.index.entry(hasher.finish()).or_default();
+        let known = bucket.iter().copied().find(|at| self.states[*at as usize] == state);
+        let id = known.unwrap_or_else(|| u32::try_from(self.states.len()).unwrap_or(NOWHERE));
+        if known.is_none() {
+            bucket.push(id);
+            self.states.push(state);
+            self.failed.push(failed);
+            self.depth.push(depth);
             self.followed.push(false);
-            if failed == Failed::Nothing { self.clean.push_back(id) } else { self.failed.push_back(id) }
+            self.open.push(Reverse((failed, depth, id)));
+        } else if (failed, depth) < (self.failed[id as usize], self.depth[id as usize]) && !self.followed[id as usize] {
+            self.failed[id as usize] = failed;
+            self.depth[id as usize] = depth;
+            self.open.push(Reverse((failed, depth, id)));
         }
-        if let Some(source) = source {
-            self.edges.push((source, id));
-        }
+        id
     }
 
-    fn expand(&mut self, at: u32) {
+    fn expand(&mut self, at: u32, so_far: Failed) {
         let state = self.states[at as usize].clone();
-        if state.waiting.len() > limits::CHECK_PILED {
-            self.cut = true;
-            return;
+        if state.waiting() > limits::CHECK_PILED {
+            return self.cut(Bound::Piled, so_far);
         }
         self.followed[at as usize] = true;
-        if let Some(head) = state.waiting.first() {
-            let asks = head.asks.clone();
-            let (ok, fails) = match self.product.head(&state) {
-                // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
-                Applied::Done { left: Some(_), may_fail, .. } if self.with_failure[at as usize] == Failed::Undo => {
-                    self.troubles.push((at, Trouble::Left));
-                    (None, may_fail)
-                }
-                Applied::Done { world, may_fail, .. } => (Some(world), may_fail),
-                Applied::Refused { which, findings } => {
-                    self.troubles.push((at, Trouble::Refused(asks[which.min(asks.len() - 1)], findings)));
-                    (None, true)
-                }
-                Applied::TooDeep(id) => {
-                    self.troubles.push((at, Trouble::TooDeep(id)));
-                    (None, false)
-                }
-            };
-            if let Some(world) = ok {
-                let next = self.product.answer(&state, true, world);
-                self.reach(
-                    next,
-                    Some((at, Move::Answer { asks: asks.clone(), ok: true })),
-                    self.with_failure[at as usize],
-                );
-            }
-            if fails {
-                let next = self.product.answer(&state, false, state.world);
-                let failed = self.with_failure[at as usize].max(Failed::of(&asks));
-                self.reach(next, Some((at, Move::Answer { asks, ok: false })), failed);
-            }
-        }
-        if state.waiting.len() < limits::CHECK_WAITING {
-            for event in self.product.reactions.offers(state.leaf).iter() {
-                let next = self.product.event(&state, *event);
-                self.reach(next, Some((at, Move::Event(*event))), self.with_failure[at as usize]);
-            }
-        }
-    }
-
-    fn trace(&self, at: u32) -> Vec<String> {
-        let mut lines = Vec::new();
-        let mut at = at;
-        while let Some((before, by)) = &self.from[at as usize] {
-            lines.push(self.product.tell(by, &self.states[at as usize]));
-            at = *before;
-        }
-        lines.push(format!("start → {}", self.product.chart.fqn(self.states[at as usize].leaf)));
-        lines.reverse();
-        lines
-    }
-
-    fn judge(self) -> Exploration {
-        let mut findings: Vec<(Finding, Vec<String>)> = Vec::new();
-        let mut said: FxHashSet<(Ask, String)> = FxHashSet::default();
-        let mut deep: FxHashSet<ConfigId> = FxHashSet::default();
-        for (at, trouble) in &self.troubles {
-            match trouble {
-                Trouble::Refused(ask, reasons) => {
-                    let first = reasons.first().map_or_else(String::new, |f| f.message.clone());
-                    if said.insert((*ask, first)) {
-                        let failed = self.with_failure[*at as usize] != Failed::Nothing;
-                        findings.push((self.refused(*at, *ask, reasons), self.trace(*at)));
-                        // The reasons are findings of their own, each at its place.
-                        for reason in reasons.iter().filter(|r| !failed && r.origin.is_some()) {
-                            findings.push((reason.clone(), self.trace(*at)));
-                        }
-                    }
-                }
-                Trouble::Left => {}
-                Trouble::TooDeep(id) => {
-                    if deep.insert(*id) {
-                        let origin = self.product.deployment.configuration(*id).map(|c| c.origin).unwrap_or_default();
-                        let message = format!("going round applies `{id}` again and again without undoing it");
-                        let finding = Finding::warning(COORD_STACK_GROWS, message).at(origin).help(format!(
-                            "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
-                        ));
-                        findings.push((finding, self.trace(*at)));
-                    }
-                }
-            }
-        }
-        self.ways_down(&mut findings);
-        findings.extend(self.product.worlds.warnings.iter().cloned().map(|f| (f, Vec::new())));
-        let explored = Explored {
-            states: self.states.len(),
-            transitions: self.edges.len(),
-            complete: !self.cut,
-            unfollowed: self.followed.iter().filter(|followed| !**followed).count(),
-            without_failure: !self
-                .followed
-                .iter()
-                .zip(&self.with_failure)
-                .any(|(f, with)| !f && *with == Failed::Nothing),
-            together: None,
-        };
-        let by = super::world::requester(self.product.deployment);
-        let mut rest = FxHashSet::default();
-        for state in self.states.iter().filter(|state| state.waiting.is_empty()) {
-            rest.insert((state.leaf, self.product.worlds.frames_of(by, state.world, None)));
-        }
-        Exploration { findings, explored, refused: said, rest }
-    }
-
-    fn refused(&self, at: u32, ask: Ask, reasons: &Findings) -> Finding {
-        let state = &self.states[at as usize];
-        let chart = self.product.chart;
-        let owner = state.waiting.first().and_then(|u| u.asks.iter().position(|a| *a == ask).and_then(|i| u.owners[i]));
-        let site = self.site(ask, owner);
-        let message =
-            format!("`{ask}` is refused when it is asked for: {}", reasons.first().map_or("", |f| &f.message));
-        let mut finding = match self.with_failure[at as usize] {
-            Failed::Nothing => Finding::error(COORD_REQUEST_REFUSED, message),
-            Failed::Apply => Finding::warning(COORD_REQUEST_REFUSED, message),
-            Failed::Undo => Finding::info(COORD_REQUEST_REFUSED, message),
-        };
-        if let Some(site) = site {
-            finding = finding.at(site.origin).labelled("asked for here").path(place(chart, site.when));
-        }
-        for reason in reasons.iter().take(3) {
-            if reason.origin.is_some() {
-                finding = finding.also(reason.origin, reason.message.clone());
-            }
-        }
-        let help = reasons.first().and_then(|f| f.help.clone());
-        finding.help(help.unwrap_or_else(|| "ask for it where it fits the system".to_owned()))
-    }
-
-    /// The place that made a request, as far as it can be told.
-    fn site(&self, ask: Ask, owner: Option<NodeId>) -> Option<&RaiseSite> {
-        let name = ask.to_string();
-        let sites = || self.product.chart.raises().iter().filter(|s| s.name.as_str() == name);
-        sites().find(|s| matches!(s.when, When::Entry(n) if Some(n) == owner)).or_else(|| sites().next())
-    }
-
-    /// Where nothing leads on, where no way leads down, and ways down that leave something behind.
-    fn ways_down(&self, findings: &mut Vec<(Finding, Vec<String>)>) {
-        let product = &*self.product;
-        let is_down = |s: &State| product.is_down(s);
-        let mut out = vec![false; self.states.len()];
-        self.edges.iter().for_each(|(a, _)| out[*a as usize] = true);
-        let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
-        let mut leaves: FxHashSet<NodeId> = FxHashSet::default();
-        for (at, state) in self.states.iter().enumerate() {
-            let id = u32::try_from(at).unwrap_or(u32::MAX);
-            if !out[at] && self.followed[at] && !is_down(state) && !troubled.contains(&id) && leaves.insert(state.leaf)
-            {
-                let fqn = product.chart.fqn(state.leaf);
-                let finding = Finding::warning(COORD_STUCK, format!("nothing leads on from `{fqn}`"))
-                    .at(product.chart.origin(state.leaf))
-                    .path(format!("coordinator.{fqn}"))
-                    .help(format!("add a transition from it, at least on `{}`", product.deployment.shutdown.event));
-                findings.push((finding, self.trace(id)));
-            }
-        }
-        if let Some((at, left)) = self.states.iter().enumerate().find_map(|(at, state)| {
-            let left = is_down(state).then(|| self.components(state)).filter(|l| !l.is_empty())?;
-            Some((u32::try_from(at).ok()?, left))
-        }) {
-            let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
-            let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
-            let finding =
-                Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
-                    .at(product.deployment.key_origin("shutdown.down"))
-                    .path("shutdown.down")
-                    .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
-            findings.push((finding, self.trace(at)));
-        }
-        // Backwards from everything that is down; what is not met has no way. Only what was followed to the end counts.
-        if self.cut {
+        // Down, and not all is known: what is left is taken away by force.
+        if self.product.worlds.top(state.world).is_some() && self.product.is_down(&state) {
             return;
         }
-        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
-        self.edges.iter().for_each(|(a, b)| before[*b as usize].push(*a));
-        let mut reaches: Vec<bool> = self.states.iter().map(&is_down).collect();
-        let mut next: Vec<usize> = (0..self.states.len()).filter(|i| reaches[*i]).collect();
-        next.extend(troubled.iter().map(|at| *at as usize));
-        while let Some(at) = next.pop() {
-            for b in &before[at] {
-                if !std::mem::replace(&mut reaches[*b as usize], true) {
-                    next.push(*b as usize);
-                }
-            }
+        let depth = self.depth[at as usize] + 1;
+        let nexts = self.product.nexts(&state);
+        if nexts.cut {
+            self.cut(Bound::Waiting, so_far);
         }
-        let lost = (0..self.states.len()).find(|at| {
-            let id = u32::try_from(*at).unwrap_or(u32::MAX);
-            !reaches[*at] && !troubled.contains(&id) && !leaves.contains(&self.states[*at].leaf)
-        });
-        if let Some(at) = lost {
-            let leaf = self.states[at].leaf;
-            let fqn = product.chart.fqn(leaf);
-            let finding = Finding::warning(
-                COORD_NO_WAY_DOWN,
-                format!("from `{fqn}` no way leads to `{}`", product.deployment.first_coordinator().down),
-            )
-            .at(product.chart.origin(leaf))
-            .path(format!("coordinator.{fqn}"))
-            .also(product.deployment.key_origin("shutdown.down"), "the state that means down")
-            .help("add transitions that lead down from there");
-            findings.push((finding, self.trace(u32::try_from(at).unwrap_or(0))));
+        self.troubles.extend(nexts.troubles.into_iter().map(|trouble| (at, trouble)));
+        for (place, next) in nexts.all.into_iter().enumerate() {
+            let place = u32::try_from(place).unwrap_or(NOWHERE);
+            if let Some(deep) = next.deep.0 {
+                self.deep.push((at, deep));
+                self.ends.insert(at);
+                self.cut(Bound::Frames, so_far);
+                continue;
+            }
+            // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
+            if next.deep.1.is_some() && so_far >= Failed::Undo {
+                self.ends.insert(at);
+                continue;
+            }
+            let failed = next.failed;
+            let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
+            let (state, class) = self.abstracted(next);
+            let to = self.reach(state, so_far.max(class), depth);
+            self.edges.push(Edge { from: at, to, place, failed: class, quiet });
         }
     }
 
-    fn components(&self, state: &State) -> Vec<ComponentName> {
-        let mut names = Vec::new();
-        self.product.worlds.get(state.world).system.for_each_component(&mut |node| names.push(node.name));
-        names.sort_unstable();
-        names
+    /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
+    /// that it is in force.
+    fn abstracted(&mut self, next: Next) -> (State, Failed) {
+        let Next { mut state, failed, by_hand, .. } = next;
+        if !by_hand || self.product.worlds.top(state.world).is_some() {
+            return (state, failed);
+        }
+        let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
+        state.world = self.product.worlds.topped(top, std::iter::empty());
+        state.unconfirmed.clear();
+        (state, failed.max(Failed::Undo))
+    }
+
+    /// The shortest way to a state on which nothing worse fails than on the best one.
+    pub fn trace(&mut self, at: u32) -> Vec<TraceStep> {
+        let mut edges = Vec::new();
+        let mut to = at;
+        let class = self.failed[at as usize];
+        self.find_ways(class);
+        let ways = &self.ways[&class];
+        while ways[to as usize] != NOWHERE {
+            let edge = self.edges[ways[to as usize] as usize];
+            edges.push(edge);
+            to = edge.from;
+        }
+        edges.reverse();
+        let mut steps = vec![TraceStep { what: Happened::Start, states: self.places(&self.states[0]) }];
+        for edge in edges {
+            let from = self.states[edge.from as usize].clone();
+            if let Some(next) = self.product.nexts(&from).all.into_iter().nth(edge.place as usize) {
+                let what = self.product.told(&next);
+                steps.push(TraceStep { what, states: self.places(&self.states[edge.to as usize]) });
+            }
+        }
+        steps
+    }
+
+    fn find_ways(&mut self, class: Failed) {
+        if self.ways.contains_key(&class) {
+            return;
+        }
+        let mut out: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); self.states.len()];
+        for (number, edge) in (0u32..).zip(&self.edges) {
+            if edge.failed <= class {
+                out[edge.from as usize].push(number);
+            }
+        }
+        let mut by = vec![NOWHERE; self.states.len()];
+        let mut seen = vec![false; self.states.len()];
+        let mut queue: VecDeque<u32> = VecDeque::from([0]);
+        seen[0] = true;
+        while let Some(at) = queue.pop_front() {
+            for number in &out[at as usize] {
+                let to = self.edges[*number as usize].to;
+                if !std::mem::replace(&mut seen[to as usize], true) {
+                    by[to as usize] = *number;
+                    queue.push_back(to);
+                }
+            }
+        }
+        self.ways.insert(class, by);
+    }
+
+    fn places(&self, state: &State) -> Vec<Place> {
+        self.product.places(state)
+    }
+
+    /// The states, those with the least failing and the shortest ways first.
+    pub fn in_order(&self) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..u32::try_from(self.states.len()).unwrap_or(NOWHERE)).collect();
+        order.sort_by_key(|at| (self.failed[*at as usize], self.depth[*at as usize]));
+        order
+    }
+
+    /// How far it went.
+    pub fn explored(&self) -> Explored {
+        let unfollowed = self.followed.iter().filter(|followed| !**followed).count();
+        let with = self.followed.iter().zip(&self.failed);
+        Explored {
+            states: self.states.len(),
+            transitions: self.edges.len(),
+            complete: self.bounds.is_empty() && unfollowed == 0,
+            unfollowed,
+            without_failure: !with.into_iter().any(|(followed, failed)| !followed && *failed == Failed::Nothing),
+        }
+    }
+}
+
+impl Product<'_> {
+    /// Where all coordinators are.
+    pub fn places(&self, state: &State) -> Vec<Place> {
+        let several = self.members.len() > 1;
+        let place = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| Place {
+            coordinator: several.then(|| member.name.to_string()),
+            state: member.chart.fqn(*leaf).to_string(),
+        };
+        self.members.iter().zip(&state.leaves).map(place).collect()
+    }
+
+    /// Where all of them are, in words.
+    pub fn place(&self, state: &State) -> String {
+        let told = |place: Place| match place.coordinator {
+            Some(name) => format!("{name}:{}", place.state),
+            None => place.state,
+        };
+        self.places(state).into_iter().map(told).collect::<Vec<_>>().join(", ")
+    }
+
+    /// A move as it is told.
+    pub fn told(&self, next: &Next) -> Happened {
+        let name = |number: u8| self.members[usize::from(number)].name.to_string();
+        let event = |number: u8, event| self.members[usize::from(number)].chart.event_text(event);
+        match next.by {
+            Move::Event(at) => Happened::Event { event: self.outside[usize::from(at)].to_string() },
+            Move::Time(number, at) => Happened::Time { coordinator: name(number), event: event(number, at) },
+            Move::Taken(number, at) => Happened::Heard { coordinator: name(number), event: event(number, at) },
+            Move::Answer => Happened::Answer {
+                answers: (next.answers.iter())
+                    .map(|(request, verdict)| Answered {
+                        by: request.requester.to_string(),
+                        request: request.ask.to_string(),
+                        answer: verdict.event(request.ask).to_string(),
+                        verdict: *verdict,
+                    })
+                    .collect(),
+            },
+            Move::Confirmed(id) => Happened::Confirmed { configuration: id.to_string() },
+            Move::Lost(id) => Happened::Lost { configuration: id.to_string() },
+            Move::Operator(ask) => Happened::Operator {
+                request: match ask {
+                    Ask::Apply(id) => format!("apply {id}"),
+                    other => format!("undo {}", other.to_string().trim_end_matches(".undo")),
+                },
+            },
+            Move::OthersDown => Happened::Down,
+        }
     }
 }

@@ -1,13 +1,15 @@
 //! What the coordinator does when it hears something: for each leaf and event once, as a table that is filled on demand.
 //!
-//! In a pure coordinator at rest the active leaf is all there is to know, so that is all the state that is kept of it.
+//! In a pure coordinator at rest the active leaf is all there is to know, so that is all the state that is kept of it. On
+//! its way to rest it may take several steps; what each of them raises is a batch of its own, as in a running session.
 
 use super::coordinator::ask_of;
 use crate::model::statechart::FunctionId;
 use crate::model::{Ask, Deployment, EventName};
-use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View};
+use crate::stack::Scope;
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View, When};
 use crate::time::Time;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::rc::Rc;
 
 /// A request that was made.
@@ -15,10 +17,19 @@ use std::rc::Rc;
 pub struct Asked {
     /// What is asked.
     pub ask: Ask,
-    /// The name that was raised.
-    pub name: EventName,
     /// Who hears the answer; none: it has been left since.
     pub owner: Option<NodeId>,
+    /// The state that brings it with it, by being entered, or takes it back, by being left.
+    pub scope: Option<Scope>,
+}
+
+/// What a step hands on.
+#[derive(Debug, Clone)]
+pub enum Handed {
+    /// Requests, in the order they were made.
+    Batch(Vec<Asked>),
+    /// It has come to the state that means down.
+    Down,
 }
 
 /// What one event leads to, until the coordinator is at rest again.
@@ -28,8 +39,8 @@ pub struct Reaction {
     pub leaf: NodeId,
     /// Whether a transition was taken at all.
     pub taken: bool,
-    /// Requests, in the order they were made.
-    pub asked: Vec<Asked>,
+    /// What its steps hand on, in order.
+    pub handed: Vec<Handed>,
     /// States that were left, at least once.
     pub left: Vec<NodeId>,
     /// Names that were raised and ask for nothing, in order.
@@ -44,11 +55,19 @@ pub struct Reactions<'a> {
     table: FxHashMap<(NodeId, EventId), Rc<Reaction>>,
     offers: FxHashMap<NodeId, Rc<Vec<EventId>>>,
     outside: Vec<EventId>,
+    down: Option<NodeId>,
+    /// Names that states raise because of their state-scoped configurations.
+    scoped: FxHashSet<(EventName, NodeId)>,
 }
 
 impl<'a> Reactions<'a> {
-    /// An empty table. `outside` are the events that can come from components and operators.
-    pub fn new(deployment: &'a Deployment, chart: &'a Chart, outside: &[EventName]) -> Self {
+    /// An empty table. `outside` are the events that can come from components and operators; `down` the state that means
+    /// down.
+    pub fn new(deployment: &'a Deployment, chart: &'a Chart, outside: &[EventName], down: Option<NodeId>) -> Self {
+        let scoped = chart.raises().iter().filter(|site| site.scoped).filter_map(|site| match site.when {
+            When::Entry(state) | When::Exit(state) => Some((site.name, state)),
+            When::Effect(_) => None,
+        });
         Self {
             deployment,
             chart,
@@ -56,13 +75,33 @@ impl<'a> Reactions<'a> {
             table: FxHashMap::default(),
             offers: FxHashMap::default(),
             outside: outside.iter().map(|e| chart.event(*e)).collect(),
+            down,
+            scoped: scoped.collect(),
+        }
+    }
+
+    fn watch(&self, from: Option<NodeId>) -> Watch<'_> {
+        let is_down = from.is_some_and(|leaf| self.down.is_some_and(|down| self.chart.is_inside(leaf, down)));
+        Watch {
+            deployment: self.deployment,
+            scoped: &self.scoped,
+            down: self.down,
+            is_down,
+            at: None,
+            taken: false,
+            batch: Vec::new(),
+            handed: Vec::new(),
+            left: Vec::new(),
+            emitted: Vec::new(),
         }
     }
 
     /// The first entry; none when the coordinator cannot be entered.
     pub fn enter(&mut self) -> Option<Reaction> {
         let mut machine = Machine::new(self.chart);
-        let mut hook = Watch::new(self.deployment);
+        let mut hook = self.watch(None);
+        // Nothing was in force before: coming to *down* first means nothing.
+        hook.is_down = true;
         machine.run(self.chart, Time::default(), &mut hook);
         machine.leaf().map(|leaf| hook.reaction(leaf))
     }
@@ -72,11 +111,13 @@ impl<'a> Reactions<'a> {
         if let Some(known) = self.table.get(&(leaf, event)) {
             return known.clone();
         }
-        let mut hook = Watch::new(self.deployment);
-        self.machine.place(self.chart, leaf, Time::default());
-        self.machine.send(event);
-        self.machine.run(self.chart, Time::default(), &mut hook);
-        let reaction = Rc::new(hook.reaction(self.machine.leaf().unwrap_or(leaf)));
+        let mut machine = std::mem::replace(&mut self.machine, Machine::new(self.chart));
+        let mut hook = self.watch(Some(leaf));
+        machine.place(self.chart, leaf, Time::default());
+        machine.send(event);
+        machine.run(self.chart, Time::default(), &mut hook);
+        let reaction = Rc::new(hook.reaction(machine.leaf().unwrap_or(leaf)));
+        self.machine = machine;
         self.table.insert((leaf, event), reaction.clone());
         reaction
     }
@@ -86,18 +127,7 @@ impl<'a> Reactions<'a> {
         if let Some(known) = self.offers.get(&leaf) {
             return known.clone();
         }
-        let mut events: Vec<EventId> = Vec::new();
-        let mut any = false;
-        let mut at = Some(leaf);
-        while let Some(state) = at {
-            for edge in self.chart.outgoing(state) {
-                match self.chart.triggers(edge) {
-                    Some(triggers) => events.extend(triggers),
-                    None => any = true,
-                }
-            }
-            at = self.chart.parent(state);
-        }
+        let (events, any) = triggers(self.chart, leaf);
         let mut timed: Vec<EventId> = Vec::new();
         let mut at = Some(leaf);
         while let Some(state) = at {
@@ -116,28 +146,57 @@ impl<'a> Reactions<'a> {
     }
 }
 
+/// The events that transitions from `leaf` and the states around it list, and whether one takes any.
+pub fn triggers(chart: &Chart, leaf: NodeId) -> (Vec<EventId>, bool) {
+    let mut events: Vec<EventId> = Vec::new();
+    let mut any = false;
+    let mut at = Some(leaf);
+    while let Some(state) = at {
+        for edge in chart.outgoing(state) {
+            match chart.triggers(edge) {
+                Some(triggers) => events.extend(triggers),
+                None => any = true,
+            }
+        }
+        at = chart.parent(state);
+    }
+    (events, any)
+}
+
 /// Writes down what is raised and left.
 struct Watch<'a> {
     deployment: &'a Deployment,
+    scoped: &'a FxHashSet<(EventName, NodeId)>,
+    down: Option<NodeId>,
+    is_down: bool,
+    /// The state that was entered or left last: what it raises comes next.
+    at: Option<NodeId>,
     taken: bool,
-    asked: Vec<Asked>,
+    batch: Vec<Asked>,
+    handed: Vec<Handed>,
     left: Vec<NodeId>,
     emitted: Vec<EventName>,
 }
 
-impl<'a> Watch<'a> {
-    fn new(deployment: &'a Deployment) -> Self {
-        Self { deployment, taken: false, asked: Vec::new(), left: Vec::new(), emitted: Vec::new() }
-    }
-
+impl Watch<'_> {
     fn reaction(self, leaf: NodeId) -> Reaction {
-        Reaction { leaf, taken: self.taken, asked: self.asked, left: self.left, emitted: self.emitted }
+        let Self { taken, handed, left, emitted, .. } = self;
+        Reaction { leaf, taken, handed, left, emitted }
     }
 }
 
 impl Hook for Watch<'_> {
+    fn entered(&mut self, _: &Chart, state: NodeId) {
+        self.at = Some(state);
+    }
+
     fn exited(&mut self, _: &Chart, state: NodeId) {
-        for asked in self.asked.iter_mut().filter(|a| a.owner == Some(state)) {
+        self.at = Some(state);
+        let earlier = self.handed.iter_mut().flat_map(|handed| match handed {
+            Handed::Batch(asked) => asked.as_mut_slice(),
+            Handed::Down => &mut [],
+        });
+        for asked in earlier.chain(&mut self.batch).filter(|a| a.owner == Some(state)) {
             asked.owner = None;
         }
         if !self.left.contains(&state) {
@@ -147,6 +206,17 @@ impl Hook for Watch<'_> {
 
     fn taking(&mut self, _: &Chart, _: EdgeId) {
         self.taken = true;
+    }
+
+    fn after_step(&mut self, view: &mut View<'_>) {
+        if !self.batch.is_empty() {
+            self.handed.push(Handed::Batch(std::mem::take(&mut self.batch)));
+        }
+        let is_down = self.down.is_some_and(|down| view.leaf.is_some_and(|leaf| view.chart.is_inside(leaf, down)));
+        if is_down && !self.is_down {
+            self.handed.push(Handed::Down);
+        }
+        self.is_down = is_down;
     }
 
     // What a function decides is not known: it is taken to let everything pass, and what is found then is a warning.
@@ -163,10 +233,13 @@ impl Hook for Watch<'_> {
     }
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
-        if let Some(ask) = ask_of(self.deployment, raised.name) {
-            self.asked.push(Asked { ask, name: raised.name, owner: Some(raised.owner) });
-        } else {
-            self.emitted.push(raised.name);
+        match ask_of(self.deployment, raised.name) {
+            Some(ask) => {
+                let of = self.at.filter(|state| self.scoped.contains(&(raised.name, *state)));
+                let scope = of.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
+                self.batch.push(Asked { ask, owner: Some(raised.owner), scope });
+            }
+            None => self.emitted.push(raised.name),
         }
     }
 }

@@ -1,24 +1,26 @@
-//! The configurator's half of the product: system and stack, as requests change them.
+//! The configurator's half of the product: system, stack and what is known of them, as requests change them.
 //!
-//! Two worlds are one when they cannot be told apart by what may be requested in them: the same components in the same
-//! run states with the same connections (no precondition looks at a value), and the same frames that the coordinator may
-//! undo, each blocked by the same kind of frames above it. Frames that nobody ever undoes count only by what they block.
-//! Which of two frames lies above the other counts only where it matters: where one keeps the other from being undone, or
-//! both have one name, of which the newest is undone first. (Where the top is undone, whatever it is, it always matters.)
-//! Each world is planned in with the real planner and the real stack, once per request.
+//! What a batch comes to is asked of the stack ([`take_up`]), as a running configurator asks; each world is planned in once
+//! per batch. Two worlds are one when nothing that is requested in them can tell them apart: the same components with the
+//! same values, connections and policies, and the same frames with the same inverses. Frames that nobody ever undoes count
+//! only by what they keep of others; which of two frames lies above the other counts only where they share something.
+//!
+//! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
+use super::alike::{FrameBook, FrameNumber, hash_system, same_system};
 use crate::limits;
-use crate::model::{
-    Ask, Catalogue, Code, ComponentName, ConfigId, Configuration, Deployment, Findings, MemberRef, Policy, RunState,
-    TypeName,
-};
-use crate::plan::footprint::{Index, Slot};
+use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, OnFailure};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
-use crate::stack::{Frame, Request, Requester, Stack, transaction};
-use crate::system::{System, View, step};
+use crate::stack::claims::Claims;
+use crate::stack::{
+    Frame, FrameId, Group, Op, Planned, Reason, Request, Requester, Rules, Stack, World, is_kept, take_up, transaction,
+};
+use crate::system::{Slot, System, View, step};
 use crate::time::Time;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
+use std::hash::{Hash, Hasher};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -28,148 +30,395 @@ pub type WorldId = u32;
 /// The world in which nothing was applied.
 pub const EMPTY: WorldId = 0;
 
-/// A world.
-pub struct World {
-    /// The system.
-    pub system: System,
-    /// The frames in force.
-    pub stack: Stack,
+/// What is known of a world of which not everything is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Top {
+    /// A safe configuration is in force.
+    pub safe: bool,
+    /// There may be an actuator.
+    pub actuator: bool,
 }
 
-/// What a request did.
+/// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
+/// these would take over.
+type Counted = (FrameNumber, bool, Vec<Slot>);
+
+enum Known {
+    Exact(Box<Exact>),
+    Top(Top),
+}
+
+struct Exact {
+    world: World,
+    counted: Vec<Counted>,
+    /// The numbers of the counted frames.
+    ids: Vec<FrameId>,
+}
+
+/// Which frames count.
+#[derive(Debug, Clone, Default)]
+pub struct Undone {
+    /// Configurations whose frames somebody may undo; none: all.
+    pub ids: Option<FxHashSet<ConfigId>>,
+    /// Those who undo whatever is their newest.
+    pub bare: FxHashSet<Requester>,
+}
+
+impl Undone {
+    fn counts(&self, frame: &Frame) -> bool {
+        let named = |ids: &FxHashSet<ConfigId>| {
+            ids.contains(&frame.configuration) || frame.parts.iter().any(|part| ids.contains(&part.configuration))
+        };
+        self.ids.as_ref().is_none_or(named) || self.bare.contains(&frame.requester) || frame.requester == Requester::Operator
+    }
+}
+
+/// Where something leads to.
 #[derive(Debug, Clone)]
-pub enum Applied {
-    /// It is answered *ok* or *undone* in this world; `may_fail`: or it fails, and the world stays.
-    Done {
-        /// The world after it.
-        world: WorldId,
-        /// Whether there is a step that can fail.
-        may_fail: bool,
-        /// A configuration that may be undone, of which one coordinator has more than [`limits::CHECK_LEFT`] frames then.
-        left: Option<ConfigId>,
-    },
-    /// It is refused, and the world stays.
-    Refused {
-        /// Which of the requests made together.
-        which: usize,
-        /// Why.
-        findings: Rc<Findings>,
-    },
-    /// It would leave more frames of one configuration and one coordinator than are followed.
-    TooDeep(ConfigId),
+pub struct Went {
+    /// The world.
+    pub world: WorldId,
+    /// Of each frame that counted before, its place among those that count now; none: nothing was asked about that.
+    pub places: Option<Rc<Vec<Option<u8>>>>,
+    /// The places of the frames that were pushed, with the configurations.
+    pub pushed: SmallVec<[(ConfigId, u8); 1]>,
+    /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames then.
+    pub deep: Option<ConfigId>,
+    /// The same with [`limits::CHECK_LEFT`].
+    pub left: Option<ConfigId>,
 }
 
-#[derive(PartialEq, Eq, Hash)]
-struct Key {
-    components: Vec<(ComponentName, TypeName, RunState)>,
-    links: Vec<(MemberRef, MemberRef)>,
-    frames: Vec<Kept>,
+/// A part of a group that is carried out.
+#[derive(Debug, Clone)]
+pub struct PartOf {
+    /// The place of its request in the batch.
+    pub place: usize,
+    /// When it was given up: those before it stand.
+    pub before: Went,
+    /// When it failed; none: there is nothing in it that can.
+    pub failed: Option<Went>,
+    /// Whether something is undone.
+    pub undo: bool,
 }
 
-/// A frame that may be undone: of which configuration, by whom, and whether one that never is keeps it from that.
-type Kept = (ConfigId, Requester, bool);
+/// What the first requests of a batch come to.
+#[derive(Debug, Clone)]
+pub struct Comes {
+    /// Told without being carried out: place and verdict.
+    pub told: SmallVec<[(usize, Option<crate::model::Verdict>); 2]>,
+    /// Those that are told because they are refused.
+    pub refused: Vec<(usize, Rc<Findings>)>,
+    /// What is carried out; empty: nothing.
+    pub parts: Vec<PartOf>,
+    /// When all is done.
+    pub done: Went,
+    /// So many requests are settled then.
+    pub takes: usize,
+}
+
+/// What a safe configuration comes to.
+#[derive(Debug, Clone)]
+pub struct SafeComes {
+    /// The world with it; none: it is refused.
+    pub done: Result<Went, Rc<Findings>>,
+    /// Whether a step of it can fail.
+    pub may_fail: bool,
+}
 
 /// All worlds that were met.
 pub struct Worlds<'a> {
     deployment: &'a Deployment,
+    configurations: FxHashMap<ConfigId, Configuration>,
+    /// What requests may touch, by their text.
+    pub claims: Claims,
     context: Context,
-    requester: Requester,
-    /// Configurations whose frames the coordinator may undo; none: all of them.
-    undone: Option<FxHashSet<ConfigId>>,
-    worlds: Vec<World>,
-    keys: FxHashMap<Key, WorldId>,
-    done: FxHashMap<(WorldId, Requester, Vec<Ask>), Applied>,
+    undone: Undone,
+    /// Places of frames are wanted: there are configurations that must be confirmed.
+    confirms: bool,
+    worlds: Vec<Known>,
+    index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
+    frames: FrameBook,
+    comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>), Rc<Comes>>,
+    safes: FxHashMap<(WorldId, Request), Rc<SafeComes>>,
+    asked: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
     warned: FxHashSet<(Code, String)>,
-    /// By address of the two frames, which are kept alive here.
-    blocks: FxHashMap<(usize, usize), (bool, Arc<Frame>, Arc<Frame>)>,
 }
 
 /// The context in which a deployment's configurations are planned.
 pub fn context(deployment: &Deployment) -> Context {
-    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>() }
-}
-
-/// How a deployment's coordinator is called in frames.
-///
-/// # Panics
-/// Never: a deployment's name is a component name without prefix.
-pub fn requester(deployment: &Deployment) -> Requester {
-    Requester::Coordinator(ComponentName::new(deployment.name.as_str()).expect("a plain name"))
+    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>(), avoid: BTreeSet::new() }
 }
 
 impl<'a> Worlds<'a> {
     /// The empty world has the number 0.
-    pub fn new(deployment: &'a Deployment, catalogue: &Catalogue, undone: Option<FxHashSet<ConfigId>>) -> Self {
+    pub fn new(deployment: &'a Deployment, catalogue: &Catalogue, undone: Undone) -> Self {
         let mut worlds = Self {
             deployment,
+            configurations: deployment.configurations.iter().map(|c| (c.id, c.clone())).collect(),
+            claims: Claims::new(deployment.configurations.iter()),
             context: context(deployment),
-            requester: requester(deployment),
             undone,
+            confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),
             worlds: Vec::new(),
-            keys: FxHashMap::default(),
-            done: FxHashMap::default(),
+            index: FxHashMap::default(),
+            frames: FrameBook::default(),
+            comes: FxHashMap::default(),
+            safes: FxHashMap::default(),
+            asked: FxHashSet::default(),
             warnings: Vec::new(),
             warned: FxHashSet::default(),
-            blocks: FxHashMap::default(),
         };
         let system = System::new(Arc::new(catalogue.clone()));
-        worlds.intern(World { system, stack: Stack::new(deployment.limits.stack) });
+        worlds.intern(World::new(system, Stack::new(deployment.limits.stack)));
         worlds
     }
 
-    /// The world of that number.
-    pub fn get(&self, id: WorldId) -> &World {
-        &self.worlds[id as usize]
+    /// The world of that number; none: it is not known.
+    pub fn get(&self, id: WorldId) -> Option<&World> {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => Some(&exact.world),
+            Known::Top(_) => None,
+        }
     }
 
-    /// What `asks`, made together by the deployment's coordinator, do in a world.
-    pub fn apply(&mut self, id: WorldId, asks: &[Ask]) -> Applied {
-        self.apply_by(self.requester, id, asks)
+    /// What is known of a world that is not known.
+    pub fn top(&self, id: WorldId) -> Option<Top> {
+        match &self.worlds[id as usize] {
+            Known::Exact(_) => None,
+            Known::Top(top) => Some(*top),
+        }
     }
 
-    /// What `asks`, made together by that coordinator, do in a world.
-    pub fn apply_by(&mut self, by: Requester, id: WorldId, asks: &[Ask]) -> Applied {
-        if let Some(known) = self.done.get(&(id, by, asks.to_vec())) {
+    /// How many worlds there are.
+    pub fn len(&self) -> usize {
+        self.worlds.len()
+    }
+
+    /// Whether a safe configuration is in force.
+    pub fn is_safe(&self, id: WorldId) -> bool {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => exact.world.stack.safe().next().is_some(),
+            Known::Top(top) => top.safe,
+        }
+    }
+
+    /// Whether there is, or may be, an actuator.
+    pub fn has_actuator(&self, id: WorldId) -> bool {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => {
+                let mut some = false;
+                exact.world.system.for_each_component(&mut |node| some |= node.ty.actuator);
+                some
+            }
+            Known::Top(top) => top.actuator,
+        }
+    }
+
+    /// Whether a frame of this configuration is in force, in whatever shape.
+    pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
+        self.get(id).is_some_and(|world| {
+            let stack = &world.stack;
+            stack.is_buried(configuration, None) || stack.frames().iter().any(|f| f.configuration == configuration)
+        })
+    }
+
+    /// Whether an operator has a frame in force, and of what.
+    pub fn of_operator(&self, id: WorldId) -> Option<ConfigId> {
+        let frames = self.get(id)?.stack.frames();
+        frames.iter().find(|frame| frame.requester == Requester::Operator).map(|frame| frame.configuration)
+    }
+
+    /// The configuration of that name.
+    pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
+        self.configurations.get(&id)
+    }
+
+    /// What the rest of a batch comes to in a world that is known.
+    pub fn comes(&mut self, id: WorldId, requests: &[Request]) -> Rc<Comes> {
+        let plain: SmallVec<[Request; 2]> = requests.iter().map(|r| Request { tag: (0, 0), ..*r }).collect();
+        let key = (id, plain);
+        if let Some(known) = self.comes.get(&key) {
             return known.clone();
         }
-        let applied = match apply(self.deployment, &self.context, by, self.get(id), asks) {
-            Err(refusal) => Applied::Refused { which: refusal.request, findings: Rc::new(refusal.findings) },
-            Ok(Change { world, steps, warnings }) => {
-                for warning in warnings {
-                    if self.warned.insert((warning.code, warning.message.clone())) {
-                        self.warnings.push(warning);
-                    }
-                }
-                match self.more_than(limits::CHECK_FRAMES, &world) {
-                    Some(id) => Applied::TooDeep(id),
-                    None => Applied::Done {
-                        may_fail: !steps.is_empty(),
-                        left: self.more_than(limits::CHECK_LEFT, &world),
-                        world: self.intern(world),
-                    },
-                }
-            }
-        };
-        self.done.insert((id, by, asks.to_vec()), applied.clone());
-        applied
+        let comes = Rc::new(self.work_out(id, &key.1));
+        self.comes.insert(key, comes.clone());
+        comes
     }
 
-    /// The configurations of a coordinator's frames that may be undone, in no order.
-    pub fn frames_of(&self, by: Requester, id: WorldId, undone: Option<&FxHashSet<ConfigId>>) -> Vec<ConfigId> {
-        let frames = self.get(id).stack.frames().iter();
-        let counted = |id: &ConfigId| self.is_undone(*id) && undone.is_none_or(|undone| undone.contains(id));
-        let mut ids: Vec<ConfigId> =
-            frames.filter(|f| f.requester == by).map(|f| f.configuration).filter(counted).collect();
-        ids.sort_unstable_by_key(|id| id.as_str());
-        ids
+    /// The first requests of a batch, as the stack decides.
+    pub fn group(&self, id: WorldId, requests: &[Request]) -> Option<Group> {
+        let rules =
+            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
+        self.get(id).map(|world| take_up(world, requests, &rules))
+    }
+
+    fn work_out(&mut self, id: WorldId, requests: &[Request]) -> Comes {
+        self.asked.extend(requests.iter().filter_map(|r| if let Ask::Apply(id) = r.ask { Some(id) } else { None }));
+        let group = self.group(id, requests).unwrap_or_default();
+        let refused = group.told.iter().filter_map(|told| {
+            let reasons = match told.reason.as_ref()? {
+                Reason::Overtaken | Reason::GivenUp | Reason::SafeCame(_) => return None,
+                other => other.findings(),
+            };
+            Some((told.place, Rc::new(reasons)))
+        });
+        let mut comes = Comes {
+            told: group.told.iter().map(|told| (told.place, told.verdict)).collect(),
+            refused: refused.collect(),
+            parts: Vec::new(),
+            done: Went { world: id, places: None, pushed: SmallVec::new(), deep: None, left: None },
+            takes: group.takes.max(1),
+        };
+        let Some(planned) = group.planned else { return comes };
+        for warning in &planned.warnings {
+            if self.warned.insert((warning.code, warning.message.clone())) {
+                self.warnings.push(warning.clone());
+            }
+        }
+        let mut may_fail = vec![false; planned.parts.len()];
+        for at in 0..planned.steps.len() {
+            may_fail[planned.part_of(planned.place(at))] = true;
+        }
+        for (k, part) in planned.parts.iter().enumerate() {
+            let place = group.places[k];
+            let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
+            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, None) };
+            let failed = (may_fail[k] || holds).then(|| {
+                let request = &requests[place];
+                let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
+                match stays {
+                    Some(frame) => self.after(id, &planned, k, Some(frame.id)),
+                    None => before.clone(),
+                }
+            });
+            comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
+        }
+        comes.done = self.after(id, &planned, planned.parts.len(), None);
+        comes
+    }
+
+    /// The world after the first `parts` of a plan. `stays`: a frame that was to be undone with the state it belonged to.
+    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stays: Option<FrameId>) -> Went {
+        let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
+        let mut world = before.clone();
+        if parts == planned.parts.len() {
+            planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+        } else {
+            let steps = planned.parts[..parts].last().map_or(0, |part| part.range.end as usize);
+            planned.whole()[..steps].iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+        }
+        let edits = planned.parts[..parts].iter().map(|part| &part.edits);
+        let pushed = world.stack.apply(edits, &[]);
+        if let Some(frame) = stays {
+            world.stack.unscope(frame);
+        }
+        self.went(id, world, &pushed)
+    }
+
+    /// What a safe configuration comes to in a world that is known.
+    pub fn safe(&mut self, id: WorldId, request: &Request) -> Rc<SafeComes> {
+        let key = (id, Request { tag: (0, 0), ..*request });
+        if let Some(known) = self.safes.get(&key) {
+            return known.clone();
+        }
+        let Ask::Apply(configuration) = request.ask else { unreachable!("safe configurations are applied") };
+        self.asked.insert(configuration);
+        let planned = self.get(id).map(|world| {
+            let configuration = &self.configurations[&configuration];
+            let op = Op::Push {
+                configuration,
+                requester: request.requester,
+                at: Time::default(),
+                scope: request.scope,
+            };
+            transaction(&world.system, &world.stack, &[op], &self.context)
+        });
+        let comes = match planned {
+            Some(Ok(planned)) => {
+                let may_fail = !planned.steps.is_empty();
+                SafeComes { done: Ok(self.after(id, &planned, planned.parts.len(), None)), may_fail }
+            }
+            Some(Err(refusal)) => SafeComes { done: Err(Rc::new(refusal.findings)), may_fail: true },
+            None => unreachable!("planned in a world that is known"),
+        };
+        let comes = Rc::new(comes);
+        self.safes.insert(key, comes.clone());
+        comes
+    }
+
+    /// The world after a coordinator has come to its *down* state, and all are down.
+    pub fn settle_down(&mut self, id: WorldId) -> WorldId {
+        match self.get(id) {
+            Some(world) if world.system.is_empty() && !world.stack.is_empty() => {
+                let mut world = world.clone();
+                world.settle_down();
+                self.intern(world)
+            }
+            _ => id,
+        }
+    }
+
+    /// The world after something of `id` ended *broken*.
+    pub fn broken(&mut self, id: WorldId, asks: impl Iterator<Item = Ask>) -> WorldId {
+        let top = Top { safe: self.is_safe(id), actuator: self.has_actuator(id) };
+        self.topped(top, asks)
+    }
+
+    /// The unknown world after these were asked.
+    pub fn topped(&mut self, mut top: Top, asks: impl Iterator<Item = Ask>) -> WorldId {
+        for ask in asks {
+            if let Ask::Apply(id) = ask {
+                top.actuator |= self.creates_actuator(id);
+            }
+        }
+        let mut hasher = FxHasher::default();
+        top.hash(&mut hasher);
+        let hash = hasher.finish();
+        let known = self.index.get(&hash).and_then(|ids| ids.iter().find(|id| self.top(**id) == Some(top)));
+        if let Some(id) = known {
+            return *id;
+        }
+        let id = self.next();
+        self.worlds.push(Known::Top(top));
+        self.index.entry(hash).or_default().push(id);
+        id
+    }
+
+    /// The unknown world after a request was answered.
+    pub fn answered(&mut self, top: Top, request: &Request, done: bool) -> WorldId {
+        let is_safe = |id: ConfigId| self.configurations.get(&id).is_some_and(|c| c.safe);
+        let safe = match request.ask {
+            Ask::Apply(id) => top.safe || is_safe(id),
+            Ask::UndoOf(id) => top.safe && !(done && is_safe(id)),
+            _ => top.safe && !done,
+        };
+        self.topped(Top { safe, ..top }, std::iter::once(request.ask))
+    }
+
+    fn creates_actuator(&self, id: ConfigId) -> bool {
+        let types = self.get(EMPTY).map(|world| world.system.catalogue());
+        let actuator = |ty| types.and_then(|types| types.get(ty)).is_some_and(|ty| ty.actuator);
+        self.configurations.get(&id).is_some_and(|c| {
+            c.changes.iter().any(|change| match &change.kind {
+                crate::model::ChangeKind::Create { ty, .. } => actuator(*ty),
+                _ => false,
+            })
+        })
+    }
+
+    /// The number of the frame that counts at that place.
+    pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => exact.ids.get(usize::from(place)).copied(),
+            Known::Top(_) => None,
+        }
     }
 
     /// Configurations that were asked for in some world.
-    pub fn asked(&self) -> FxHashSet<ConfigId> {
-        let asks = self.done.keys().flat_map(|(_, _, asks)| asks);
-        asks.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None }).collect()
+    pub fn asked(&self) -> &FxHashSet<ConfigId> {
+        &self.asked
     }
 
     /// Plans a configuration in the world with the most components.
@@ -177,147 +426,131 @@ impl<'a> Worlds<'a> {
     /// # Errors
     /// Why it is refused there.
     pub fn try_anywhere(&self, configuration: &Configuration) -> Result<(), Refusal> {
-        let fullest = self.worlds.iter().max_by_key(|world| world.system.len());
+        let worlds = (0..self.worlds.len()).filter_map(|id| self.get(id as WorldId));
+        let fullest = worlds.max_by_key(|world| world.system.len());
         fullest.map_or(Ok(()), |world| plan(&world.system, configuration, &self.context).map(|_| ()))
     }
 
-    fn is_undone(&self, id: ConfigId) -> bool {
-        self.undone.as_ref().is_none_or(|undone| undone.contains(&id))
+    /// Whether `request` would be refused if none but its requester had frames in force.
+    pub fn is_refused_alone(&self, id: WorldId, request: &Request) -> bool {
+        let Some(world) = self.get(id) else { return false };
+        let mut stack = Stack::new(self.deployment.limits.stack);
+        for frame in world.stack.frames().iter().filter(|frame| frame.requester == request.requester) {
+            stack.push((**frame).clone());
+        }
+        let alone = World::new(world.system.clone(), stack);
+        let rules =
+            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
+        let group = take_up(&alone, std::slice::from_ref(request), &rules);
+        group.told.iter().any(|told| told.reason.is_some())
     }
 
-    /// A configuration of which one coordinator has more frames than that. Those of another one come of other rounds.
+    /// The steps of a group, for who shows them.
+    pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
+        self.group(id, requests).and_then(|group| group.planned).map_or_else(Vec::new, |planned| planned.steps)
+    }
+
+    fn next(&self) -> WorldId {
+        WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX)
+    }
+
+    fn went(&mut self, from: WorldId, world: World, pushed: &[FrameId]) -> Went {
+        let (deep, left) = (self.more_than(limits::CHECK_FRAMES, &world), self.more_than(limits::CHECK_LEFT, &world));
+        if !self.confirms {
+            return Went { world: self.intern(world), places: None, pushed: SmallVec::new(), deep, left };
+        }
+        let (counted, ids) = self.shape(&world.stack);
+        let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
+        let before = match &self.worlds[from as usize] {
+            Known::Exact(exact) => exact.ids.clone(),
+            Known::Top(_) => Vec::new(),
+        };
+        let places = before.iter().map(place).collect();
+        let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
+        let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();
+        let world = self.intern_shaped(world, counted, ids);
+        Went { world, places: Some(Rc::new(places)), pushed, deep, left }
+    }
+
+    /// A configuration of which one requester has more frames than that. Those of another one come of other rounds.
     fn more_than(&self, most: usize, world: &World) -> Option<ConfigId> {
         let mut counts: FxHashMap<(ConfigId, Requester), usize> = FxHashMap::default();
-        let deep = world.stack.frames().iter().find(|frame| {
+        let frames = world.stack.frames().iter().filter(|frame| self.undone.counts(frame) && !frame.is_squashed());
+        let deep = frames.into_iter().find(|frame| {
             let count = counts.entry((frame.configuration, frame.requester)).or_default();
             *count += 1;
-            self.is_undone(frame.configuration) && *count > most
+            *count > most
         });
         deep.map(|frame| frame.configuration)
     }
 
     fn intern(&mut self, world: World) -> WorldId {
-        let mut components = Vec::with_capacity(world.system.len());
-        world.system.for_each_component(&mut |node| components.push((node.name, node.ty.name, node.state)));
-        components.sort_unstable();
-        let mut links = Vec::new();
-        world.system.for_each_link(&mut |from, to, _: Policy| links.push((from, to)));
-        links.sort_unstable();
-        let frames = self.shape(&world);
-        let key = Key { components, links, frames };
-        if let Some(id) = self.keys.get(&key) {
+        let (counted, ids) = self.shape(&world.stack);
+        self.intern_shaped(world, counted, ids)
+    }
+
+    fn intern_shaped(&mut self, world: World, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
+        let mut hasher = FxHasher::default();
+        hash_system(&world.system, &mut hasher);
+        counted.hash(&mut hasher);
+        let hash = hasher.finish();
+        let same = |id: &&WorldId| match &self.worlds[**id as usize] {
+            Known::Exact(exact) => exact.counted == counted && same_system(&exact.world.system, &world.system),
+            Known::Top(_) => false,
+        };
+        if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {
             return *id;
         }
-        let id = WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX);
-        self.worlds.push(world);
-        self.keys.insert(key, id);
+        let id = self.next();
+        self.worlds.push(Known::Exact(Box::new(Exact { world, counted, ids })));
+        self.index.entry(hash).or_default().push(id);
         id
     }
 
-    /// The frames that may be undone, each with whether one that never is keeps it from that; in a canonical order.
-    fn shape(&mut self, world: &World) -> Vec<Kept> {
-        let frames = world.stack.frames();
-        let mut kept: Vec<(&Arc<Frame>, bool)> = Vec::new();
+    /// The frames that count, in a canonical order.
+    fn shape(&mut self, stack: &Stack) -> (Vec<Counted>, Vec<FrameId>) {
+        let frames = stack.frames();
+        let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
         for (i, frame) in frames.iter().enumerate() {
-            if self.is_undone(frame.configuration) {
-                let blocked = frames[i + 1..]
-                    .iter()
-                    .any(|above| !self.is_undone(above.configuration) && self.blocked(frame, above));
-                kept.push((frame, blocked));
+            if !self.undone.counts(frame) {
+                continue;
             }
+            let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
+            let over: FxHashSet<Slot> = above.iter().flat_map(|f| f.saved.iter().map(|s| s.slot)).collect();
+            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(|slot| over.contains(slot)).collect();
+            handed.sort_unstable();
+            handed.dedup();
+            let blocked = !above.is_empty() && is_kept(frame, above.into_iter());
+            kept.push((frame, (self.frames.number(frame), blocked, handed)));
         }
-        if self.undone.is_none() {
-            return kept.into_iter().map(|(frame, blocked)| (frame.configuration, frame.requester, blocked)).collect();
-        }
-        let mut shape = Vec::with_capacity(kept.len());
+        let mut counted = Vec::with_capacity(kept.len());
+        let mut ids = Vec::with_capacity(kept.len());
         while !kept.is_empty() {
             // Of those that could as well lie at the bottom, that with the least name.
             let mut least = 0;
             for at in 1..kept.len() {
-                let (frame, _) = kept[at];
-                if frame.configuration.as_str() < kept[least].0.configuration.as_str()
-                    && kept[..at].iter().all(|(below, _)| self.commute(below, frame))
-                {
+                let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
+                if smaller && (0..at).all(|below| self.commute(kept[below].0, kept[at].0)) {
                     least = at;
                 }
             }
-            let (frame, blocked) = kept.remove(least);
-            shape.push((frame.configuration, frame.requester, blocked));
+            let (frame, one) = kept.remove(least);
+            counted.push(one);
+            ids.push(frame.id);
         }
-        shape
+        (counted, ids)
     }
 
-    /// Whether it makes no difference which of two frames lies above the other: neither keeps the other from being
-    /// undone, and they are not asked for by one name.
+    /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
+    /// one name.
     fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
-        a.configuration != b.configuration && !self.blocked(a, b) && !self.blocked(b, a)
+        let one_name =
+            a.requester == b.requester && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
+        !one_name && !self.frames.share(a, b)
     }
 
-    /// Whether `above` keeps `frame` from being undone (as the stack would say; values that are handed over do not).
-    fn blocked(&mut self, frame: &Arc<Frame>, above: &Arc<Frame>) -> bool {
-        let key = (Arc::as_ptr(frame) as usize, Arc::as_ptr(above) as usize);
-        if let Some(known) = self.blocks.get(&key) {
-            return known.0;
-        }
-        let over: FxHashSet<Slot> = above.saved.iter().map(|s| s.slot).collect();
-        let index = Index::new(&frame.footprint, |touch| touch.serves.is_none_or(|slot| !over.contains(&slot)));
-        let blocked = above.floor.is_some() || above.footprint.touches.iter().any(|touch| index.shares(touch));
-        self.blocks.insert(key, (blocked, frame.clone(), above.clone()));
-        blocked
+    /// Whether what a failure of `id` leaves is never taken back by itself.
+    pub fn holds_on_failure(&self, id: ConfigId) -> bool {
+        self.configurations.get(&id).is_some_and(|c| c.on_failure == OnFailure::Hold)
     }
-}
-
-/// What requests made together lead to.
-pub struct Change {
-    /// The world after them.
-    pub world: World,
-    /// The steps.
-    pub steps: Vec<PlannedStep>,
-    /// What the plans warn of.
-    pub warnings: Findings,
-}
-
-/// What `asks`, made together by `requester`, do in `world`.
-///
-/// # Errors
-/// Why they are refused.
-pub fn apply(
-    deployment: &Deployment,
-    context: &Context,
-    requester: Requester,
-    world: &World,
-    asks: &[Ask],
-) -> Result<Change, Refusal> {
-    let mut requests = Vec::new();
-    let mut places = Vec::new();
-    for (i, ask) in asks.iter().enumerate() {
-        let request = match ask {
-            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| Request::Push {
-                configuration,
-                requester,
-                at: Time::default(),
-                active: false,
-            }),
-            Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Request::Undo(frame.id)),
-            Ask::Undo => Some(Request::UndoTop),
-            Ask::UndoTo(n) => Some(Request::UndoTo(*n)),
-            Ask::Commit => None,
-        };
-        // An undo of what is not there is answered *undone*.
-        if let Some(request) = request {
-            requests.push(request);
-            places.push(i);
-        }
-    }
-    let mut world = World { system: world.system.clone(), stack: world.stack.clone() };
-    let mut transaction = transaction(&world.system, &world.stack, &requests, context)
-        .map_err(|refusal| Refusal { request: places.get(refusal.request).copied().unwrap_or(0), ..refusal })?;
-    for planned in &transaction.steps {
-        step::effect(&planned.step, &mut world.system);
-    }
-    // Taken out, not copied: the stack commits frames, not steps.
-    let steps = std::mem::take(&mut transaction.steps);
-    let warnings = std::mem::take(&mut transaction.warnings);
-    world.stack.commit(transaction);
-    Ok(Change { world, steps, warnings })
 }

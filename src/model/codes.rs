@@ -470,10 +470,28 @@ codes! {
          driven, a property cannot be set in this run state. The request would be answered `failed`. Make the request \
          where it fits, or write the configuration so that it fits both states: demands (run states, values) are fulfilled \
          when already so, acts (create, destroy, connect, disconnect) are not.";
+    COORD_ENDLESS = "coord::endless", "answers go round for ever",
+        "On the way shown the coordinator gets to a circle of states that only answers lead round: each answer makes it ask \
+         for something whose answer makes it ask again. No step fails and no time passes on the way round, so it works \
+         without end as fast as the configurator answers. Let it wait somewhere on the way round: for an event, or for a \
+         time (`e_after(1.0)`).";
+    COORD_SAFETY_UNHEARD = "coord::safety_unheard", "a safety event does not lead to a safe configuration",
+        "`safety` lists events that must lead to a `safe` configuration wherever an actuator exists. On the way shown there \
+         is a component of a type with `actuator: true`, no safe configuration is in force or asked for, and the event \
+         either is not heard, or what it leads to asks for no safe configuration before another event comes. After something \
+         ended *broken* nothing is known of the system, and the same is demanded as a warning. Add a transition on the event \
+         to a state that asks for a safe configuration on its entry; a transition from the outermost state in which actuators \
+         exist serves for all states inside.";
+    COORD_LOST_UNHEARD = "coord::lost_unheard", "nobody hears that what a configuration stands for is lost",
+        "A configuration says with `holds` what it stands for. When that becomes false while a frame of it is in force, the \
+         coordinator hears `ID.lost`, in whatever state it is. On the way shown it is in a state in which no transition hears \
+         it, so it would go on as if nothing had happened. Add a transition on `ID.lost` to a state around all in which the \
+         configuration may be in force.";
     COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
         "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
-         neither from inside nor from outside. Only a forced shutdown gets the system out. Add a transition, at least on \
-         the shutdown event.";
+         neither from inside nor from outside. Only a forced shutdown gets the system out. Where the state waits for answers, \
+         they belong to requests that were not made on this way: ask on the entry of the state, so that it is asked for on \
+         every way there. Else add a transition, at least on the shutdown event.";
     COORD_NO_WAY_DOWN = "coord::no_way_down", "the state that means down cannot be reached from here",
         "`check` followed every order of events from the state shown, and none leads to `shutdown.down`, even if every \
          request succeeds from there on. A shutdown would have to be forced. Add the transitions that lead down from there.";
@@ -482,17 +500,16 @@ codes! {
          would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \
          applied on the way up.";
     COORD_SHARED = "coord::shared", "two coordinators touch the same component",
-        "Each coordinator is verified alone, as if the others were not there. That is all there is to know as long as the \
-         configurations of one touch no component that those of another touch. Here they do: at run time one of them may be \
-         refused where alone it was not (nothing is broken by that: a conflict is refused and named). A few coordinators are \
-         followed together as well, as far as the budget goes; then this is a note, and what comes of it is told by findings \
-         of its own. Else what follows from it is a warning at most. Give each coordinator components of its own, or let one \
-         coordinator ask the other by an event.";
+        "The configurations of one coordinator touch a component that those of another touch. At run time one of them may be \
+         refused something because of the other's frames (nothing is broken by that: a conflict is refused and named). The \
+         coordinators are followed together; what comes of it is told by findings of its own, and this is a note. Where they \
+         were not followed to the end, it is a warning. Give each coordinator components of its own, or let one coordinator \
+         ask the other by an event.";
     COORD_REFUSED_BY_OTHER = "coord::refused_by_other", "one coordinator is refused something because of another's frames",
-        "Coordinators side by side were followed together, and one of them is refused what it is never refused alone: frames \
-         of another are in the way. Nothing is broken by that, the request is answered as failed; but whether it happens \
-         depends on which of the two was first. The trace shows a shortest way. Give each coordinator components of its own, \
-         or let one ask the other by an event.";
+        "Coordinators side by side were followed together, and one of them is refused something because frames of those named \
+         are in the way: they share a component or a group with it, and without them it would not be refused. Nothing is \
+         broken by that, the request is answered as failed; but whether it happens depends on which of them was first. The \
+         trace shows a shortest way. Give each coordinator components of its own, or let one ask the other by an event.";
     COORD_STACK_GROWS = "coord::stack_grows", "going round makes the stack grow",
         "The coordinator can go round a circle of states that applies a configuration each time and never undoes it, \
          though elsewhere it undoes that configuration by name. Each round leaves a frame; past the limit the oldest are \

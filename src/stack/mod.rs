@@ -24,11 +24,11 @@ mod work;
 mod world;
 
 pub use answer::{Answer, Reason, Residual};
-pub use batch::{Group, Rules, Told, take_up};
+pub use batch::{Group, Rules, Told, held, take_up};
 pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
-pub use share::HandOver;
+pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};
 pub use world::{Broken, World};
 

@@ -1,0 +1,124 @@
+//! When two systems, or two frames, are the same to whoever may ask for something.
+
+use crate::model::Value;
+use crate::stack::{Frame, shares};
+use crate::system::{System, View};
+use rustc_hash::{FxHashMap, FxHasher};
+use smallvec::SmallVec;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+/// The number of what a frame contains, whatever its own number is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FrameNumber(u32);
+
+/// The frames that were met, by what they contain.
+#[derive(Default)]
+pub struct FrameBook {
+    frames: Vec<Arc<Frame>>,
+    index: FxHashMap<u64, SmallVec<[u32; 1]>>,
+    shares: FxHashMap<(u32, u32), bool>,
+    /// By address; the frames are kept alive here.
+    known: FxHashMap<usize, (FrameNumber, Arc<Frame>)>,
+}
+
+impl FrameBook {
+    /// The number of what a frame contains.
+    pub fn number(&mut self, frame: &Arc<Frame>) -> FrameNumber {
+        let address = Arc::as_ptr(frame) as usize;
+        if let Some((number, _)) = self.known.get(&address) {
+            return *number;
+        }
+        let mut hasher = FxHasher::default();
+        hash_frame(frame, &mut hasher);
+        let bucket = self.index.entry(hasher.finish()).or_default();
+        let number = match bucket.iter().find(|at| same_frame(&self.frames[**at as usize], frame)) {
+            Some(at) => *at,
+            None => {
+                let next = u32::try_from(self.frames.len()).unwrap_or(u32::MAX);
+                self.frames.push(frame.clone());
+                bucket.push(next);
+                next
+            }
+        };
+        self.known.insert(address, (FrameNumber(number), frame.clone()));
+        FrameNumber(number)
+    }
+
+    /// Whether two frames share anything.
+    pub fn share(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
+        let (FrameNumber(x), FrameNumber(y)) = (self.number(a), self.number(b));
+        let key = (x.min(y), x.max(y));
+        if let Some(known) = self.shares.get(&key) {
+            return *known;
+        }
+        let shared = shares(a, b) || shares(b, a);
+        self.shares.insert(key, shared);
+        shared
+    }
+}
+
+fn hash_frame(frame: &Frame, hasher: &mut impl Hasher) {
+    (frame.configuration, frame.requester, frame.scope, frame.partial, frame.safe).hash(hasher);
+    frame.parts.len().hash(hasher);
+    frame.steps().len().hash(hasher);
+    for saved in &frame.saved {
+        saved.slot.hash(hasher);
+    }
+}
+
+/// Whether two frames differ in nothing but their number, age and memory.
+fn same_frame(a: &Frame, b: &Frame) -> bool {
+    (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
+        && (a.partial, a.safe, &a.floor) == (b.partial, b.safe, &b.floor)
+        && a.parts == b.parts
+        && a.saved == b.saved
+        && a.inverse == b.inverse
+        && a.footprint == b.footprint
+}
+
+fn hash_value(value: &Value, hasher: &mut impl Hasher) {
+    match value {
+        Value::Bool(v) => v.hash(hasher),
+        Value::Int(v) => v.hash(hasher),
+        // Both zeros are one.
+        Value::Float(v) => (if *v == 0.0 { 0 } else { v.to_bits() }).hash(hasher),
+        Value::Str(v) => v.hash(hasher),
+        Value::Array(v) => v.iter().for_each(|v| hash_value(v, hasher)),
+        Value::Record(v) => v.iter().for_each(|(_, v)| hash_value(v, hasher)),
+    }
+}
+
+/// The same for systems that are the same, in whatever order they were built.
+pub fn hash_system(system: &System, hasher: &mut impl Hasher) {
+    let mut sum = 0u64;
+    system.for_each_component(&mut |node| {
+        let mut own = FxHasher::default();
+        (node.name, node.ty.name, node.state, node.activity).hash(&mut own);
+        node.properties.iter().for_each(|value| hash_value(value, &mut own));
+        for (port, value) in node.written_ports() {
+            port.hash(&mut own);
+            hash_value(value, &mut own);
+        }
+        sum = sum.wrapping_add(own.finish());
+    });
+    system.for_each_link(&mut |from, to, policy| {
+        let mut own = FxHasher::default();
+        (from, to, policy).hash(&mut own);
+        sum = sum.wrapping_add(own.finish());
+    });
+    sum.hash(hasher);
+}
+
+/// Whether two systems are the same to an observer.
+pub fn same_system(a: &System, b: &System) -> bool {
+    let mut same = a.len() == b.len();
+    a.for_each_component(&mut |node| same = same && b.component(node.name).is_some_and(|other| node.same(other)));
+    let mut links = 0usize;
+    a.for_each_link(&mut |from, to, policy| {
+        links += 1;
+        same = same && b.link(from, to) == Some(policy);
+    });
+    b.for_each_link(&mut |_, _, _| links = links.wrapping_sub(1));
+    same && links == 0
+}

@@ -1,0 +1,260 @@
+//! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
+
+use super::product::{Answers, Failed, Move, Next, Nexts, Product, State, Stop, index};
+use super::reactions::{Asked, Handed, Reaction};
+use crate::limits;
+use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
+use crate::stack::{Arrival, Batch, Request, Why};
+use crate::statechart::{EventId, NodeId};
+use smallvec::SmallVec;
+
+/// A request as a step makes it.
+pub type Given = Asked;
+
+impl Product<'_> {
+    /// A coordinator hears an event, and comes to rest again.
+    pub(super) fn react(&mut self, state: State, by: usize, event: EventId) -> Vec<State> {
+        let reaction = self.members[by].react(state.leaves[by], event);
+        self.follow(state, by, &reaction)
+    }
+
+    /// Brings a reaction of a coordinator into a state. More than one: it makes a difference what is over already.
+    pub(super) fn follow(&mut self, mut state: State, by: usize, reaction: &Reaction) -> Vec<State> {
+        state.leaves[by] = reaction.leaf;
+        self.forget(&mut state, by, &reaction.left);
+        let mut states = vec![state];
+        let requester = self.members[by].by;
+        for handed in &reaction.handed {
+            let batch = match handed {
+                Handed::Batch(asked) => asked.iter().map(|asked| Self::request(requester, asked)).collect(),
+                Handed::Down => {
+                    Batch::one(Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) })
+                }
+            };
+            states = states.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+        }
+        for name in &reaction.emitted {
+            for state in &mut states {
+                self.confirm(state, *name);
+                self.spread(state, *name, Some(by));
+            }
+        }
+        states
+    }
+
+    /// Nobody hears the answers any more whose state has been left.
+    fn forget(&self, state: &mut State, by: usize, left: &[NodeId]) {
+        if left.is_empty() {
+            return;
+        }
+        let requester = self.members[by].by;
+        let gone = |request: &mut Request| {
+            let owner = request.tag.0.checked_sub(1);
+            if request.requester == requester && left.iter().any(|node| Some(node.index() as u64) == owner) {
+                request.tag = (0, 0);
+            }
+        };
+        state.desk.requests_mut().for_each(gone);
+        state.safe.iter_mut().for_each(gone);
+        state.due.iter_mut().for_each(|(request, _)| gone(request));
+        state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
+        if let Some(batch) = &mut state.flight {
+            batch.requests.iter_mut().for_each(gone);
+        }
+        for (_, stop) in &mut state.stopped {
+            if let Stop::GivenUp(undo) = stop {
+                gone(undo);
+            }
+        }
+    }
+
+    /// The batches under way that `batch` would stop.
+    pub(super) fn stopped_by(&self, state: &State, batch: &Batch) -> SmallVec<[u32; 2]> {
+        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
+        let mut trial = state.desk.clone();
+        let Arrival { safe, given_up, .. } = trial.arrive(batch.clone(), is_safe, &self.worlds.claims);
+        let mut stopped: SmallVec<[u32; 2]> = given_up.iter().map(|(number, _)| *number).collect();
+        if !safe.is_empty() {
+            stopped.extend(state.desk.under_way().iter().map(|turn| turn.number));
+        }
+        stopped.retain(|number| !state.stopped.iter().any(|(of, _)| of == number));
+        stopped.sort_unstable();
+        stopped.dedup();
+        stopped
+    }
+
+    /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
+    pub(super) fn arrive(&mut self, state: State, batch: Batch) -> Vec<State> {
+        let stops = self.stopped_by(&state, &batch);
+        let mut states = Vec::with_capacity(1);
+        if !stops.is_empty() && state.flight.is_none() {
+            states.push(State { flight: Some(Box::new(batch.clone())), ..state.clone() });
+            let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
+            if batch.requests.iter().any(is_safe) {
+                let mut waits = state.clone();
+                stops.iter().rev().for_each(|number| waits.desk.put_back(*number));
+                states.push(self.take_in(waits, batch.clone()));
+            }
+        }
+        states.insert(0, self.take_in(state, batch));
+        states
+    }
+
+    fn is_safe(&self, id: ConfigId) -> bool {
+        self.worlds.configuration(id).is_some_and(|c| c.safe)
+    }
+
+    /// A batch comes to the desk.
+    pub(super) fn take_in(&mut self, mut state: State, batch: Batch) -> State {
+        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
+        let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
+        for (request, verdict, _) in &arrival.told {
+            self.owed(&mut state, request);
+            state.due.push((*request, *verdict));
+        }
+        if !arrival.safe.is_empty() {
+            for turn in state.desk.under_way() {
+                let stopped = state.stopped.iter().any(|(of, stop)| *of == turn.number && *stop == Stop::Interrupted);
+                if !stopped {
+                    state.stopped.push((turn.number, Stop::Interrupted));
+                }
+            }
+        }
+        for request in arrival.safe {
+            self.owed(&mut state, &request);
+            state.safe.push(request);
+        }
+        for (number, undo) in arrival.given_up {
+            self.owed(&mut state, &undo);
+            self.give_up(&mut state, number, undo);
+        }
+        self.begin(&mut state);
+        state
+    }
+
+    /// What is under way is given up by its own undo.
+    fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
+        let Some(turn) = state.desk.under_way().iter().find(|turn| turn.number == number) else { return };
+        let requests = turn.batch.requests.clone();
+        let Ask::UndoOf(id) = undo.ask else { return };
+        let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
+        let Some(place) = requests.iter().position(fits) else { return };
+        let begun = match self.worlds.top(state.world) {
+            Some(_) => place == 0,
+            None => self.comes(state, &requests).parts.iter().any(|part| part.place == place),
+        };
+        if begun {
+            state.stopped.push((number, Stop::GivenUp(undo)));
+            return;
+        }
+        // It stands behind in its batch and has not begun.
+        state.desk.answered(number, place);
+        state.due.push((requests[place], Verdict::Cancelled));
+        state.due.push((undo, Verdict::Undone));
+    }
+
+    /// A request is taken up: who asks is not down any more.
+    fn owed(&self, state: &mut State, request: &Request) {
+        if request.why == Why::Asked
+            && let Some(number) = self.member(request.requester)
+        {
+            state.down &= !(1 << number.min(63));
+        }
+    }
+
+    /// Whatever can begin does.
+    pub(super) fn begin(&mut self, state: &mut State) {
+        while let Some(turn) = state.desk.turn(&self.worlds.claims) {
+            let first = turn.batch.requests[0];
+            if first.why != Why::Down {
+                for request in &turn.batch.requests {
+                    self.owed(state, request);
+                }
+                continue;
+            }
+            state.desk.over(turn.number);
+            if let Some(number) = self.member(first.requester) {
+                state.down |= 1 << number.min(63);
+            }
+            if self.all_down(state) && !self.others {
+                let world = self.worlds.settle_down(state.world);
+                if world != state.world {
+                    state.world = world;
+                    state.unconfirmed.clear();
+                    state.lost.clear();
+                }
+            }
+        }
+    }
+
+    /// Puts an event into the inbox of everybody but the one that emits it.
+    pub(super) fn spread(&mut self, state: &mut State, name: EventName, but: Option<usize>) {
+        for number in 0..self.members.len() {
+            let member = &mut self.members[number];
+            let event = member.chart.event(name);
+            let own = index(number);
+            // Nothing can bring it elsewhere before it takes the event, and here the event does nothing.
+            let settled = state.outstanding(member.by) == 0 && !state.inbox.iter().any(|(to, _)| *to == own);
+            let alone = but.is_none() && self.members.len() == 1;
+            let member = &mut self.members[number];
+            if Some(number) == but
+                || event == EventId::OTHER
+                || (settled || alone) && !member.react(state.leaves[number], event).taken
+            {
+                continue;
+            }
+            if state.inbox.len() >= limits::CHECK_INBOX {
+                self.overflow = true;
+                continue;
+            }
+            state.inbox.push((own, event));
+        }
+        state.inbox.sort_by_key(|(to, _)| *to);
+    }
+
+    /// Frames that waited for this event have been confirmed.
+    pub(super) fn confirm(&self, state: &mut State, name: EventName) {
+        state.unconfirmed.retain(|waits| match waits.request.ask {
+            Ask::Apply(id) => {
+                self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)
+            }
+            _ => false,
+        });
+    }
+
+    /// Gives answers, one after the other; each is heard before the next comes.
+    pub(super) fn tell(&mut self, mut state: State, answers: Answers, failed: Failed, nexts: &mut Nexts) {
+        self.begin(&mut state);
+        // Those that are still to be heard lie with the state: one may be left by hearing those before.
+        let before = state.due.len();
+        state.due.extend(answers.iter().copied());
+        let mut states = vec![state];
+        for _ in 0..answers.len() {
+            let mut heard = Vec::with_capacity(states.len());
+            for mut state in states {
+                let (request, verdict) = state.due.remove(before.min(state.due.len() - 1));
+                let owner = self.member(request.requester).filter(|_| request.tag.0 != 0);
+                match owner {
+                    Some(number) => {
+                        let event = self.members[number].chart.event(verdict.event(request.ask));
+                        heard.extend(self.react(state, number, event));
+                    }
+                    None => heard.push(state),
+                }
+            }
+            states = heard;
+        }
+        for mut state in states {
+            self.begin(&mut state);
+            let state = self.settle(state);
+            nexts.all.push(Next {
+                by: Move::Answer,
+                answers: answers.clone(),
+                state,
+                failed,
+                deep: (None, None),
+                by_hand: false,
+            });
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! How what is under way may end.
+
+use super::product::{Answers, Failed, Nexts, Product, State, Stop, Trouble, Unconfirmed};
+use super::world::{Comes, Top, Went};
+use crate::model::{Ask, ConfigId, Verdict};
+use crate::stack::{Batch, Request, Requester, Why};
+use smallvec::SmallVec;
+
+/// Requests of a batch that are answered: place and verdict; none: nobody is told.
+type Given = SmallVec<[(usize, Option<Verdict>); 2]>;
+
+impl Product<'_> {
+    fn requests(state: &State, number: u32) -> SmallVec<[Request; 2]> {
+        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
+        turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default()
+    }
+
+    /// How a batch under way may end, or its first requests.
+    pub(super) fn ends(&mut self, state: &State, number: u32, nexts: &mut Nexts) {
+        let requests = Self::requests(state, number);
+        if let Some(top) = self.worlds.top(state.world) {
+            return self.ends_somehow(state, number, top, &requests, nexts);
+        }
+        let comes = self.comes(state, &requests);
+        for (place, reasons) in &comes.refused {
+            if requests[*place].requester != Requester::Operator {
+                nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
+            }
+        }
+        let from = nexts.all.len();
+        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
+        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
+        let deep = (comes.done.deep, comes.done.left);
+        nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
+        for (k, part) in comes.parts.iter().enumerate() {
+            let Some(went) = &part.failed else { continue };
+            let ask = requests[part.place].ask;
+            let mut failed = Self::done_before(&requests, &comes, k, part.place);
+            let mut broken = failed.clone();
+            failed.push((part.place, Some(ask.failed())));
+            let class = if part.undo { Failed::Undo } else { Failed::Apply };
+            self.ended(state, number, &requests, failed, went, class, nexts);
+            broken.push((part.place, Some(ask.broken())));
+            self.broke(state, number, &requests, broken, nexts);
+        }
+    }
+
+    /// The answers when the first `parts` are done: theirs, and what is told before `place`.
+    fn done_before(requests: &[Request], comes: &Comes, parts: usize, place: usize) -> Given {
+        let done = comes.parts[..parts].iter().map(|part| (part.place, Some(requests[part.place].ask.done())));
+        let told = comes.told.iter().copied().filter(|(told, _)| *told < place);
+        let mut given: Given = done.chain(told).collect();
+        given.sort_by_key(|(place, _)| *place);
+        given
+    }
+
+    /// Nothing is known: each request may end in any way, one after the other.
+    fn ends_somehow(&mut self, state: &State, number: u32, top: Top, requests: &[Request], nexts: &mut Nexts) {
+        let ask = requests[0].ask;
+        for (verdict, done) in [(ask.done(), true), (ask.failed(), false), (ask.broken(), false)] {
+            let went = Went::to(self.worlds.answered(top, &requests[0], done));
+            let given = Given::from_iter([(0, Some(verdict))]);
+            self.ended(state, number, requests, given, &went, Failed::Nothing, nexts);
+        }
+    }
+
+    /// Something of a batch under way is left in between.
+    fn broke(&mut self, state: &State, number: u32, requests: &[Request], given: Given, nexts: &mut Nexts) {
+        let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
+        let mut state = state.clone();
+        state.unconfirmed.clear();
+        self.ended(&state, number, requests, given, &Went::to(world), Failed::Broken, nexts);
+    }
+
+    /// These requests of a batch under way are answered, and the world has become another one.
+    #[allow(clippy::too_many_arguments)]
+    fn ended(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        given: Given,
+        went: &Went,
+        failed: Failed,
+        nexts: &mut Nexts,
+    ) {
+        let mut next = state.clone();
+        self.go(&mut next, went);
+        let mut given_up: SmallVec<[Request; 1]> = SmallVec::new();
+        next.stopped.retain(|(of, stop)| {
+            let over = *of == number;
+            if let (true, Stop::GivenUp(undo)) = (over, &*stop) {
+                given_up.push(*undo);
+            }
+            !over
+        });
+        // From the last on, so that places stay.
+        for (place, _) in given.iter().rev() {
+            next.desk.answered(number, *place);
+        }
+        let mut answers = Answers::new();
+        let mut late: SmallVec<[Request; 1]> = SmallVec::new();
+        for (place, verdict) in &given {
+            let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
+            self.applied(&mut next, &request, verdict, went);
+            answers.push((request, verdict));
+            let fits = |undo: &Request| matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b);
+            if let Some(at) = given_up.iter().position(fits) {
+                let undo = given_up.remove(at);
+                match verdict {
+                    // It was through before it could be given up: the undo is a request like others.
+                    Verdict::Ok => late.push(undo),
+                    Verdict::Broken => answers.push((undo, Verdict::UndoBroken)),
+                    _ => answers.push((undo, Verdict::Undone)),
+                }
+            }
+        }
+        // What gives up a request that is taken up anew goes on doing so.
+        next.stopped.extend(given_up.into_iter().map(|undo| (number, Stop::GivenUp(undo))));
+        for undo in late {
+            next = self.take_in(next, Batch::one(undo));
+        }
+        if let Some(batch) = next.flight.take() {
+            next = self.take_in(next, *batch);
+        }
+        self.tell(next, answers, failed, nexts);
+    }
+
+    /// What a request that was carried out leaves to be waited for.
+    fn applied(&self, state: &mut State, request: &Request, verdict: Verdict, went: &Went) {
+        let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
+        state.lost.retain(|lost| *lost != id);
+        let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
+        if let (true, Some((_, place))) = (waits, went.pushed.iter().find(|(of, _)| *of == id)) {
+            state.unconfirmed.push(Unconfirmed { place: *place, request: Request { why: Why::Asked, ..*request } });
+        }
+    }
+
+    /// How a batch under way that was stopped may end.
+    pub(super) fn stopped_ends(&mut self, state: &State, number: u32, nexts: &mut Nexts) {
+        let requests = Self::requests(state, number);
+        if requests.is_empty() {
+            return;
+        }
+        if let Some(top) = self.worlds.top(state.world) {
+            let given_up = state.stopped.iter().find_map(|(of, stop)| match stop {
+                Stop::GivenUp(undo) if *of == number => Some(*undo),
+                _ => None,
+            });
+            let verdict = if given_up.is_some() { Verdict::Cancelled } else { requests[0].ask.failed() };
+            for verdict in [verdict, requests[0].ask.broken()] {
+                let went = Went::to(self.worlds.answered(top, &requests[0], false));
+                self.ended(state, number, &requests, Given::from_iter([(0, Some(verdict))]), &went, Failed::Nothing, nexts);
+            }
+            return;
+        }
+        let comes = self.comes(state, &requests);
+        let interrupted = state.stopped.iter().any(|(of, stop)| *of == number && *stop == Stop::Interrupted);
+        if interrupted {
+            let mut given: Given = comes.told.clone();
+            given.extend(comes.parts.iter().map(|part| (part.place, Some(requests[part.place].ask.failed()))));
+            given.sort_by_key(|(place, _)| *place);
+            let went = comes.parts.first().map_or(&comes.done, |part| part.failed.as_ref().unwrap_or(&part.before));
+            self.ended(state, number, &requests, given.clone(), went, Failed::Nothing, nexts);
+            if let Some(part) = comes.parts.iter().find(|part| part.failed.is_some()) {
+                let broken = |(place, verdict): (usize, Option<Verdict>)| {
+                    (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
+                };
+                self.broke(state, number, &requests, given.into_iter().map(broken).collect(), nexts);
+            }
+            return;
+        }
+        let given_up: SmallVec<[ConfigId; 1]> = state
+            .stopped
+            .iter()
+            .filter_map(|(of, stop)| match stop {
+                Stop::GivenUp(Request { ask: Ask::UndoOf(id), .. }) if *of == number => Some(*id),
+                _ => None,
+            })
+            .collect();
+        let is_given_up = |place: usize| matches!(requests[place].ask, Ask::Apply(id) if given_up.contains(&id));
+        let Some(k) = comes.parts.iter().position(|part| is_given_up(part.place)) else {
+            // It is refused by now, or was.
+            return self.ends(state, number, nexts);
+        };
+        let part = &comes.parts[k];
+        let mut cancelled = Self::done_before(&requests, &comes, k, part.place);
+        let mut broken = cancelled.clone();
+        cancelled.push((part.place, Some(Verdict::Cancelled)));
+        self.ended(state, number, &requests, cancelled, &part.before, Failed::Nothing, nexts);
+        if part.failed.is_some() {
+            broken.push((part.place, Some(Verdict::Broken)));
+            self.broke(state, number, &requests, broken, nexts);
+        }
+    }
+
+    /// How a safe configuration may end.
+    pub(super) fn safe_ends(&mut self, state: &State, request: &Request, nexts: &mut Nexts) {
+        let mut over = state.clone();
+        over.safe.remove(0);
+        if let Some(top) = self.worlds.top(state.world) {
+            for verdict in [Verdict::Ok, Verdict::Broken] {
+                let mut next = over.clone();
+                next.world = self.worlds.answered(top, request, true);
+                self.tell(next, Answers::from_iter([(*request, verdict)]), Failed::Nothing, nexts);
+            }
+            return;
+        }
+        let comes = self.worlds.safe(state.world, request);
+        let from = nexts.all.len();
+        match &comes.done {
+            Ok(went) => {
+                let mut next = over.clone();
+                self.go(&mut next, went);
+                self.applied(&mut next, request, Verdict::Ok, went);
+                self.tell(next, Answers::from_iter([(*request, Verdict::Ok)]), Failed::Nothing, nexts);
+                nexts.all[from..].iter_mut().for_each(|next| next.deep = (went.deep, went.left));
+            }
+            Err(reasons) if request.requester != Requester::Operator => {
+                nexts.troubles.push(Trouble::Refused(*request, reasons.clone()));
+            }
+            Err(_) => {}
+        }
+        if comes.may_fail {
+            let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
+            let mut next = over;
+            next.world = self.worlds.topped(top, std::iter::once(request.ask));
+            next.unconfirmed.clear();
+            self.tell(next, Answers::from_iter([(*request, Verdict::Broken)]), Failed::Broken, nexts);
+        }
+        if request.requester == Requester::Operator {
+            nexts.all[from..].iter_mut().for_each(|next| next.by_hand = true);
+        }
+    }
+}
+
+impl Went {
+    /// To a world of which no frames are known.
+    pub(super) fn to(world: super::world::WorldId) -> Self {
+        Self { world, places: None, pushed: SmallVec::new(), deep: None, left: None }
+    }
+}

@@ -1,0 +1,462 @@
+//! What is judged of everything that was followed: findings, each with its own shortest way.
+
+use super::coordinator::{answers, place};
+use super::explore::{Bound, Graph};
+use super::product::{Failed, State, Trouble};
+use super::reactions::triggers;
+use super::trace::TraceStep;
+use crate::limits;
+use crate::model::codes::{
+    COORD_ENDLESS, COORD_LEFTOVERS, COORD_LOST_UNHEARD, COORD_NO_WAY_DOWN, COORD_REFUSED_BY_OTHER,
+    COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK,
+};
+use crate::model::{
+    Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,
+};
+use crate::stack::{Request, Requester, claims};
+use crate::statechart::{NodeId, RaiseSite, When};
+use crate::system::View;
+use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
+/// Findings with the ways to them; empty: there is none to tell.
+pub type Traced = Vec<(Finding, Vec<TraceStep>)>;
+
+impl Graph<'_, '_> {
+    /// Everything there is to say.
+    pub fn judge(&mut self) -> Traced {
+        let mut found = Traced::new();
+        self.refusals(&mut found);
+        self.growing(&mut found);
+        self.unheard(&mut found);
+        self.endless(&mut found);
+        let stuck = self.stuck(&mut found);
+        self.leftovers(&mut found);
+        self.ways_down(&stuck, &mut found);
+        self.safety(&mut found);
+        found.extend(self.product.worlds.warnings.iter().cloned().map(|finding| (finding, Vec::new())));
+        found
+    }
+
+    /// Which of the states comes first, in the order of failing and length.
+    fn firsts<T: Clone>(&self, list: &[(u32, T)]) -> Vec<(u32, T)> {
+        let order = self.in_order();
+        let mut rank = vec![0u32; order.len()];
+        (0u32..).zip(&order).for_each(|(place, at)| rank[*at as usize] = place);
+        let mut list = list.to_vec();
+        list.sort_by_key(|(at, _)| rank[*at as usize]);
+        list
+    }
+
+    fn refusals(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<(Requester, Ask, Code, String)> = FxHashSet::default();
+        for (at, trouble) in self.firsts(&self.troubles) {
+            let Trouble::Refused(request, reasons) = trouble else { continue };
+            let Some(first) = reasons.first() else { continue };
+            if !said.insert((request.requester, request.ask, first.code, first.message.clone())) {
+                continue;
+            }
+            let trace = self.trace(at);
+            let finding = self.refused(at, &request, &reasons);
+            // The reasons are findings of their own, each at its place.
+            let own = finding.code == COORD_REQUEST_REFUSED && self.failed[at as usize] == Failed::Nothing;
+            let severity = finding.severity;
+            found.push((finding, trace.clone()));
+            for reason in reasons.iter().filter(|reason| own && reason.origin.is_some()) {
+                let reason = Finding { severity: reason.severity.min(severity), ..reason.clone() };
+                found.push((reason, trace.clone()));
+            }
+        }
+    }
+
+    fn refused(&self, at: u32, request: &Request, reasons: &Rc<Findings>) -> Finding {
+        let state = &self.states[at as usize];
+        let why = reasons.first().map_or("", |f| f.message.as_str());
+        let class = match self.failed[at as usize] {
+            Failed::Nothing => Severity::Error,
+            Failed::Apply => Severity::Warning,
+            Failed::Undo | Failed::Broken => Severity::Info,
+        };
+        let ask = request.ask;
+        let Some(number) = self.product.member(request.requester) else {
+            return Finding::new(class, COORD_REQUEST_REFUSED, format!("`{ask}` is refused: {why}"));
+        };
+        let member = &self.product.members[number];
+        let others = self.blamed(state, request);
+        let maker = self.maker(number, state, ask);
+        let mut finding = if others.is_empty() {
+            let message = format!("`{ask}` is refused when it is asked for: {why}");
+            let shared = maker.is_some() || self.shares(number, ask) || !member.chart.is_pure();
+            let severity = if shared { class.min(Severity::Warning) } else { class };
+            Finding::new(severity, COORD_REQUEST_REFUSED, message)
+        } else {
+            let message =
+                format!("`{ask}` of `{}` is refused because of the frames of {}: {why}", member.name, others.join(" and "));
+            Finding::new(class.min(Severity::Warning), COORD_REFUSED_BY_OTHER, message)
+        };
+        if let Some(site) = self.site(number, request) {
+            finding = finding.at(site.origin).labelled("asked for here").path(place(member.chart, site.when));
+        }
+        for reason in reasons.iter().filter(|reason| reason.origin.is_some()).take(3) {
+            finding = finding.also(reason.origin, reason.message.clone());
+        }
+        let help = reasons.first().and_then(|f| f.help.clone());
+        finding.help(match (maker, others.is_empty()) {
+            (Some((other, by, component)), _) => format!(
+                "`{component}` comes with `{by}`, which `{other}` asks for: ask for this one when that is there, which \
+                 `{other}` can tell by an event"
+            ),
+            (None, true) => help.unwrap_or_else(|| "ask for it where it fits the system".to_owned()),
+            (None, false) => {
+                "give each coordinator components of its own, or let one ask the other by an event".to_owned()
+            }
+        })
+    }
+
+    /// Components that a request is about, in the state's world.
+    fn about(&self, state: &State, ask: Ask, by: Requester) -> BTreeSet<ComponentName> {
+        let mut about = BTreeSet::new();
+        if let Ask::Apply(id) | Ask::UndoOf(id) = ask
+            && let Some(configuration) = self.product.worlds.configuration(id)
+        {
+            about.extend(claims::components(configuration));
+        }
+        let frames = self.product.worlds.get(state.world).map(|world| world.stack.frames()).unwrap_or_default();
+        let pops = |id: ConfigId| match ask {
+            Ask::UndoOf(of) => of == id,
+            Ask::Undo => true,
+            _ => false,
+        };
+        let popped = frames.iter().rev().find(|frame| frame.requester == by && pops(frame.configuration));
+        for touch in popped.iter().flat_map(|frame| &frame.footprint.touches) {
+            let (a, b) = touch.slot.components();
+            about.extend([a, b]);
+        }
+        about
+    }
+
+    /// Those whose frames are in the way of a request: they share a component (or a group) with it, and without their frames
+    /// it would not be refused.
+    fn blamed(&self, state: &State, request: &Request) -> Vec<String> {
+        let Some(world) = self.product.worlds.get(state.world) else { return Vec::new() };
+        let strange = |requester: &Requester| *requester != request.requester;
+        if !world.stack.frames().iter().any(|frame| strange(&frame.requester))
+            || self.product.worlds.is_refused_alone(state.world, request)
+        {
+            return Vec::new();
+        }
+        let about = self.about(state, request.ask, request.requester);
+        let group = match request.ask {
+            Ask::Apply(id) => self.product.worlds.configuration(id).and_then(|c| c.group),
+            _ => None,
+        };
+        let mut others: Vec<Requester> = Vec::new();
+        for frame in world.stack.frames().iter().filter(|frame| strange(&frame.requester)) {
+            let touches = frame.footprint.touches.iter().any(|touch| {
+                let (a, b) = touch.slot.components();
+                about.contains(&a) || about.contains(&b)
+            });
+            if (touches || group.is_some() && frame.group == group) && !others.contains(&frame.requester) {
+                others.push(frame.requester);
+            }
+        }
+        let name = |by: &Requester| match self.product.member(*by) {
+            Some(number) => format!("`{}`", self.product.members[number].name),
+            None => "an operator".to_owned(),
+        };
+        others.iter().map(name).collect()
+    }
+
+    fn asked_by(&self, number: usize) -> BTreeSet<ConfigId> {
+        super::beside::asked(self.product.deployment, self.product.members[number].chart)
+    }
+
+    /// Whether other coordinators ask for configurations that touch what a request is about: then what it meets there may be
+    /// their doing.
+    fn shares(&self, number: usize, ask: Ask) -> bool {
+        let (Ask::Apply(id) | Ask::UndoOf(id)) = ask else { return false };
+        let Some(own) = self.product.worlds.configuration(id).map(claims::components) else { return false };
+        let meets = |id: &ConfigId| {
+            let other = self.product.worlds.configuration(*id).map(claims::components);
+            other.is_some_and(|other| other.intersection(&own).next().is_some())
+        };
+        let others = (0..self.product.members.len()).filter(|other| *other != number);
+        others.into_iter().any(|other| self.asked_by(other).iter().any(meets))
+    }
+
+    /// Who asks for a configuration that makes a component which is missing: the coordinator, the configuration and the
+    /// component.
+    fn maker(&self, number: usize, state: &State, ask: Ask) -> Option<(String, ConfigId, ComponentName)> {
+        let world = self.product.worlds.get(state.world)?;
+        let Ask::Apply(id) = ask else { return None };
+        let own = self.product.worlds.configuration(id)?;
+        let made: BTreeSet<ComponentName> = created(own).collect();
+        let missing: Vec<ComponentName> = claims::components(own)
+            .into_iter()
+            .filter(|component| !made.contains(component) && world.system.component(*component).is_none())
+            .collect();
+        let others = (0..self.product.members.len()).filter(|other| *other != number);
+        others.into_iter().find_map(|other| {
+            let asked = self.asked_by(other);
+            let configurations = asked.iter().filter_map(|id| self.product.worlds.configuration(*id));
+            let name = self.product.members[other].name.to_string();
+            let makes = |c: &Configuration| created(c).find(|component| missing.contains(component));
+            configurations.into_iter().find_map(|c| makes(c).map(|component| (name.clone(), c.id, component)))
+        })
+    }
+
+    /// The place that made a request, as far as it can be told.
+    fn site(&self, number: usize, request: &Request) -> Option<&RaiseSite> {
+        let name = request.ask.to_string();
+        let chart = self.product.members[number].chart;
+        let owner = request.tag.0.checked_sub(1).and_then(|at| chart.node(usize::try_from(at).ok()?));
+        let sites = || chart.raises().iter().filter(|site| site.name.as_str() == name);
+        sites().find(|site| matches!(site.when, When::Entry(node) if Some(node) == owner)).or_else(|| sites().next())
+    }
+
+    /// Configurations that are applied again and again.
+    fn growing(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<ConfigId> = FxHashSet::default();
+        for (at, id) in self.firsts(&self.deep) {
+            if !said.insert(id) {
+                continue;
+            }
+            let origin = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
+            let message = format!("going round applies `{id}` again and again without undoing it");
+            let finding = Finding::warning(COORD_STACK_GROWS, message).at(origin).help(format!(
+                "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
+            ));
+            let trace = self.trace(at);
+            found.push((finding, trace));
+        }
+    }
+
+    /// What is lost and nobody hears.
+    fn unheard(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<ConfigId> = FxHashSet::default();
+        for (at, trouble) in self.firsts(&self.troubles) {
+            let Trouble::Unheard(id) = trouble else { continue };
+            if !said.insert(id) {
+                continue;
+            }
+            let event = Verdict::Lost.event(Ask::Apply(id));
+            let place = self.product.place(&self.states[at as usize]);
+            let origin = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
+            let message = format!("nobody hears `{event}` in {place}, where `{id}` may be in force");
+            let finding = Finding::warning(COORD_LOST_UNHEARD, message)
+                .at(origin)
+                .labelled("stands for something that can be lost")
+                .path(format!("configurations.{id}"))
+                .help(format!("add a transition on `{event}` to a state around all in which `{id}` may be in force"));
+            let trace = self.trace(at);
+            found.push((finding, trace));
+        }
+    }
+
+    /// Circles of answers in which no time passes and no step fails.
+    fn endless(&mut self, found: &mut Traced) {
+        let mut out: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
+        for edge in self.edges.iter().filter(|edge| edge.quiet) {
+            out[edge.from as usize].push(edge.to);
+        }
+        let mut said: FxHashSet<Vec<NodeId>> = FxHashSet::default();
+        for at in self.in_order() {
+            // Not known what is answered there, so nothing can be said of circles.
+            if self.product.worlds.top(self.states[at as usize].world).is_some() {
+                continue;
+            }
+            let Some(circle) = circle(&out, at, limits::CHECK_CIRCLE) else { continue };
+            let mut leaves: Vec<NodeId> =
+                circle.iter().flat_map(|at| self.states[*at as usize].leaves.iter().copied()).collect();
+            leaves.sort_unstable();
+            leaves.dedup();
+            if !said.insert(leaves) {
+                continue;
+            }
+            let places: Vec<String> = circle.iter().map(|at| self.product.place(&self.states[*at as usize])).collect();
+            let mut named: Vec<String> = places.into_iter().map(|place| format!("`{place}`")).collect();
+            named.dedup();
+            named.truncate(6);
+            let leaf = self.states[at as usize].leaves[0];
+            let finding = Finding::warning(
+                COORD_ENDLESS,
+                format!("answers go round for ever, with nothing failing and no time passing: {}", named.join(", ")),
+            )
+            .at(self.product.members[0].chart.origin(leaf))
+            .help("wait for an event or for a time (`e_after(1.0)`) somewhere on the way round");
+            let trace = self.trace(at);
+            found.push((finding, trace));
+            // One that is entered from many places is told once.
+            if said.len() >= limits::CHECK_TOLD {
+                return;
+            }
+        }
+    }
+
+    /// Where nothing leads on.
+    fn stuck(&mut self, found: &mut Traced) -> FxHashSet<u32> {
+        let mut leads_on = vec![false; self.states.len()];
+        self.edges.iter().for_each(|edge| leads_on[edge.from as usize] = true);
+        let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
+        let mut stuck = FxHashSet::default();
+        let mut told: FxHashSet<Vec<NodeId>> = FxHashSet::default();
+        for at in self.in_order() {
+            let state = &self.states[at as usize];
+            let known = self.product.worlds.top(state.world).is_none();
+            let over = self.product.is_down(state) || self.ends.contains(&at) || troubled.contains(&at);
+            if leads_on[at as usize] || !self.followed[at as usize] || over || !known {
+                continue;
+            }
+            stuck.insert(at);
+            if self.product.members.len() > 1 || !told.insert(state.leaves.to_vec()) {
+                continue;
+            }
+            let finding = self.nothing_leads_on(state.leaves[0]);
+            let trace = self.trace(at);
+            found.push((finding, trace));
+        }
+        stuck
+    }
+
+    fn nothing_leads_on(&self, leaf: NodeId) -> Finding {
+        let (member, deployment) = (&self.product.members[0], self.product.deployment);
+        let (chart, fqn) = (member.chart, member.chart.fqn(leaf).to_string());
+        let awaited = answers(deployment, chart);
+        let names: BTreeSet<EventName> = triggers(chart, leaf).0.iter().filter_map(|e| member.name_of(*e)).collect();
+        let waits: Vec<String> = names.intersection(&awaited).map(|name| format!("`{name}`")).collect();
+        let finding = if waits.is_empty() {
+            Finding::warning(COORD_STUCK, format!("nothing leads on from `{fqn}`"))
+                .help(format!("add a transition from it, at least on `{}`", deployment.shutdown.event))
+        } else {
+            let message = format!(
+                "what `{fqn}` waits for never comes: {}, for on this way nothing is asked for that would be answered so",
+                waits.join(", ")
+            );
+            Finding::warning(COORD_STUCK, message).help(
+                "ask for it on the entry of the state, so that it is asked for on every way there; or add a transition on \
+                 an event from outside",
+            )
+        };
+        finding.at(chart.origin(leaf)).path(format!("coordinator.{fqn}"))
+    }
+
+    /// Ways down that leave something behind.
+    fn leftovers(&mut self, found: &mut Traced) {
+        let left = |state: &State| -> Vec<ComponentName> {
+            let mut names = Vec::new();
+            if let Some(world) = self.product.worlds.get(state.world).filter(|_| self.product.is_down(state)) {
+                world.system.for_each_component(&mut |node| names.push(node.name));
+            }
+            names.sort_unstable();
+            names
+        };
+        let first = self.in_order().into_iter().find_map(|at| {
+            let left = left(&self.states[at as usize]);
+            (!left.is_empty()).then_some((at, left))
+        });
+        let Some((at, left)) = first else { return };
+        if self.product.others {
+            return;
+        }
+        let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
+        let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
+        let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
+            .at(self.product.deployment.key_origin("shutdown.down"))
+            .path("shutdown.down")
+            .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
+        let trace = self.trace(at);
+        found.push((finding, trace));
+    }
+
+    /// From everywhere there is a way down. Only what was followed to the end counts: where events were not followed since
+    /// too many requests waited, their answers lead on.
+    fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
+        let cut = |bound: &Bound| matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Entered);
+        if self.bounds.keys().any(cut) {
+            return;
+        }
+        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
+        self.edges.iter().for_each(|edge| before[edge.to as usize].push(edge.from));
+        let forced = |state: &State| self.product.worlds.top(state.world).is_some();
+        let mut reaches: Vec<bool> =
+            self.states.iter().map(|state| self.product.is_down(state) || forced(state)).collect();
+        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
+        ends.for_each(|at| reaches[at as usize] = true);
+        // What the broken ends lead to is taken away by force: that is no way down of an intact system.
+        let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
+        open.retain(|at| !forced(&self.states[*at as usize]));
+        while let Some(at) = open.pop() {
+            for from in &before[at as usize] {
+                if !std::mem::replace(&mut reaches[*from as usize], true) {
+                    open.push(*from);
+                }
+            }
+        }
+        let several = self.product.members.len() > 1;
+        let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
+        let order = self.in_order();
+        let leaves: FxHashSet<&[NodeId]> = stuck.iter().map(|at| &self.states[*at as usize].leaves[..]).collect();
+        let first = if several {
+            // Where nothing leads on at all tells most.
+            let first = order.iter().copied().find(|at| lost(at) && stuck.contains(at));
+            first.or_else(|| order.iter().copied().find(lost))
+        } else {
+            order.iter().copied().find(|at| lost(at) && !leaves.contains(&self.states[*at as usize].leaves[..]))
+        };
+        let Some(at) = first else { return };
+        let deployment = self.product.deployment;
+        let state = &self.states[at as usize];
+        let finding = if several {
+            let message = format!("from {} no way leads down together", self.product.place(state));
+            Finding::warning(COORD_NO_WAY_DOWN, message)
+                .at(deployment.key_origin("shutdown.down"))
+                .path("shutdown.down")
+                .help("look at the trace: which of them waits for the other, and for what?")
+        } else {
+            let member = &self.product.members[0];
+            let (leaf, fqn) = (state.leaves[0], member.chart.fqn(state.leaves[0]).to_string());
+            let down = deployment.coordinator_named(member.name).map_or("", |c| c.down.as_str());
+            Finding::warning(COORD_NO_WAY_DOWN, format!("from `{fqn}` no way leads to `{down}`"))
+                .at(member.chart.origin(leaf))
+                .path(format!("coordinator.{fqn}"))
+                .also(deployment.key_origin("shutdown.down"), "the state that means down")
+                .help("add transitions that lead down from there")
+        };
+        let trace = self.trace(at);
+        found.push((finding, trace));
+    }
+}
+
+/// Components that a configuration makes.
+fn created(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
+    configuration.changes.iter().filter_map(|change| match &change.kind {
+        ChangeKind::Create { component, .. } => Some(*component),
+        _ => None,
+    })
+}
+
+/// A shortest circle through `at`, of at most so many states.
+fn circle(out: &[Vec<u32>], at: u32, most: usize) -> Option<Vec<u32>> {
+    let mut from: rustc_hash::FxHashMap<u32, u32> = rustc_hash::FxHashMap::default();
+    let mut queue = std::collections::VecDeque::from([at]);
+    while let Some(state) = queue.pop_front() {
+        for next in &out[state as usize] {
+            if *next == at {
+                let mut circle = vec![state];
+                let mut back = state;
+                while back != at {
+                    back = from[&back];
+                    circle.push(back);
+                }
+                circle.reverse();
+                return Some(circle);
+            }
+            if from.len() < most && !from.contains_key(next) {
+                from.insert(*next, state);
+                queue.push_back(*next);
+            }
+        }
+    }
+    None
+}

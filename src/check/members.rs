@@ -1,0 +1,107 @@
+//! The coordinators of a product.
+
+use super::coordinator::ask_of;
+use super::reactions::{Reaction, Reactions};
+use super::world::Undone;
+use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, OperatorMay};
+use crate::stack::Requester;
+use crate::statechart::{Chart, EventId, NodeId};
+use rustc_hash::FxHashSet;
+use std::rc::Rc;
+
+/// One of the coordinators.
+pub struct Member<'a> {
+    /// Its name.
+    pub name: Ident,
+    /// Its chart.
+    pub chart: &'a Chart,
+    /// Its state that means up.
+    pub up: Option<NodeId>,
+    /// The one that means down.
+    pub down: Option<NodeId>,
+    /// The name its frames go by.
+    pub by: Requester,
+    reactions: Option<Reactions<'a>>,
+}
+
+impl<'a> Member<'a> {
+    /// From now on it hears these events from outside.
+    pub fn listen(&mut self, deployment: &'a Deployment, outside: &[EventName]) {
+        self.reactions = Some(Reactions::new(deployment, self.chart, outside, self.down));
+    }
+
+    fn reactions(&mut self) -> &mut Reactions<'a> {
+        self.reactions.as_mut().expect("it listens since the product was made")
+    }
+
+    /// The first entry; none when the coordinator cannot be entered.
+    pub fn enter(&mut self) -> Option<Reaction> {
+        self.reactions().enter()
+    }
+
+    /// What happens in `leaf` when `event` comes.
+    pub fn react(&mut self, leaf: NodeId, event: EventId) -> Rc<Reaction> {
+        self.reactions().react(leaf, event)
+    }
+
+    /// Events from outside, and time events, that are heard in `leaf`.
+    pub fn offers(&mut self, leaf: NodeId) -> Rc<Vec<EventId>> {
+        self.reactions().offers(leaf)
+    }
+
+    /// Whether an event of that name leads anywhere from `leaf`.
+    pub fn takes(&mut self, leaf: NodeId, name: EventName) -> bool {
+        let event = self.chart.event(name);
+        event != EventId::OTHER && self.react(leaf, event).taken
+    }
+
+    /// The name of a listed event.
+    pub fn name_of(&self, event: EventId) -> Option<EventName> {
+        event.listed().and_then(|at| self.chart.events().get(at)).copied()
+    }
+}
+
+/// How the coordinator of that name is called in frames.
+///
+/// # Panics
+/// Never: a plain name is a component name without prefix.
+pub fn requester(name: Ident) -> Requester {
+    Requester::Coordinator(ComponentName::new(name.as_str()).expect("a plain name"))
+}
+
+/// The coordinators of these numbers, and which frames count with them.
+pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usize]) -> (Vec<Member<'a>>, Undone) {
+    let mut ids: FxHashSet<ConfigId> = FxHashSet::default();
+    // Replaced, taken back unasked, watched, or looked at by what may move.
+    let counts = deployment.configurations.iter();
+    ids.extend(
+        counts.filter(|c| c.group.is_some() || c.confirm.is_some() || c.holds.is_some() || c.safe).map(|c| c.id),
+    );
+    ids.extend(deployment.operator.iter().filter_map(|(may, _)| match may {
+        OperatorMay::Apply(id) => Some(*id),
+        OperatorMay::Set(_) => None,
+    }));
+    let mut undone = Undone { ids: None, bare: FxHashSet::default() };
+    let mut members = Vec::new();
+    for number in numbers {
+        let (coordinator, chart) = (&deployment.coordinators[*number], charts[*number]);
+        let by = requester(coordinator.name);
+        for site in chart.raises() {
+            match ask_of(deployment, site.name) {
+                Some(Ask::Undo | Ask::UndoTo(_)) => _ = undone.bare.insert(by),
+                Some(Ask::UndoOf(id)) => _ = ids.insert(id),
+                _ => {}
+            }
+        }
+        members.push(Member {
+            name: coordinator.name,
+            chart,
+            up: chart.find(&coordinator.up).ok(),
+            down: chart.find(&coordinator.down).ok(),
+            by,
+            reactions: None,
+        });
+    }
+    undone.ids = Some(ids);
+    (members, undone)
+}

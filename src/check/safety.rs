@@ -1,0 +1,114 @@
+//! Safety events: wherever an actuator exists, each must lead to a safe configuration without another event from outside.
+
+use super::explore::Graph;
+use super::judge::Traced;
+use super::product::{Move, Product, State};
+use crate::limits;
+use crate::model::codes::COORD_SAFETY_UNHEARD;
+use crate::model::{Ask, EventName, Finding, Severity};
+use crate::statechart::{EventId, NodeId};
+use rustc_hash::FxHashSet;
+
+impl Graph<'_, '_> {
+    /// One finding for each event that does not lead to a safe configuration somewhere.
+    pub(super) fn safety(&mut self, found: &mut Traced) {
+        let events: Vec<_> = self.product.deployment.safety.clone();
+        let order = self.in_order();
+        for (event, origin) in events {
+            let mut known: FxHashSet<(Vec<NodeId>, u32)> = FxHashSet::default();
+            let mut first: Option<u32> = None;
+            let mut places: Vec<String> = Vec::new();
+            for at in &order {
+                let state = &self.states[*at as usize];
+                let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_none());
+                if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
+                    continue;
+                }
+                let state = state.clone();
+                // In one place and one world, with nothing under way, it leads to one thing.
+                if state.desk.is_empty() && !known.insert((state.leaves.to_vec(), world)) {
+                    continue;
+                }
+                if leads_to_safe(self.product, &state, event) {
+                    continue;
+                }
+                first.get_or_insert(*at);
+                let place = format!("`{}`", self.product.place(&state));
+                if !places.contains(&place) {
+                    places.push(place);
+                }
+            }
+            let Some(at) = first else { continue };
+            let more = places.len().saturating_sub(6);
+            places.truncate(6);
+            let more = if more > 0 { format!(" and {more} more places") } else { String::new() };
+            let unknown = self.product.worlds.top(self.states[at as usize].world).is_some();
+            let severity = if unknown { Severity::Warning } else { Severity::Error };
+            let message = format!(
+                "`{event}` does not lead to a `safe` configuration in {}{more}, where an actuator {}",
+                places.join(", "),
+                if unknown { "may be there after something broke" } else { "is there" },
+            );
+            let finding = Finding::new(severity, COORD_SAFETY_UNHEARD, message).at(origin).path("safety").help(format!(
+                "add a transition on `{event}` to a state that asks for a `safe` configuration on its entry; one from the \
+                 outermost state in which actuators exist serves for all inside"
+            ));
+            let trace = self.trace(at);
+            found.push((finding, trace));
+        }
+    }
+}
+
+fn is_asked(product: &Product<'_>, state: &State) -> bool {
+    let is_safe = |ask: Ask| match ask {
+        Ask::Apply(id) => product.worlds.configuration(id).is_some_and(|c| c.safe),
+        _ => false,
+    };
+    let in_flight = state.flight.iter().any(|batch| batch.requests.iter().any(|request| is_safe(request.ask)));
+    product.worlds.is_safe(state.world) || !state.safe.is_empty() || in_flight
+}
+
+/// Whether `event` leads to a safe configuration from this state on every way on which nothing else comes from outside.
+fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName) -> bool {
+    if is_asked(product, state) {
+        return true;
+    }
+    let mut after = vec![state.clone()];
+    for number in 0..product.members.len() {
+        let id = product.members[number].chart.event(event);
+        if id != EventId::OTHER {
+            after = after.into_iter().flat_map(|state| product.react(state, number, id)).collect();
+        }
+    }
+    let mut walk = Walk { good: FxHashSet::default(), on_the_way: Vec::new() };
+    after.iter().all(|state| walk.leads(product, state))
+}
+
+/// Ways on which nothing comes from outside.
+struct Walk {
+    good: FxHashSet<State>,
+    on_the_way: Vec<State>,
+}
+
+impl Walk {
+    /// Whether every way from here comes to a safe configuration.
+    fn leads(&mut self, product: &mut Product<'_>, state: &State) -> bool {
+        if is_asked(product, state) || self.good.contains(state) {
+            return true;
+        }
+        // Round and round, or too far to be an answer to an emergency.
+        if self.on_the_way.len() >= limits::CHECK_CIRCLE || self.on_the_way.contains(state) {
+            return false;
+        }
+        let own = |by: &Move| matches!(by, Move::Answer | Move::Taken(..) | Move::Time(..));
+        let next: Vec<State> =
+            product.nexts(state).all.into_iter().filter(|next| own(&next.by)).map(|next| next.state).collect();
+        self.on_the_way.push(state.clone());
+        let leads = !next.is_empty() && next.iter().all(|next| self.leads(product, next));
+        self.on_the_way.pop();
+        if leads {
+            self.good.insert(state.clone());
+        }
+        leads
+    }
+}

@@ -1,0 +1,118 @@
+//! Ways: how the deployment comes from its start to what a finding is about.
+
+use crate::model::Verdict;
+use serde::Serialize;
+use std::fmt;
+
+/// One thing that happens on a way.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TraceStep {
+    /// What happens.
+    #[serde(flatten)]
+    pub what: Happened,
+    /// The innermost states of the coordinators then, in the order of the deployment.
+    pub states: Vec<Place>,
+}
+
+/// Where a coordinator is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Place {
+    /// The coordinator; none: there is only this one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinator: Option<String>,
+    /// The full name of its innermost state.
+    pub state: String,
+}
+
+/// What can happen on a way.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "what", rename_all = "lowercase")]
+pub enum Happened {
+    /// The coordinators are entered.
+    Start,
+    /// An event comes from outside.
+    Event {
+        /// Its name.
+        event: String,
+    },
+    /// Time passes for a coordinator.
+    Time {
+        /// The coordinator.
+        coordinator: String,
+        /// Its time event.
+        event: String,
+    },
+    /// A coordinator takes what another one has emitted, or what came from outside before.
+    Heard {
+        /// The coordinator.
+        coordinator: String,
+        /// The event.
+        event: String,
+    },
+    /// Requests are answered.
+    Answer {
+        /// The answers, in their order.
+        answers: Vec<Answered>,
+    },
+    /// A confirmation comes.
+    Confirmed {
+        /// The configuration whose frame waited for it.
+        configuration: String,
+    },
+    /// What a configuration stands for is no longer so.
+    Lost {
+        /// The configuration.
+        configuration: String,
+    },
+    /// An operator asks for something.
+    Operator {
+        /// The request.
+        request: String,
+    },
+    /// Coordinators that have nothing to do with these are down as well: what was in force is forgotten.
+    Down,
+}
+
+/// A request that is answered.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Answered {
+    /// Who asked: a coordinator, or `operator`.
+    pub by: String,
+    /// What was asked.
+    pub request: String,
+    /// The answer as an event.
+    pub answer: String,
+    /// How it ended.
+    pub verdict: Verdict,
+}
+
+impl fmt::Display for TraceStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.what {
+            Happened::Start => f.write_str("start")?,
+            Happened::Event { event } => f.write_str(event)?,
+            Happened::Time { coordinator, event } | Happened::Heard { coordinator, event } => match self.states.len() {
+                1 => f.write_str(event)?,
+                _ => write!(f, "{coordinator} hears {event}")?,
+            },
+            Happened::Answer { answers } => {
+                for (i, answered) in answers.iter().enumerate() {
+                    write!(f, "{}{}", if i == 0 { "" } else { ", " }, answered.answer)?;
+                }
+            }
+            Happened::Confirmed { configuration } => write!(f, "`{configuration}` is confirmed")?,
+            Happened::Lost { configuration } => write!(f, "{configuration}.lost")?,
+            Happened::Operator { request } => write!(f, "operator: {request}")?,
+            Happened::Down => f.write_str("the others are down")?,
+        }
+        f.write_str(" → ")?;
+        for (i, place) in self.states.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            match &place.coordinator {
+                Some(name) => write!(f, "{comma}{name}:{}", place.state)?,
+                None => write!(f, "{comma}{}", place.state)?,
+            }
+        }
+        Ok(())
+    }
+}

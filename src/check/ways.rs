@@ -1,0 +1,110 @@
+//! Bring-up and shutdown must work when everything goes well.
+
+use super::drive::{self, Way};
+use super::judge::Traced;
+use super::product::{Product, State};
+use super::trace::{Happened, TraceStep};
+use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
+use crate::model::{Code, Coordinator, Finding, Severity};
+use crate::system::View;
+
+/// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
+pub fn ways(product: &mut Product<'_>) -> Traced {
+    let operator = std::mem::take(&mut product.operator);
+    let ways = drive::ways(product);
+    product.operator = operator;
+    let Some((rise, fall)) = ways else { return Traced::new() };
+    let mut found = Traced::new();
+    let up = trace(product, &[&rise]);
+    let down = fall.as_ref().map(|fall| trace(product, &[&rise, fall]));
+    let (rises, falls) = (rise.reached, fall.as_ref().is_some_and(|fall| fall.reached));
+    let ways = [Some((&rise, &up)), fall.as_ref().zip(down.as_ref())];
+    // The reasons of a refusal are findings of their own, each at its place.
+    for (way, trace) in ways.into_iter().flatten() {
+        if let Some((_, reasons)) = &way.refused {
+            found.extend(reasons.iter().map(|reason| (reason.clone(), trace.clone())));
+        }
+    }
+    if !rises {
+        found.push((stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"), up));
+    }
+    let (Some(fall), Some(down)) = (fall, down) else { return found };
+    if !falls {
+        found.push((stops(product, &fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"), down));
+    } else if let Some(finding) = leftovers(product, fall.end()) {
+        found.push((finding, down));
+    }
+    for (finding, _) in &mut found {
+        // What functions decide is not known here.
+        if !product.members.iter().all(|member| member.chart.is_pure()) {
+            finding.severity = finding.severity.min(Severity::Warning);
+        }
+    }
+    found
+}
+
+/// The ways one after the other, as a trace from the start.
+fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
+    let mut steps = Vec::new();
+    for (number, way) in ways.iter().enumerate() {
+        if number == 0 {
+            steps.push(TraceStep { what: Happened::Start, states: product.places(&way.from) });
+        }
+        let told = way.moves.iter().map(|next| TraceStep { what: product.told(next), states: product.places(&next.state) });
+        steps.extend(told);
+    }
+    steps
+}
+
+fn stops(
+    product: &Product<'_>,
+    way: &Way,
+    code: Code,
+    key: &str,
+    goal: fn(&Coordinator) -> &String,
+    what: &str,
+) -> Finding {
+    let deployment = product.deployment;
+    let at = product.place(way.end());
+    let finding = match &way.refused {
+        Some((request, reasons)) => {
+            let why = reasons.first().map_or("", |f| f.message.as_str());
+            let message = format!("{what} stops at `{at}`: `{}` is refused, because {why}", request.ask);
+            let mut finding = Finding::error(code, message);
+            for reason in reasons.iter().filter(|reason| reason.origin.is_some()).take(4) {
+                finding = finding.also(reason.origin, reason.message.clone());
+            }
+            finding
+        }
+        None => {
+            let goals: Vec<String> = deployment.coordinators.iter().map(|c| format!("`{}`", goal(c))).collect();
+            let message = format!("{what} stops at `{at}` and never reaches {}", goals.join(", "));
+            let mut finding = Finding::error(code, message);
+            for (member, leaf) in product.members.iter().zip(&way.end().leaves) {
+                finding = finding.also(member.chart.origin(*leaf), "stops here, even if every request succeeds");
+            }
+            finding
+        }
+    };
+    let help = way.refused.as_ref().and_then(|(_, reasons)| reasons.first()).and_then(|reason| reason.help.clone());
+    let several = if product.members.len() > 1 { "one of them wait for that no other emits" } else { "the coordinator wait for at its end" };
+    let help = help.unwrap_or_else(|| format!("look at the trace: which event does {several}?"));
+    finding.help(help).at(deployment.key_origin(key)).path(key)
+}
+
+fn leftovers(product: &Product<'_>, end: &State) -> Option<Finding> {
+    let mut left = Vec::new();
+    product.worlds.get(end.world)?.system.for_each_component(&mut |node| left.push(node.name.to_string()));
+    left.sort();
+    if left.is_empty() {
+        return None;
+    }
+    let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
+    left.truncate(6);
+    let message = format!("the shutdown leaves {}{more} behind", left.join(", "));
+    let finding = Finding::error(DEPLOY_LEFTOVERS, message)
+        .at(product.deployment.key_origin("shutdown.down"))
+        .path("shutdown.down")
+        .help("let the coordinator undo what it applied, or apply a configuration that destroys what is left");
+    Some(finding)
+}
