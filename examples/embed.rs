@@ -38,6 +38,10 @@ impl Platform for Talkative {
         outcome
     }
 
+    fn cancel(&self, step: &Step) {
+        self.0.cancel(step);
+    }
+
     fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
         self.0.observe(deadline)
     }

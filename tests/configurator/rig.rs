@@ -113,6 +113,16 @@ macro_rules! leaves_to_inner {
         fn observe(&self, deadline: Time) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
             self.inner.observe(deadline)
         }
+        fn observe_some(
+            &self,
+            components: &[davit::model::ComponentName],
+            deadline: Time,
+        ) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
+            self.inner.observe_some(components, deadline)
+        }
+        fn cancel(&self, step: &davit::model::Step) {
+            self.inner.cancel(step);
+        }
         fn observe_component(
             &self,
             component: davit::model::ComponentName,
