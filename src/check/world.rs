@@ -14,7 +14,7 @@ use crate::model::{
 };
 use crate::plan::footprint::{Index, Slot};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
-use crate::stack::{Frame, Request, Requester, Stack, transaction};
+use crate::stack::{Frame, Op, Requester, Stack, transaction};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -88,7 +88,7 @@ pub struct Worlds<'a> {
 
 /// The context in which a deployment's configurations are planned.
 pub fn context(deployment: &Deployment) -> Context {
-    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>() }
+    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>(), avoid: BTreeSet::new() }
 }
 
 /// How a deployment's coordinator is called in frames.
@@ -292,15 +292,15 @@ pub fn apply(
     let mut places = Vec::new();
     for (i, ask) in asks.iter().enumerate() {
         let request = match ask {
-            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| Request::Push {
+            Ask::Apply(id) => deployment.configuration(*id).map(|configuration| Op::Push {
                 configuration,
                 requester,
                 at: Time::default(),
-                active: false,
+                scope: None,
             }),
-            Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Request::Undo(frame.id)),
-            Ask::Undo => Some(Request::UndoTop),
-            Ask::UndoTo(n) => Some(Request::UndoTo(*n)),
+            Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Op::Undo(frame.id)),
+            Ask::Undo => Some(Op::UndoTop),
+            Ask::UndoTo(n) => Some(Op::UndoTo(*n)),
             Ask::Commit => None,
         };
         // An undo of what is not there is answered *undone*.

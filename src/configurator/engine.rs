@@ -72,6 +72,9 @@ pub(super) struct Engine {
     pub steps: u64,
     /// Requests for safe configurations that have come and were not begun.
     pub safe: VecDeque<Request>,
+    /// What safe configurations under way could not plan, and what those that have ended touched.
+    pub troubles: Vec<(RequestId, Vec<Reason>)>,
+    pub touched: crate::transaction::Touched,
     /// Undos that give up what is under way, answered with it.
     pub giving_up: Vec<(u32, Request)>,
     /// Commands that wait.
@@ -120,6 +123,8 @@ impl Engine {
             numbers: 0,
             steps: 0,
             safe: VecDeque::new(),
+            troubles: Vec::new(),
+            touched: crate::transaction::Touched::default(),
             giving_up: Vec::new(),
             commands: VecDeque::new(),
             replies: Vec::new(),

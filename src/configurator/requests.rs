@@ -2,6 +2,7 @@
 
 use super::control::FrameView;
 use super::engine::{Confirming, Engine};
+use super::fast::Fared;
 use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
@@ -25,9 +26,8 @@ impl Engine {
         if let [request] = turn.batch.requests[..]
             && self.running.is_empty()
             && request.why == Why::Asked
-            && self.handle_fast(request)
+            && self.handle_fast(turn.number, request) != Fared::Not
         {
-            self.desk.over(turn.number);
             return;
         }
         self.take_up(turn.number);
@@ -84,9 +84,8 @@ impl Engine {
                 }
             }
             let spec = self.spec(&planned, false);
-            let begun = self.clock.now();
             let machine = Transaction::new(planned, spec);
-            let running = Running::new(self.number(), machine, Purpose::Requests(number, group), serves, begun);
+            let running = Running::new(self.number(), machine, Purpose::Requests(number, group), serves);
             self.running.push(running);
             return;
         }

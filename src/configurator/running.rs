@@ -42,16 +42,14 @@ pub(super) struct Running {
     pub purpose: Purpose,
     /// The request that each part of the plan serves, for the log.
     pub serves: SmallVec<[RequestId; 2]>,
-    pub begun: Time,
     flights: Vec<Flight>,
     read: Option<(Ticket, Time)>,
-    /// When each step that is out was begun is in its flight; these were begun in this thread.
     pub over: bool,
 }
 
 impl Running {
-    pub fn new(number: u64, machine: Transaction, purpose: Purpose, serves: SmallVec<[RequestId; 2]>, begun: Time) -> Self {
-        Self { number, machine, purpose, serves, begun, flights: Vec::new(), read: None, over: false }
+    pub fn new(number: u64, machine: Transaction, purpose: Purpose, serves: SmallVec<[RequestId; 2]>) -> Self {
+        Self { number, machine, purpose, serves, flights: Vec::new(), read: None, over: false }
     }
 
     pub fn is_safe(&self) -> bool {

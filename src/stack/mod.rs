@@ -27,6 +27,7 @@ pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
 pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
+pub use prepared::switch_frame;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::HandOver;
 pub use work::{Op, Part, Planned, transaction};

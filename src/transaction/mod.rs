@@ -96,6 +96,8 @@ pub enum Input {
     Release(Touched),
     /// Everything is taken down: nothing further begins, and nothing is taken back.
     TakenDown,
+    /// Nothing further begins, and what was done is taken back as after a failure.
+    Stop,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,6 +185,16 @@ impl Transaction {
         }
     }
 
+    /// Goes on where the first `done` steps were done already (the model has them) and the next has ended so.
+    pub fn resume(&mut self, done: u32, outcome: Outcome, live: &mut System) {
+        let forward = self.forward.as_mut().expect("it has not begun");
+        (0..done).for_each(|i| forward.was_done(i));
+        if (done as usize) < forward.list.len() {
+            forward.is_out(done, live);
+            self.on(Input::Ended { step: done, outcome }, live);
+        }
+    }
+
     /// What it carries out; its steps are those of [`Self::step`] now.
     pub fn planned(&self) -> &Planned {
         &self.planned
@@ -245,6 +257,18 @@ impl Transaction {
         open.map(|i| (&forward.list[i as usize], self.undo_of(i)))
     }
 
+    /// What failed so far, and what nobody knows of.
+    pub fn failures(&self) -> Vec<Reason> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let unknown = |i: &u32| Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout };
+        forward.failures.iter().map(|(_, reason)| reason.clone()).chain(forward.unsettled.iter().map(unknown)).collect()
+    }
+
+    /// The components that it is about.
+    pub fn components(&self) -> Vec<ComponentName> {
+        self.own()
+    }
+
     /// What came of it, once it is over.
     pub fn end(self) -> End {
         self.end.expect("it is over")
@@ -280,6 +304,12 @@ impl Transaction {
             Input::Release(touched) => {
                 self.held = false;
                 self.touched.join(touched);
+            }
+            Input::Stop => {
+                if self.phase == Phase::Forward {
+                    self.stopped_by.get_or_insert(Reason::TakenDown);
+                    self.cancel();
+                }
             }
             Input::TakenDown => {
                 self.stopped_by.get_or_insert(Reason::TakenDown);

@@ -198,6 +198,7 @@ impl Rig {
             configurations,
             catalogue,
             activities,
+            coordinators: BTreeSet::new(),
             platform: wrap(platform.clone()),
             clock: clock.clone(),
             limits,
@@ -233,7 +234,9 @@ impl Rig {
         };
         let mut next = self.next.lock().unwrap();
         *next += 1;
-        let request = Request { id: RequestId(*next), ask, requester, scoped: false, tag: (*next, 7) };
+        // The scenario's operator means it.
+        let force = requester == Requester::Operator;
+        let request = Request { force, tag: (*next, 7), ..Request::new(RequestId(*next), ask, requester) };
         self.submitted.lock().unwrap().push(request);
         request
     }

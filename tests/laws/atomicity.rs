@@ -4,7 +4,7 @@ use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
 use davit::plan::undo::rollback;
-use davit::stack::{Request, Stack, transaction};
+use davit::stack::{Op, Stack, transaction};
 use davit::system::step;
 use proptest::prelude::*;
 
@@ -31,7 +31,7 @@ proptest! {
             stack.commit(push);
         }
         let conf = read(last, &system);
-        let requests = [Request::UndoTop, operator(&conf)];
+        let requests = [Op::UndoTop, operator(&conf)];
         // A push, an undo, or the net of both.
         let requests = [&requests[..1], &requests[1..], &requests[..]][what as usize % 3];
         let Ok(transaction) = transaction(&system, &stack, requests, &context()) else { return Ok(()) };
@@ -57,7 +57,7 @@ proptest! {
         prop_assert_eq!(system.snapshot(), before);
         // The transaction was dropped: the stack is as before, and still fits the system.
         while !stack.is_empty() {
-            let pop = davit::stack::transaction(&system, &stack, &[Request::UndoTop], &context()).unwrap();
+            let pop = davit::stack::transaction(&system, &stack, &[Op::UndoTop], &context()).unwrap();
             for s in &pop.steps {
                 step::apply(&s.step, &mut system).unwrap();
             }

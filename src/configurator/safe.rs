@@ -1,0 +1,253 @@
+//! Safe configurations: applied at once and best effort, whatever is under way and also when something is broken.
+//!
+//! The frame it leaves is planned on the picture without what was interrupted: so it undoes to where the stack was before
+//! both, and what is rolled back around it does not matter to it.
+
+use super::engine::Engine;
+use super::request::{Reason, Request};
+use super::running::{Purpose, Running};
+use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
+use crate::plan::{PlannedStep, plan_on};
+use crate::stack::{Edits, Frame, Op, Planned, transaction};
+use crate::system::{Overlay, System, step};
+use crate::time::Time;
+use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
+use smallvec::SmallVec;
+use std::time::Duration;
+
+impl Engine {
+    /// Begins the safe configurations that were asked for. True: there were some.
+    pub(super) fn serve_safe(&mut self) -> bool {
+        if self.safe.is_empty() && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) == 0 {
+            return false;
+        }
+        self.glance();
+        let mut some = false;
+        while let Some(request) = self.safe.pop_front() {
+            self.owe(request);
+            self.begin_safe(request);
+            some = true;
+        }
+        if !some && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) > 0 {
+            // It was announced and is on its way.
+            self.pump(self.clock.now() + Duration::from_millis(1));
+        }
+        some
+    }
+
+    /// A safe configuration begins: what is under way is interrupted, and told so.
+    fn begin_safe(&mut self, request: Request) {
+        let Ask::Apply(id) = request.ask else { return };
+        let configurations = self.configurations.clone();
+        let Some(configuration) = configurations.get(&id) else { return };
+        let before = self.interrupt(id);
+        let frame = match before {
+            // The frame as it would be if what is interrupted had never been.
+            Some(before) => self.plan_safe(configuration, request, &before).0,
+            None => None,
+        };
+        let system = self.world.system.clone();
+        let (own, planned, troubles) = self.plan_whole(configuration, request, &system);
+        let frame = frame.or(own);
+        let mut touched = Touched::default();
+        for entry in configuration.pre.iter().chain(&configuration.post) {
+            if let Target::Component(component) = entry.target {
+                touched.add_state(component);
+            }
+        }
+        planned.steps.iter().for_each(|planned| touched.add(&planned.step));
+        for planned in frame.iter().flat_map(|frame| frame.steps()) {
+            touched.add(&planned.step);
+        }
+        self.troubles.push((request.id, troubles));
+        let spec = Spec {
+            until: Time::NEVER,
+            timeout: Duration::ZERO,
+            patience: self.limits.step_timeout,
+            best_effort: true,
+            asked_back: false,
+        };
+        let purpose = Purpose::Safe(Box::new((request, frame, touched)));
+        let machine = Transaction::new(planned, spec);
+        let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
+        self.running.insert(0, running);
+        // Now, not after what else waits to go on.
+        self.advance(0);
+    }
+
+    /// Interrupts what is under way; the picture without it, if it has done anything.
+    fn interrupt(&mut self, id: ConfigId) -> Option<System> {
+        let mut before: Option<System> = None;
+        for at in 0..self.running.len() {
+            let running = &mut self.running[at];
+            if running.is_safe() || running.over {
+                continue;
+            }
+            running.machine.on(Input::Interrupt(id), &mut self.world.system);
+            let done: Vec<_> = running.machine.done_so_far().map(|(_, undo)| undo.clone()).collect();
+            if !done.is_empty() {
+                let picture = before.get_or_insert_with(|| self.world.system.clone());
+                for undo in done.iter().rev() {
+                    for back in undo.steps() {
+                        let _ = step::apply(back, picture);
+                    }
+                }
+            }
+            // Calls that are out are told first.
+            self.advance(at);
+        }
+        before
+    }
+
+    /// A safe configuration planned as a frame on a system, if it can be.
+    fn plan_safe(&self, configuration: &Configuration, request: Request, system: &System) -> (Option<Frame>, Option<Planned>) {
+        let Request { requester, scope, .. } = request;
+        let op = Op::Push { configuration, requester, at: self.clock.now(), scope };
+        match transaction(system, &self.world.stack, &[op], &self.context) {
+            Ok(planned) => {
+                let frame = planned.parts[0].edits.push.as_deref().cloned();
+                (frame, Some(planned))
+            }
+            Err(_) => (None, None),
+        }
+    }
+
+    /// A safe configuration as far as it can be planned, whole or piece by piece, with why pieces cannot.
+    pub(super) fn plan_whole(
+        &self,
+        configuration: &Configuration,
+        request: Request,
+        system: &System,
+    ) -> (Option<Frame>, Planned, Vec<Reason>) {
+        if let (frame, Some(planned)) = self.plan_safe(configuration, request, system) {
+            return (frame, planned, Vec::new());
+        }
+        let mut view = Overlay::new(system);
+        let mut steps: Vec<PlannedStep> = Vec::new();
+        let mut troubles = Vec::new();
+        let (mut footprint, mut saved) = (crate::plan::footprint::Footprint::default(), Vec::new());
+        for piece in pieces(configuration) {
+            let mut trial = view.clone();
+            match plan_on(&mut trial, &piece, &self.context) {
+                Ok(plan) => {
+                    view = trial;
+                    let base = steps.len() as u32;
+                    let wave = steps.last().map_or(0, |step| step.wave + 1);
+                    footprint.touches.extend(plan.footprint.touches);
+                    saved.extend(plan.saved.into_iter().map(|mut value| {
+                        value.at += base;
+                        value
+                    }));
+                    for mut planned in plan.steps {
+                        planned.id += base;
+                        planned.wave += wave;
+                        planned.after.iter_mut().for_each(|id| *id += base);
+                        steps.push(planned);
+                    }
+                }
+                Err(refusal) => troubles.push(Reason::Refused(refusal.findings)),
+            }
+        }
+        let frame = Frame {
+            id: crate::stack::FrameId(u64::MAX),
+            configuration: configuration.id,
+            group: configuration.group,
+            requester: request.requester,
+            at: self.clock.now(),
+            inverse: crate::stack::Inverse::Steps(steps.clone()),
+            footprint,
+            saved,
+            floor: crate::plan::irreversible(&steps).map(str::to_owned),
+            parts: std::collections::BTreeSet::new(),
+            acts: Vec::new(),
+            scope: request.scope,
+            partial: !troubles.is_empty(),
+            safe: true,
+        };
+        let part = crate::stack::Part {
+            range: 0..steps.len() as u32,
+            edits: Edits::default(),
+            pushes: Some(configuration.id),
+            on_failure: configuration.on_failure,
+            frame: Some(std::sync::Arc::new(frame.clone())),
+        };
+        let planned = Planned {
+            steps,
+            of: Vec::new(),
+            whole: Vec::new(),
+            parts: vec![part],
+            revision: system.revision(),
+            warnings: Vec::new(),
+            popped: Vec::new(),
+        };
+        (Some(frame), planned, troubles)
+    }
+
+    /// A safe configuration has been applied as far as it goes: its frame is pushed, it is answered, and what it interrupted
+    /// goes back.
+    pub(super) fn safe_ended(&mut self, safe: (Request, Option<Frame>, Touched), machine: Transaction) {
+        let (request, frame, touched) = safe;
+        let edits = machine.planned().parts[0].edits.pops.clone();
+        let end = machine.end();
+        let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
+        let mut troubles = troubles.map(|at| self.troubles.remove(at).1).unwrap_or_default();
+        let mut broken = None;
+        if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
+            broken = Some(part);
+        }
+        self.world.stack.apply([&Edits { pops: edits, push: None }], &[]);
+        let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
+        let frame = match (&broken, interrupted) {
+            (Some(part), false) => part.frame.clone().map(|part| Frame { partial: true, ..part }),
+            _ => frame.map(|frame| Frame { partial: frame.partial || broken.is_some(), ..frame }),
+        };
+        let pushed = frame.map(|frame| self.world.stack.push(Frame { safe: true, ..frame }));
+        let (verdict, reason) = match broken {
+            None if troubles.is_empty() => (Verdict::Ok, None),
+            None => {
+                let residual = crate::stack::Residual::of(troubles.swap_remove(0));
+                (Verdict::Broken, Some(Reason::Broken(std::sync::Arc::new(residual))))
+            }
+            Some(part) => {
+                let residual = part.residual.clone();
+                let part = crate::transaction::BrokenPart { frame: None, instead: None, ..*part };
+                self.left_broken(&request, part);
+                if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
+                    last.frame = pushed;
+                }
+                (Verdict::Broken, Some(Reason::Broken(residual)))
+            }
+        };
+        self.forget_confirmations();
+        self.changed();
+        if verdict == Verdict::Ok
+            && let Some(frame) = pushed
+        {
+            self.await_confirmation(request, frame);
+        }
+        self.answer(request, verdict, reason);
+        self.release(touched);
+    }
+
+    /// What was interrupted goes back, once no safe configuration is being applied any more.
+    fn release(&mut self, touched: Touched) {
+        self.touched.join(touched);
+        if self.running.iter().any(|running| running.is_safe() && !running.over) {
+            return;
+        }
+        let touched = std::mem::take(&mut self.touched);
+        for running in self.running.iter_mut().filter(|running| !running.is_safe() && !running.over) {
+            running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
+        }
+    }
+}
+
+/// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.
+fn pieces(whole: &Configuration) -> Vec<Configuration> {
+    let empty = || Configuration::new(whole.id);
+    let pre = whole.pre.iter().map(|entry| Configuration { pre: vec![*entry], ..empty() });
+    let changes =
+        whole.changes.iter().map(|change: &Change| Configuration { changes: vec![change.clone()], ..empty() });
+    let post = whole.post.iter().map(|entry| Configuration { post: vec![*entry], ..empty() });
+    pre.chain(changes).chain(post).collect()
+}
