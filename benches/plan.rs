@@ -136,7 +136,7 @@ fn switches(c: &mut Criterion) {
                     black_box(prepared.sends(act));
                     prepared.done(act, &mut system);
                 }
-                stack.push_switch(&prepared, Requester::Operator, Time(0), false);
+                stack.push_switch(&prepared, Requester::Operator, Time(0), None);
                 let top = stack.top_of(&prepared).expect("just pushed");
                 assert!(prepared.ready_undo(&system, &top.acts, &top.saved));
                 for i in 0..prepared.acts().len() {

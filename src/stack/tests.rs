@@ -203,7 +203,7 @@ fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(3);
     let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
     let scoped = of(1);
-    let request = Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), active: true };
+    let request = Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) };
     let kept = bench.ok(&[request]).1[0];
     for n in 2..9 {
         bench.ok(&[push(&of(n))]);
@@ -221,7 +221,7 @@ fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(2);
     for n in 0..2 {
         let conf = of(n);
-        bench.ok(&[Op::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), active: true }]);
+        bench.ok(&[Op::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) }]);
     }
     assert_eq!(bench.codes(&[push(&of(3))]), ["stack::full"]);
 }

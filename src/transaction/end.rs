@@ -183,7 +183,7 @@ impl Transaction {
         // Where the way back to before is not known to be gone, what remains is told as a difference.
         let remaining = if whole { Vec::new() } else { self.remaining(part) };
         let forward = self.forward.as_ref().expect("it was carried out");
-        let mut residual = Residual {
+        let residual = Residual {
             left: remaining.iter().map(|i| forward.list[*i as usize].step.clone()).collect(),
             withheld: self.withheld.clone(),
             difference,
@@ -198,7 +198,6 @@ impl Transaction {
             observed: observed || !(self.doubted || !unsettled.is_empty()),
             ..Residual::of(self.reason())
         };
-        residual.left.retain(|step| !residual.irreversible.contains(step));
         self.unsettled = unsettled;
         let clean = residual.is_settled() && remaining.is_empty();
         let missing = self.missing(part);

@@ -63,7 +63,7 @@ proptest! {
                     continue;
                 }
                 act(&mut fast, switch)?;
-                fast.stack.push_switch(switch, Requester::Operator, Time(1), false);
+                fast.stack.push_switch(switch, Requester::Operator, Time(1), None);
                 pushed += 1;
                 prop_assert_eq!(fast.system.snapshot(), plain.system.snapshot());
                 let (a, b) = (fast.stack.top().unwrap(), plain.stack.top().unwrap());

@@ -6,7 +6,7 @@ use crate::plans::{every_order, operator, show};
 use crate::settings;
 use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
 use davit::plan::{PlannedStep, Refusal, Stage};
-use davit::stack::{FrameId, Op, Stack, Planned, transaction};
+use davit::stack::{FrameId, Op, Scope, Stack, Planned, transaction};
 use davit::system::{System, View, step};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ impl Both {
         transaction(&self.system, &self.stack, requests, &context())
     }
 
-    pub fn execute(&mut self, transaction: Transaction) -> Vec<FrameId> {
+    pub fn execute(&mut self, transaction: Planned) -> Vec<FrameId> {
         for s in &transaction.steps {
             step::apply(&s.step, &mut self.system)
                 .unwrap_or_else(|v| panic!("{}: {v:?} in {:?}", s.step, show(&transaction.steps)));
@@ -212,7 +212,7 @@ proptest! {
             let now = large.system.snapshot();
             let active = i < 2 && keep & (1 << i) != 0;
             let request = [match operator(&conf) {
-                Op::Push { configuration, requester, at, .. } => Op::Push { configuration, requester, at, active },
+                Op::Push { configuration, requester, at, .. } => Op::Push { configuration, requester, at, scope: active.then_some(Scope(1)) },
                 other => other,
             }];
             let Ok(pushed) = small.make(&request) else {
