@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use davit::model::*;
 use davit::plan::prepare::Switch;
 use davit::plan::{Context, plan};
-use davit::stack::{Request, Requester, Stack, transaction};
+use davit::stack::{Op, Requester, Stack, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::collections::BTreeMap;
@@ -113,7 +113,7 @@ fn switches(c: &mut Criterion) {
         let mut stack = Stack::new(64);
         let context = Context::default();
         let push =
-            |configuration| Request::Push { configuration, requester: Requester::Operator, at: Time(0), active: false };
+            |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let (eight, five) = (switch("eight", 2.0), switch("five", 3.0));
         let first = transaction(&system, &stack, &[push(&eight)], &context).expect("accepted");
         for s in &first.steps {
@@ -121,7 +121,7 @@ fn switches(c: &mut Criterion) {
         }
         stack.commit(first);
         group.bench_with_input(BenchmarkId::new("net of undo and push", n), &n, |b, _| {
-            b.iter(|| transaction(&system, &stack, &[Request::UndoTop, push(&five)], &context).expect("accepted"));
+            b.iter(|| transaction(&system, &stack, &[Op::UndoTop, push(&five)], &context).expect("accepted"));
         });
     }
     for n in [10, 10_000] {
@@ -136,7 +136,7 @@ fn switches(c: &mut Criterion) {
                     black_box(prepared.sends(act));
                     prepared.done(act, &mut system);
                 }
-                stack.push_switch(&prepared, Requester::Operator, Time(0), false);
+                stack.push_switch(&prepared, Requester::Operator, Time(0), None);
                 let top = stack.top_of(&prepared).expect("just pushed");
                 assert!(prepared.ready_undo(&system, &top.acts, &top.saved));
                 for i in 0..prepared.acts().len() {

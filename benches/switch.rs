@@ -126,6 +126,7 @@ impl Switched {
             configurations: configurations(others),
             catalogue: libraries().catalogue(),
             activities: BTreeSet::from([loop_]),
+            coordinators: BTreeSet::new(),
             platform,
             clock: clock.clone(),
             limits: DeploymentLimits::default(),
@@ -143,7 +144,7 @@ impl Switched {
     fn ask(&mut self, clock: &Clock, ask: Ask) -> (u64, u64) {
         self.asked += 1;
         let id = RequestId(self.asked);
-        let request = Request { id, ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+        let request = Request { force: true, ..Request::new(id, ask, Requester::Operator) };
         let begun = clock.now();
         self.handle.submit(Batch::one(request)).expect("room");
         let answer = self.answers.recv().expect("an answer");

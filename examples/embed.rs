@@ -38,6 +38,10 @@ impl Platform for Talkative {
         outcome
     }
 
+    fn cancel(&self, step: &Step) {
+        self.0.cancel(step);
+    }
+
     fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
         self.0.observe(deadline)
     }
@@ -106,6 +110,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         configurations: loaded.configurations,
         catalogue,
         activities: BTreeSet::new(),
+        coordinators: BTreeSet::new(),
         platform,
         clock: clock.clone(),
         limits: DeploymentLimits::default(),
@@ -120,13 +125,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (number, ask) in [apply("build")?, apply("fast")?, Ask::Undo, Ask::Undo].into_iter().enumerate() {
         println!("{ask}");
         let id = RequestId(number as u64);
-        configurator.submit(Batch::one(Request {
-            id,
-            ask,
-            requester: Requester::Operator,
-            scoped: false,
-            tag: (0, 0),
-        }))?;
+        configurator.submit(Batch::one(Request::new(id, ask, Requester::Operator)))?;
         let answer = answers.recv_deadline(clock.now() + Duration::from_secs(5))?;
         println!("  = {}", answer.event());
     }

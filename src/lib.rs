@@ -24,3 +24,4 @@ pub mod plan;
 pub mod stack;
 pub mod system;
 pub mod time;
+pub mod transaction;

@@ -4,7 +4,7 @@
 use davit::model::*;
 use davit::plan::prepare::{Act, Switch};
 use davit::plan::{Context, plan};
-use davit::stack::{Requester, Stack};
+use davit::stack::{Requester, Scope, Stack};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::alloc::{GlobalAlloc, Layout};
@@ -122,7 +122,7 @@ fn a_prepared_switch_allocates_nothing() {
         assert!(stack.takes(switch));
         assert!(switch.ready(system));
         perform(switch, system);
-        stack.push_switch(switch, Requester::Operator, Time(1), true);
+        stack.push_switch(switch, Requester::Operator, Time(1), Some(Scope(1)));
         let top = stack.top_of(switch).expect("it was just pushed");
         assert!(switch.ready_undo(system, &top.acts, &top.saved));
         perform(switch, system);

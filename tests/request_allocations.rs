@@ -83,6 +83,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         configurations: configurations(),
         catalogue: libraries.catalogue(),
         activities: BTreeSet::from([name]),
+        coordinators: BTreeSet::new(),
         platform,
         clock: clock.clone(),
         limits: DeploymentLimits::default(),
@@ -93,7 +94,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
     let mut next = 0;
     let mut ask = |ask: Ask| {
         next += 1;
-        let request = Request { id: RequestId(next), ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+        let request = Request { force: true, ..Request::new(RequestId(next), ask, Requester::Operator) };
         handle.submit(Batch::one(request)).expect("room");
         let answer = answers.recv_deadline(clock.now() + Duration::from_secs(60)).expect("an answer");
         assert!(answer.verdict.is_success(), "{answer:?}");

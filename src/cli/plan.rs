@@ -11,7 +11,7 @@ use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_N
 use crate::model::finding::{configuration, did_you_mean, has_errors};
 use crate::model::{Ask, ConfigId, Finding, Findings, Snapshot};
 use crate::plan::PlannedStep;
-use crate::stack::{Request, Requester, Stack, transaction};
+use crate::stack::{Op, Requester, Stack, transaction};
 use crate::system::{Reversibility, System, step};
 use crate::time::Time;
 use std::sync::Arc;
@@ -140,14 +140,14 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     if has_errors(&wrong) {
         return Err(wrong);
     }
-    let context = crate::plan::Context { activities: deployment.activities.keys().copied().collect() };
+    let context = crate::plan::Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
     let mut system = System::new(Arc::new(read.catalogue.clone()));
     let mut stack = Stack::new(deployment.limits.stack);
     let mut planned = Vec::new();
     for id in ids {
         let Some(configuration) = deployment.configuration(id) else { continue };
         let request =
-            Request::Push { configuration, requester: Requester::Operator, at: Time::default(), active: false };
+            Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
         let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| {
             let mut findings = refusal.findings;
             if let Some(first) = findings.first_mut().filter(|_| names.is_empty()) {

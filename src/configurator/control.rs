@@ -20,6 +20,8 @@ pub struct FrameView {
     pub floor: bool,
     /// How many frames were squashed into it; 1 for a plain frame.
     pub parts: usize,
+    /// It is what was done and not taken back of something that ended *broken*.
+    pub partial: bool,
 }
 
 /// What is under way.
@@ -44,8 +46,10 @@ pub struct View {
     pub busy: Option<Busy>,
     /// Requests that wait.
     pub waiting: usize,
-    /// Why the system is broken, if it is.
+    /// What is broken longest, if anything is.
     pub broken: Option<Arc<Residual>>,
+    /// All that is broken.
+    pub residuals: Vec<Arc<Residual>>,
     /// Components whose call has not returned.
     pub quarantined: Vec<ComponentName>,
 }
@@ -105,6 +109,8 @@ pub(super) enum Command {
     Drift { reply: Sender<Drift> },
     Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
     TakeDown { forced: bool, deadline: Time, reply: Sender<TakenDown> },
+    /// A coordinator has come to its *down* state.
+    Down(Requester),
     DiscardStack,
     Stop,
 }

@@ -1,4 +1,5 @@
-//! The configurator's own thread: takes up requests one batch after the other, safe ones first, and survives itself.
+//! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; and it survives
+//! itself.
 
 use super::AnswerSink;
 use super::control::{Busy, Command, View};
@@ -6,88 +7,31 @@ use super::fast::Fast;
 use super::inbox::{Counts, Mail};
 use super::pool::{Pool, Reply, Ticket};
 use super::progress::{Progress, ProgressSink};
-use super::request::{Answer, Batch, Reason, Request, Residual};
-use super::transaction::{Interruption, Left};
+use super::request::{Answer, Reason, Request};
+use super::running::Running;
 use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RunState, Snapshot, Verdict,
+    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, RunState, Snapshot, Verdict,
 };
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
-use crate::stack::{Requester, Stack};
-use crate::system::System;
+use crate::stack::claims::Claims;
+use crate::stack::{Batch, Desk, FrameId, Requester, Why, World};
 use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// The system is neither as before an application nor as after it.
-pub(super) struct Broken {
-    pub residual: Arc<Residual>,
-    /// The system as it should be.
-    pub expected: System,
-    /// The configuration whose application broke it, and who asked: its undo recovers.
-    pub culprit: Option<(ConfigId, Requester)>,
-    /// May be mended without being asked, when a component comes back.
-    pub mendable: bool,
-}
-
 /// A frame that waits for its confirmation.
 pub(super) struct Confirming {
     pub request: Request,
+    pub frame: FrameId,
     pub event: EventName,
     pub within: Duration,
     pub until: Time,
-}
-
-pub(super) struct Engine {
-    pub clock: Clock,
-    pub platform: Arc<dyn Platform>,
-    pub limits: DeploymentLimits,
-    pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
-    pub context: Context,
-    pub system: System,
-    pub stack: Stack,
-    pub pool: Pool,
-    pub inbox: Receiver<Mail>,
-    pub counts: Arc<Counts>,
-    pub answers: AnswerSink,
-    pub progress: Option<ProgressSink>,
-    /// Batches that have not begun.
-    pub queue: VecDeque<Batch>,
-    /// Commands that wait.
-    pub commands: VecDeque<Command>,
-    pub replies: Vec<(Ticket, Reply)>,
-    pub given_up: FxHashSet<Ticket>,
-    pub broken: Option<Broken>,
-    /// The picture as it should be, when a panic came in the middle of an application.
-    pub expected: Option<System>,
-    pub quarantined: Vec<ComponentName>,
-    /// Components that were reported faulted and not looked at since.
-    pub suspects: Vec<ComponentName>,
-    /// A component came back: a broken system may be mended.
-    pub returned: bool,
-    /// Prepared switches.
-    pub switches: FxHashMap<ConfigId, Box<Fast>>,
-    pub confirming: Vec<Confirming>,
-    /// Confirming events that came since the request under way began.
-    pub heard: Vec<EventName>,
-    /// The time of the configuration that is carried out.
-    pub allowed: Duration,
-    /// How long one step may take.
-    pub patience: Duration,
-    /// Requests that have begun and were not answered.
-    pub current: SmallVec<[(Request, Time); 4]>,
-    pub revision: u64,
-    /// Kept for the next view, with what it is a picture of: a picture read back counts its revisions from anew, so the
-    /// view's own revision belongs to it.
-    snapshot: Option<((u64, u64), Arc<Snapshot>)>,
-    /// The safe configurations that a forced teardown has applied already, and what they could not do.
-    pub forced_safe: Option<(Vec<ConfigId>, Vec<Reason>)>,
-    pub stopping: bool,
 }
 
 /// What a configurator is made of.
@@ -97,6 +41,7 @@ pub(super) struct Parts {
     pub limits: DeploymentLimits,
     pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
     pub context: Context,
+    pub coordinators: BTreeSet<Requester>,
     pub pool: Pool,
     pub inbox: Receiver<Mail>,
     pub counts: Arc<Counts>,
@@ -104,40 +49,97 @@ pub(super) struct Parts {
     pub progress: Option<ProgressSink>,
 }
 
+pub(super) struct Engine {
+    pub clock: Clock,
+    pub platform: Arc<dyn Platform>,
+    pub limits: DeploymentLimits,
+    pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
+    pub context: Context,
+    pub claims: Claims,
+    pub pool: Pool,
+    inbox: Receiver<Mail>,
+    pub counts: Arc<Counts>,
+    answers: AnswerSink,
+    pub progress: Option<ProgressSink>,
+    /// System, stack and what is broken.
+    pub world: World,
+    /// Who waits for whom.
+    pub desk: Desk,
+    /// Transactions under way, and how many there were.
+    pub running: Vec<Running>,
+    pub numbers: u64,
+    /// Steps that have ended.
+    pub steps: u64,
+    /// Requests for safe configurations that have come and were not begun.
+    pub safe: VecDeque<Request>,
+    /// What safe configurations under way could not plan, and what those that have ended touched.
+    pub troubles: Vec<(RequestId, Vec<Reason>)>,
+    pub touched: crate::transaction::Touched,
+    /// Undos that give up what is under way, answered with it.
+    pub giving_up: Vec<(u32, Request)>,
+    /// Commands that wait.
+    pub commands: VecDeque<Command>,
+    replies: Vec<(Ticket, Reply)>,
+    given_up: FxHashSet<Ticket>,
+    /// Components that were reported faulted and not looked at since, and looks that are under way.
+    pub suspects: Vec<ComponentName>,
+    looks: Vec<(Ticket, ComponentName, Time)>,
+    /// A component came back: what is broken may be mended.
+    pub returned: bool,
+    /// Prepared switches.
+    pub switches: FxHashMap<ConfigId, Box<Fast>>,
+    pub confirming: Vec<Confirming>,
+    /// Confirming events that came while something was under way.
+    pub heard: Vec<(EventName, Time)>,
+    /// Coordinators, and those that are down.
+    coordinators: BTreeSet<Requester>,
+    pub down: BTreeSet<Requester>,
+    /// Requests that have begun and were not answered.
+    pub current: SmallVec<[(Request, Time); 4]>,
+    pub revision: u64,
+    /// Kept for the next view, with what it is a picture of.
+    snapshot: Option<((u64, u64), Arc<Snapshot>)>,
+    pub stopping: bool,
+}
+
 impl Engine {
-    pub fn new(parts: Parts, system: System) -> Self {
-        let stack = Stack::new(parts.limits.stack);
+    pub fn new(parts: Parts, world: World) -> Self {
+        let claims = Claims::new(parts.configurations.values());
         Self {
             clock: parts.clock,
             platform: parts.platform,
             limits: parts.limits,
             configurations: parts.configurations,
             context: parts.context,
-            system,
-            stack,
+            claims,
             pool: parts.pool,
             inbox: parts.inbox,
             counts: parts.counts,
             answers: parts.answers,
             progress: parts.progress,
-            queue: VecDeque::new(),
+            world,
+            desk: Desk::default(),
+            running: Vec::new(),
+            numbers: 0,
+            steps: 0,
+            safe: VecDeque::new(),
+            troubles: Vec::new(),
+            touched: crate::transaction::Touched::default(),
+            giving_up: Vec::new(),
             commands: VecDeque::new(),
             replies: Vec::new(),
             given_up: FxHashSet::default(),
-            broken: None,
-            expected: None,
-            quarantined: Vec::new(),
             suspects: Vec::new(),
+            looks: Vec::new(),
             returned: false,
             switches: FxHashMap::default(),
             confirming: Vec::new(),
             heard: Vec::new(),
-            allowed: Duration::ZERO,
-            patience: parts.limits.step_timeout,
+            coordinators: parts.coordinators,
+            down: BTreeSet::new(),
             current: SmallVec::new(),
             revision: 0,
             snapshot: None,
-            forced_safe: None,
             stopping: false,
         }
     }
@@ -150,6 +152,7 @@ impl Engine {
                 // A panic while starting anew must not end the thread either: then there is no picture to be had.
                 if catch_unwind(AssertUnwindSafe(|| self.start_anew(&text))).is_err() {
                     self.current.clear();
+                    self.running.clear();
                 }
             }
         }
@@ -160,18 +163,34 @@ impl Engine {
         while !self.stopping {
             if let Some(command) = self.commands.pop_front() {
                 self.command(command);
-            } else if let Some(batch) = self.next_batch() {
-                self.handle(batch);
-            } else if self.confirming.iter().any(|waiting| waiting.until <= self.clock.now()) {
-                self.revert_unconfirmed();
-            } else if !self.suspects.is_empty() {
-                self.read_suspects();
-            } else if std::mem::take(&mut self.returned) {
-                self.mend();
-            } else {
-                let until = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
-                self.pump(until);
+                continue;
             }
+            let mut did = self.serve_safe();
+            if !self.running.iter().any(Running::is_safe) {
+                while let Some(turn) = self.desk.turn(&self.claims) {
+                    did = true;
+                    self.begin(turn);
+                    if self.urgent() {
+                        break;
+                    }
+                }
+            }
+            did |= self.advance_all();
+            self.look_at_suspects();
+            if did {
+                self.glance();
+                continue;
+            }
+            if self.revert_unconfirmed() {
+                continue;
+            }
+            if self.running.is_empty() && std::mem::take(&mut self.returned) {
+                self.mend();
+                continue;
+            }
+            let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
+            let looks = self.looks.iter().map(|(.., until)| *until).min().unwrap_or(Time::NEVER);
+            self.pump(confirm.min(looks).min(self.running_until()));
         }
     }
 
@@ -195,14 +214,14 @@ impl Engine {
         }
         if self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.clear();
-            self.suspects.extend(self.system.graph().node_weights().map(|node| node.name));
+            self.suspects.extend(self.world.system.graph().node_weights().map(|node| node.name));
             self.returned = true;
         }
     }
 
     fn take_in(&mut self, mail: Mail) {
         match mail {
-            Mail::Batch(batch) => self.enqueue(batch),
+            Mail::Batch(batch) => self.arrive(batch),
             Mail::Reply(ticket, reply) => {
                 if self.given_up.remove(&ticket) {
                     self.pool.came_back();
@@ -218,7 +237,9 @@ impl Engine {
             Mail::Event(event) => {
                 self.counts.report_taken();
                 self.confirming.retain(|waiting| waiting.event != event);
-                self.heard.push(event);
+                if !self.current.is_empty() && self.heard.len() < crate::limits::HEARD {
+                    self.heard.push((event, self.clock.now()));
+                }
             }
             Mail::Command(command) => {
                 self.counts.command_taken();
@@ -227,17 +248,39 @@ impl Engine {
                     Command::View { system, reply } => {
                         let _ = reply.try_send(self.view(system));
                     }
+                    // Stands in its coordinator's queue like a request.
+                    Command::Down(requester) => {
+                        let ask = Ask::Undo;
+                        let request = Request { why: Why::Down, ..Request::new(RequestId(0), ask, requester) };
+                        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.claims);
+                    }
                     other => self.commands.push_back(other),
                 }
             }
         }
     }
 
+    /// A batch comes: what it overtakes, gives up or cancels is answered, the rest waits its turn.
+    fn arrive(&mut self, batch: Batch) {
+        let configurations = self.configurations.clone();
+        let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
+        let arrival = self.desk.arrive(batch, safe, &self.claims);
+        for (request, verdict, reason) in arrival.told {
+            self.owe(request);
+            let reason = (verdict != Verdict::Undone).then_some(reason);
+            self.answer(request, verdict, reason);
+        }
+        self.safe.extend(arrival.safe);
+        for (number, request) in arrival.given_up {
+            self.owe(request);
+            self.give_up_request(number, request);
+        }
+        self.changed();
+    }
+
     fn reported(&mut self, event: PlatformEvent) {
         match event {
-            PlatformEvent::Faulted { component, .. } => {
-                self.suspects.push(component);
-            }
+            PlatformEvent::Faulted { component, .. } => self.suspects.push(component),
             PlatformEvent::Returned { component, .. } => {
                 self.suspects.push(component);
                 self.returned = true;
@@ -251,10 +294,6 @@ impl Engine {
     /// Whether something waits that everything else gives way to.
     pub fn urgent(&self) -> bool {
         self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(Command::is_urgent)
-    }
-
-    pub fn has_reply(&self, ticket: Ticket) -> bool {
-        self.replies.iter().any(|(t, _)| *t == ticket)
     }
 
     pub fn take_reply(&mut self, ticket: Ticket) -> Option<Reply> {
@@ -273,8 +312,8 @@ impl Engine {
     pub fn note_quarantine(&mut self) {
         let mut now = self.platform.quarantined();
         now.sort_unstable();
-        if now != self.quarantined {
-            self.quarantined = now;
+        if now != self.world.quarantined {
+            self.world.quarantined = now;
             self.changed();
         }
     }
@@ -284,73 +323,25 @@ impl Engine {
         self.revision += 1;
     }
 
-    pub fn is_safe(&self, request: &Request) -> bool {
-        matches!(request.ask, Ask::Apply(id) if self.configurations.get(&id).is_some_and(|c| c.safe))
+    /// A number for a transaction.
+    pub fn number(&mut self) -> u64 {
+        self.numbers += 1;
+        self.numbers
     }
 
-    /// Queues a batch; an undo in it cancels its push that has not begun.
-    fn enqueue(&mut self, batch: Batch) {
-        let mut kept = Batch::default();
-        for request in batch.requests {
-            if let Ask::UndoOf(id) = request.ask
-                && let Some(overtaken) = self.overtake(&mut kept, id, request.requester)
-            {
-                self.begin(overtaken);
-                self.begin(request);
-                self.answer(overtaken, Verdict::Cancelled, Some(Reason::Overtaken));
-                self.answer(request, Verdict::Undone, None);
-            } else {
-                kept.requests.push(request);
-            }
-        }
-        if !kept.requests.is_empty() {
-            self.queue.push_back(kept);
-        }
-        self.changed();
+    /// Whether all coordinators are down.
+    pub fn all_down(&self) -> bool {
+        self.coordinators.iter().all(|coordinator| self.down.contains(coordinator))
     }
 
-    fn overtake(&mut self, kept: &mut Batch, id: ConfigId, by: Requester) -> Option<Request> {
-        let fits =
-            |request: &Request| request.ask == Ask::Apply(id) && (by == Requester::Operator || request.requester == by);
-        let batches = std::iter::once(kept).chain(self.queue.iter_mut().rev());
-        for batch in batches {
-            if let Some(at) = batch.requests.iter().rposition(fits) {
-                return Some(batch.requests.remove(at));
-            }
+    /// A request makes room in the queue and is owed an answer.
+    pub fn owe(&mut self, request: Request) {
+        if request.why == Why::Asked {
+            let safe = matches!(request.ask, Ask::Apply(id) if self.configurations.get(&id).is_some_and(|c| c.safe));
+            let count = if safe { &self.counts.safe } else { &self.counts.requests };
+            count.fetch_sub(1, Ordering::AcqRel);
+            self.down.remove(&request.requester);
         }
-        None
-    }
-
-    /// The next batch to be taken up: safe requests first, each by itself.
-    fn next_batch(&mut self) -> Option<Batch> {
-        if let Some(safe) = self.next_safe() {
-            return Some(Batch::one(safe));
-        }
-        loop {
-            let batch = self.queue.pop_front()?;
-            if !batch.requests.is_empty() {
-                return Some(batch);
-            }
-        }
-    }
-
-    /// The first safe request that waits, taken out of its batch.
-    pub fn next_safe(&mut self) -> Option<Request> {
-        if self.counts.safe.load(Ordering::Acquire) == 0 {
-            return None;
-        }
-        for b in 0..self.queue.len() {
-            if let Some(at) = self.queue[b].requests.iter().position(|request| self.is_safe(request)) {
-                return Some(self.queue[b].requests.remove(at));
-            }
-        }
-        None
-    }
-
-    /// `request` begins: it makes room in the queue and is owed an answer.
-    pub fn begin(&mut self, request: Request) {
-        let count = if self.is_safe(&request) { &self.counts.safe } else { &self.counts.requests };
-        count.fetch_sub(1, Ordering::AcqRel);
         self.current.push((request, self.clock.now()));
     }
 
@@ -362,7 +353,15 @@ impl Engine {
         };
         // No longer owed, whatever the listeners do with it.
         let (_, begun) = self.current.remove(at);
+        if self.current.is_empty() {
+            self.heard.clear();
+        }
         self.tell_answer(request, verdict, reason.map(Arc::new), begun);
+    }
+
+    /// What was owed is over, and nobody is told.
+    pub fn forget(&mut self, request: Request) {
+        self.current.retain(|(r, _)| !(r.id == request.id && r.ask == request.ask && r.why == request.why));
     }
 
     /// Tells an answer, or a notice in the form of one.
@@ -378,17 +377,49 @@ impl Engine {
     }
 
     /// Looks at components that were reported faulted (the report may be older than what was done since).
-    pub fn read_suspects(&mut self) {
-        let mut suspects = std::mem::take(&mut self.suspects);
-        suspects.sort_unstable();
-        suspects.dedup();
-        for component in suspects {
-            let reply = self.ask(super::pool::Call::ObserveComponent(component), false);
-            if let Ok(Some(Reply::ObservedComponent(Ok(Some(seen))))) = reply
-                && seen.state == RunState::Faulted
-                && self.system.set_state(component, RunState::Faulted)
-            {
+    fn look_at_suspects(&mut self) {
+        let mut at = 0;
+        while at < self.looks.len() {
+            let (ticket, component, until) = self.looks[at];
+            let seen = match self.take_reply(ticket) {
+                Some(Reply::ObservedComponent(Ok(seen))) => seen,
+                Some(_) => None,
+                None if self.clock.now() >= until => {
+                    self.give_up(ticket);
+                    None
+                }
+                None => {
+                    at += 1;
+                    continue;
+                }
+            };
+            self.looks.remove(at);
+            let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
+            if faulted && self.world.system.set_state(component, RunState::Faulted) {
                 self.changed();
+            }
+        }
+        while self.pool.has_room_beside(1)
+            && let Some(component) = self.suspects.pop()
+        {
+            if self.looks.iter().any(|(_, looked, _)| *looked == component) {
+                continue;
+            }
+            let deadline = self.clock.now() + self.limits.step_timeout;
+            let ticket = self.pool.start(super::pool::Call::ObserveComponent(component), deadline);
+            self.looks.push((ticket, component, deadline + crate::limits::PLATFORM_GRACE));
+        }
+    }
+
+    /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
+    pub fn settle_suspects(&mut self) {
+        while !self.suspects.is_empty() || !self.looks.is_empty() {
+            self.look_at_suspects();
+            if let Some(until) = self.looks.iter().map(|(.., until)| *until).min() {
+                self.pump(until);
+            }
+            if self.stopping {
+                return;
             }
         }
     }
@@ -396,10 +427,10 @@ impl Engine {
     pub fn view(&mut self, system: bool) -> Arc<View> {
         let stack = self.frame_views();
         let system = system.then(|| match &self.snapshot {
-            Some((of, snapshot)) if *of == (self.revision, self.system.revision()) => snapshot.clone(),
+            Some((of, snapshot)) if *of == (self.revision, self.world.system.revision()) => snapshot.clone(),
             _ => {
-                let snapshot = Arc::new(self.system.snapshot());
-                self.snapshot = Some(((self.revision, self.system.revision()), snapshot.clone()));
+                let snapshot = Arc::new(self.world.system.snapshot());
+                self.snapshot = Some(((self.revision, self.world.system.revision()), snapshot.clone()));
                 snapshot
             }
         });
@@ -408,50 +439,21 @@ impl Engine {
             system,
             stack,
             busy: self.current.first().map(|(request, since)| Busy::of(request, *since)),
-            waiting: self.queue.iter().map(|batch| batch.requests.len()).sum(),
-            broken: self.broken.as_ref().map(|broken| broken.residual.clone()),
-            quarantined: self.quarantined.clone(),
+            waiting: self.desk.len(),
+            broken: self.world.broken.first().map(|broken| broken.residual.clone()),
+            residuals: self.world.broken.iter().map(|broken| broken.residual.clone()).collect(),
+            quarantined: self.world.quarantined.clone(),
         })
-    }
-
-    /// After a panic: what is owed is answered *broken*, and the picture is read back from the platform.
-    fn start_anew(&mut self, text: &str) {
-        if let Some(progress) = &self.progress {
-            progress(&Progress::Survived(text.to_owned()));
-        }
-        let expected = self.expected.take().unwrap_or_else(|| self.system.clone());
-        let reason = Reason::Panic(text.to_owned());
-        let mut between = Interruption::closed();
-        let observed = match self.look(&mut between) {
-            Some(seen) => self.adopt(&seen).is_ok(),
-            None => false,
-        };
-        let left = Left::of(reason.clone());
-        let residual = Arc::new(self.residual(left, &expected, observed));
-        if self.broken.is_none() && (!residual.is_empty() || !observed) {
-            self.broken = Some(Broken { residual: residual.clone(), expected, culprit: None, mendable: true });
-        }
-        while let Some((request, begun)) = self.current.pop() {
-            let verdict = match request.ask {
-                Ask::Apply(_) | Ask::Commit => Verdict::Broken,
-                Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoBroken,
-            };
-            self.tell_answer(request, verdict, Some(Arc::new(Reason::Broken(residual.clone()))), begun);
-        }
     }
 
     /// Everything that still waits is answered.
     fn bid_farewell(&mut self) {
         self.glance();
-        while let Some(batch) = self.queue.pop_front() {
-            for request in batch.requests {
-                let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
-                    Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
-                };
-                let now = self.clock.now();
-                self.tell_answer(request, verdict, Some(Arc::new(Reason::Ended)), now);
-            }
+        let safe = std::mem::take(&mut self.safe);
+        let waiting = self.desk.cancel_waiting(|_| true);
+        for request in safe.into_iter().chain(waiting).filter(|request| request.why == Why::Asked) {
+            let now = self.clock.now();
+            self.tell_answer(request, request.ask.failed(), Some(Arc::new(Reason::Ended)), now);
         }
     }
 }

@@ -5,17 +5,17 @@
 //! every precondition on the live system, and declines when anything is not as it was prepared for.
 
 use super::engine::Engine;
-use super::exec::Run;
-use super::frames::Op;
 use super::progress::{Progress, StepEnd, StepName};
-use super::request::{Reason, Request};
-use super::requests::Part;
-use super::transaction::Ended;
-use crate::model::{Ask, ConfigId, Verdict};
+use super::request::Request;
+use super::running::{Purpose, Running};
+use super::teardown::own_plan;
+use crate::model::{Ask, Cause, ConfigId, Outcome};
 use crate::plan::prepare::Switch;
-use crate::platform::{Cause, Outcome, Prepared};
-use crate::stack::Requester;
+use crate::platform::Prepared;
+use crate::stack::{Edits, Frame, Group};
 use crate::time::Time;
+use crate::transaction::Transaction;
+use smallvec::SmallVec;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A switch, prepared on both sides.
@@ -32,80 +32,74 @@ impl Engine {
         }
         let configurations = self.configurations.clone();
         if let Some(configuration) = configurations.get(&id)
-            && let Some(switch) = Switch::new(&mut self.system, configuration)
+            && let Some(switch) = Switch::new(&mut self.world.system, configuration)
             && let Some(platform) = self.platform.prepare(switch.universe())
         {
             self.switches.insert(id, Box::new(Fast { switch, platform }));
         }
     }
 
-    /// Carries out a request that has begun by a prepared switch. False: it goes the ordinary way.
-    pub(super) fn handle_fast(&mut self, request: Request) -> bool {
-        if self.switches.is_empty() || self.broken.is_some() || !self.quarantined.is_empty() {
-            return false;
+    /// Carries out a request that has begun by a prepared switch, `number` being its batch on the desk.
+    pub(super) fn handle_fast(&mut self, number: u32, request: Request) -> Fared {
+        if self.switches.is_empty()
+            || !self.world.broken.is_empty()
+            || !self.world.quarantined.is_empty()
+            || request.still
+            || self.world.stack.safe().next().is_some()
+        {
+            return Fared::Not;
         }
         let (id, undoing) = match request.ask {
             Ask::Apply(id) => (id, false),
             Ask::UndoOf(id) => (id, true),
-            _ => return false,
+            _ => return Fared::Not,
         };
-        let Some(mut fast) = self.switches.remove(&id) else { return false };
+        let Some(mut fast) = self.switches.remove(&id) else { return Fared::Not };
         let ready = if undoing {
-            match self.stack.top_of(&fast.switch) {
-                Some(top) if request.requester == Requester::Operator || top.requester == request.requester => {
-                    fast.switch.ready_undo(&self.system, &top.acts, &top.saved)
-                }
-                _ => {
+            let own = |top: &&Frame| {
+                (request.force || top.requester == request.requester)
+                    && (request.scope.is_none() || request.scope == top.scope)
+            };
+            match self.world.stack.top_of(&fast.switch).filter(own) {
+                Some(top) => fast.switch.ready_undo(&self.world.system, &top.acts, &top.saved),
+                None => {
                     self.switches.insert(id, fast);
-                    return false;
+                    return Fared::Not;
                 }
             }
-        } else if self.stack.takes(&fast.switch) {
-            fast.switch.ready(&self.system)
+        } else if self.world.stack.takes(&fast.switch) {
+            fast.switch.ready(&self.world.system)
         } else {
             self.switches.insert(id, fast);
-            return false;
+            return Fared::Not;
         };
         if !ready {
             // It was prepared for another system: let go, and prepared anew when it has been applied.
-            return false;
+            return Fared::Not;
         }
-        let op = Op::Push(id, request.requester, request.scoped);
         let mut at = self.current.last().map_or_else(|| self.clock.now(), |(_, begun)| *begun);
-        match self.switch_over(&mut fast, op, undoing, &mut at) {
-            Ended::Applied => {
-                if undoing {
-                    self.stack.pop_switch();
-                    self.forget_confirmations();
-                } else {
-                    self.stack.push_switch(&fast.switch, request.requester, at, request.scoped);
-                }
-                self.switches.insert(id, fast);
-                if undoing {
-                    self.answer(request, Verdict::Undone, None);
-                } else {
-                    self.applied(Part { request, op });
-                }
-            }
-            Ended::Undone(reason) => {
-                let verdict = if undoing { Verdict::UndoFailed } else { Verdict::Failed };
-                self.answer(request, verdict, Some(reason));
-            }
-            Ended::Broken(residual) => {
-                if !undoing {
-                    self.blame(&Part { request, op });
-                }
-                let verdict = if undoing { Verdict::UndoBroken } else { Verdict::Broken };
-                self.answer(request, verdict, Some(Reason::Broken(residual)));
-            }
+        if let Err((sent, outcome)) = self.switch_over(&mut fast, request, undoing, &mut at) {
+            self.go_on_from(number, &fast.switch, request, undoing, (sent, outcome));
+            self.switches.insert(id, fast);
+            return Fared::GoesOn;
         }
-        true
+        if undoing {
+            self.world.stack.pop_switch();
+            self.forget_confirmations();
+        } else {
+            let frame = self.world.stack.push_switch(&fast.switch, request.requester, at, request.scope);
+            self.await_confirmation(request, frame);
+        }
+        self.switches.insert(id, fast);
+        self.desk.over(number);
+        self.answer(request, request.ask.done(), None);
+        Fared::Done
     }
 
     /// Carries out the acts that are ready, from `at` on, which becomes the time of the last look at the clock: a look costs
-    /// as much as an act, so only those that may take time are measured. What goes wrong is taken over by an ordinary
-    /// transaction in the middle.
-    fn switch_over(&mut self, fast: &mut Fast, op: Op, undoing: bool, at: &mut Time) -> Ended {
+    /// as much as an act, so only those that may take time are measured. The error is the number of the step that was not
+    /// done, and what came of it.
+    fn switch_over(&mut self, fast: &mut Fast, request: Request, undoing: bool, at: &mut Time) -> Result<(), (u32, Outcome)> {
         let deadline = *at + self.limits.step_timeout;
         let mut sent = 0u32;
         for nth in 0..fast.switch.acts().len() {
@@ -124,23 +118,59 @@ impl Engine {
                     let begun = std::mem::replace(at, self.clock.now());
                     at.since(begun)
                 });
-                self.tell(step, StepEnd::from(&outcome), took, undoing);
+                if let Some(progress) = &self.progress {
+                    let end = StepEnd::from(&outcome);
+                    progress(&Progress::Ended { request: request.id, step, end, took, undoing });
+                }
                 if !matches!(outcome, Outcome::Done(_)) {
-                    let steps = fast.switch.steps(fast.switch.acts());
-                    let spec = self.spec([op]);
-                    let mut run = Run::new(&steps, false, true, Time::NEVER);
-                    for done in 0..sent {
-                        run.over[done as usize] = true;
-                        run.done.push(done);
-                    }
-                    self.conclude(&steps, sent, outcome, &mut run);
-                    return self.transact_from(&steps, run, spec);
+                    return Err((sent, outcome));
                 }
                 sent += 1;
             }
-            fast.switch.done(act, &mut self.system);
+            fast.switch.done(act, &mut self.world.system);
         }
         self.changed();
-        Ended::Applied
+        Ok(())
     }
+
+    /// What goes wrong in the middle of a switch is taken over by an ordinary transaction.
+    fn go_on_from(&mut self, number: u32, switch: &Switch, request: Request, undoing: bool, ended: (u32, Outcome)) {
+        let (sent, outcome) = ended;
+        let steps = switch.steps(switch.acts());
+        let (edits, frame) = if undoing {
+            let top = self.world.stack.top().cloned();
+            let pops = top.iter().map(|top| (top.id, crate::stack::HandOver::default())).collect();
+            (Edits { pops, push: None }, top)
+        } else {
+            let frame = crate::stack::switch_frame(switch, request.requester, self.clock.now(), request.scope);
+            let frame = Some(std::sync::Arc::new(frame));
+            (Edits { pops: Vec::new(), push: frame.clone() }, frame)
+        };
+        let mut planned = own_plan(steps, &self.world.system);
+        planned.parts[0].edits = edits;
+        planned.parts[0].frame = frame;
+        if !undoing {
+            planned.parts[0].pushes = Some(switch.configuration());
+            let on_failure = self.configurations.get(&switch.configuration()).map(|c| c.on_failure);
+            planned.parts[0].on_failure = on_failure.unwrap_or_default();
+        }
+        let spec = self.spec(&planned, false);
+        let mut machine = Transaction::new(planned, spec);
+        machine.resume(sent, outcome, &mut self.world.system);
+        let group = Group { takes: 1, places: SmallVec::from_iter([0]), ..Group::default() };
+        let purpose = Purpose::Requests(number, group);
+        let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
+        self.running.push(running);
+    }
+}
+
+/// How a request fared that might go by a prepared switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fared {
+    /// It goes the ordinary way.
+    Not,
+    /// It is over and answered.
+    Done,
+    /// Something went wrong in the middle; a transaction goes on.
+    GoesOn,
 }

@@ -9,35 +9,33 @@
 //! request that is dropped.
 //!
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
-//! * `engine`: the thread. `requests`: the table of §6. `transaction`: whole or not at all. `exec`: carrying out steps.
-//!   `fast`: prepared switches. `safe`: what goes first. `teardown`: to nothing. `pool`, `inbox`, `work`, `touched`: their tools.
+//! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction between its machine and the platform.
+//!   `safe`: what goes first. `fast`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//!   `pool`, `inbox`: their tools.
 
 pub mod control;
 mod engine;
-mod exec;
 mod fast;
-mod flights;
-mod frames;
 mod inbox;
 mod pool;
 pub mod progress;
+mod recovery;
 pub mod request;
 mod requests;
+mod running;
 mod safe;
 mod teardown;
-mod touched;
-mod transaction;
-mod work;
 
-pub use crate::stack::Requester;
+pub use crate::stack::{Requester, Scope, Why};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{Progress, ProgressSink, StepEnd, StepName};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident, Verdict};
+use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
+use crate::stack::World;
 use crate::system::System;
 use crate::time::{Clock, Join, Receiver, Time};
 use control::Command;
@@ -60,6 +58,8 @@ pub struct Setup {
     pub catalogue: Catalogue,
     /// The deployment's activities.
     pub activities: BTreeSet<Ident>,
+    /// The names under which coordinators ask.
+    pub coordinators: BTreeSet<Requester>,
     /// Where the components live.
     pub platform: Arc<dyn Platform>,
     /// The time.
@@ -90,14 +90,16 @@ impl Configurator {
             platform: setup.platform.clone(),
             limits: setup.limits,
             configurations: Arc::new(configurations),
-            context: Context { activities: setup.activities },
+            context: Context { activities: setup.activities, avoid: BTreeSet::new() },
+            coordinators: setup.coordinators,
             pool: Pool::new(setup.clock.clone(), setup.platform, post.clone(), setup.workers.min(limits::WORKERS_MOST)),
             inbox,
             counts: post.counts.clone(),
             answers: setup.answers.clone(),
             progress: setup.progress,
         };
-        let engine = Engine::new(parts, System::new(Arc::new(setup.catalogue)));
+        let stack = crate::stack::Stack::new(setup.limits.stack);
+        let engine = Engine::new(parts, World::new(System::new(Arc::new(setup.catalogue)), stack));
         let thread = setup.clock.spawn("configurator", move || engine.live());
         let inner =
             Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };
@@ -140,10 +142,7 @@ impl ConfiguratorHandle {
         self.inner.post.batch(batch, safe).map_err(|batch| {
             let at = self.inner.clock.now();
             for request in batch.requests {
-                let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
-                    Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
-                };
+                let verdict = request.ask.failed();
                 let reason = Some(Arc::new(Reason::Full));
                 (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
             }
@@ -198,6 +197,12 @@ impl ConfiguratorHandle {
         let (reply, answer) = self.inner.clock.channel(1);
         self.inner.post.command(Command::TakeDown { forced, deadline, reply });
         answer
+    }
+
+    /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
+    /// are down and nothing is there any more, what was in force is forgotten.
+    pub fn down(&self, coordinator: Requester) {
+        self.inner.post.command(Command::Down(coordinator));
     }
 
     /// Forgets the stack: the *down* state was reached with an empty system.

@@ -21,10 +21,12 @@ pub(super) struct Ticket(pub u64);
 
 /// What a worker is to call.
 pub(super) enum Call {
-    Execute(Step),
+    /// One step; whether it belongs to a safe configuration.
+    Execute(Step, bool),
     /// Several brief steps, each with so much time; none is begun any more once it is set.
     Several(Vec<Step>, Duration, Arc<AtomicBool>),
     Observe,
+    ObserveSome(Vec<ComponentName>),
     ObserveComponent(ComponentName),
 }
 
@@ -55,8 +57,9 @@ pub(super) struct Pool {
 }
 
 /// Calls `platform` and survives its panic: whether the step happened is then unknown.
-pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time) -> Outcome {
-    catch_unwind(AssertUnwindSafe(|| platform.execute(step, deadline))).unwrap_or_else(|payload| {
+pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time, safe: bool) -> Outcome {
+    let call = || if safe { platform.execute_safe(step, deadline) } else { platform.execute(step, deadline) };
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
         Outcome::Unknown(Cause::Lost(format!("the platform panicked: {}", crate::time::clock::panic_text(&*payload))))
     })
 }
@@ -64,7 +67,7 @@ pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time) -> O
 fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
     let lost = || ObserveError::Lost("the platform panicked".to_owned());
     match call {
-        Call::Execute(step) => Reply::Executed(execute(platform, &step, deadline)),
+        Call::Execute(step, safe) => Reply::Executed(execute(platform, &step, deadline, safe)),
         Call::Several(steps, each, stop) => {
             let count = steps.len();
             let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline, &stop)));
@@ -75,6 +78,9 @@ fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
         }
         Call::Observe => Reply::Observed(
             catch_unwind(AssertUnwindSafe(|| platform.observe(deadline))).unwrap_or_else(|_| Err(lost())),
+        ),
+        Call::ObserveSome(names) => Reply::Observed(
+            catch_unwind(AssertUnwindSafe(|| platform.observe_some(&names, deadline))).unwrap_or_else(|_| Err(lost())),
         ),
         Call::ObserveComponent(name) => Reply::ObservedComponent(
             catch_unwind(AssertUnwindSafe(|| platform.observe_component(name, deadline)))
@@ -89,9 +95,9 @@ impl Pool {
         Self { clock, platform, post, jobs, workers: 0, busy: 0, bound: bound.max(1), next: 0 }
     }
 
-    /// Whether a worker is free (or can be had).
-    pub fn has_room(&self) -> bool {
-        self.busy < self.bound
+    /// Whether a worker is free (or can be had), with so many left over.
+    pub fn has_room_beside(&self, others: usize) -> bool {
+        self.busy + others.min(self.bound - 1) < self.bound
     }
 
     /// Hands `call` to a worker.

@@ -1,8 +1,7 @@
 //! What is told while requests are carried out: each step with how it ended and how long it took.
 
 use super::request::{Answer, Request};
-use crate::model::{ComponentName, Ident, MemberRef, Step};
-use crate::platform::Outcome;
+use crate::model::{ComponentName, Ident, MemberRef, Outcome, RequestId, Step};
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
 use std::time::Duration;
@@ -88,6 +87,8 @@ pub enum Progress {
     Started(StepName),
     /// A step ended.
     Ended {
+        /// The request that it belongs to; 0 for what nobody asked for.
+        request: RequestId,
         /// The step.
         step: StepName,
         /// How.

@@ -1,325 +1,356 @@
-//! The table of requests (design §6): what each one means and how it is answered.
+//! Batches that begin and end: what the stack decides is carried out, booked and answered.
 
+use super::control::FrameView;
 use super::engine::{Confirming, Engine};
-use super::frames::{Op, Planned};
+use super::fast::Fared;
 use super::progress::Progress;
-use super::request::{Batch, Reason, Request};
-use super::transaction::{Ended, Spec};
-use crate::model::{Ask, ConfigId, Configuration, OnFailure, Verdict};
-use crate::stack::Requester;
+use super::request::{Reason, Request};
+use super::running::{Purpose, Running};
+use crate::model::{Ask, ConfigId, RequestId, Verdict};
+use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, take_up};
+use crate::time::Time;
+use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
-/// What a request comes to, once its names are looked up.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
-    pub request: Request,
-    pub op: Op,
-}
 
 impl Engine {
-    /// Takes up a batch.
-    pub(super) fn handle(&mut self, batch: Batch) {
-        self.heard.clear();
-        for request in &batch.requests {
-            self.begin(*request);
+    /// A batch begins.
+    pub(super) fn begin(&mut self, turn: Turn) {
+        for request in &turn.batch.requests {
+            self.owe(*request);
         }
         if !self.suspects.is_empty() {
-            self.read_suspects();
+            self.settle_suspects();
         }
-        if let [request] = batch.requests[..]
-            && self.is_safe(&request)
-        {
-            return self.handle_safe(request);
-        }
-        if let [request] = batch.requests[..]
-            && self.handle_fast(request)
+        if let [request] = turn.batch.requests[..]
+            && self.running.is_empty()
+            && request.why == Why::Asked
+            && self.handle_fast(turn.number, request) != Fared::Not
         {
             return;
         }
-        let (mut undos, mut pushes) = (SmallVec::<[Part; 4]>::new(), SmallVec::<[Part; 4]>::new());
-        let mixed = batch.requests.iter().any(|r| matches!(r.ask, Ask::UndoOf(_)))
-            && batch.requests.iter().any(|r| matches!(r.ask, Ask::Apply(_)));
-        for request in batch.requests {
-            match request.ask {
-                Ask::UndoOf(_) | Ask::Apply(_) if mixed => {
-                    let taken: SmallVec<[Op; 4]> = undos.iter().map(|part| part.op).collect();
-                    if let Some(op) = self.look_up(request, &taken) {
-                        let list = if op.is_push() { &mut pushes } else { &mut undos };
-                        list.push(Part { request, op });
-                    }
-                }
-                Ask::UndoOf(_) | Ask::Apply(_) => {
-                    if let Some(op) = self.look_up(request, &[]) {
-                        self.alone(Part { request, op });
-                    }
-                }
-                Ask::Undo => self.handle_undo(request),
-                Ask::UndoTo(frames) => self.handle_undo_to(request, frames),
-                Ask::Commit => self.handle_commit(request),
-            }
-        }
-        self.together(undos, pushes);
+        self.take_up(turn.number);
     }
 
-    /// What a request means now; none: it has been answered.
-    fn look_up(&mut self, request: Request, taken: &[Op]) -> Option<Op> {
-        match request.ask {
-            Ask::Apply(id) => {
-                if !self.configurations.contains_key(&id) {
-                    self.answer(request, Verdict::Failed, Some(Reason::Unknown(id)));
-                } else if let Some(broken) = &self.broken {
-                    let reason = Reason::StillBroken(broken.residual.clone());
-                    self.answer(request, Verdict::Failed, Some(reason));
-                } else {
-                    return Some(Op::Push(id, request.requester, request.scoped));
+    /// The rest of a batch under way is taken up.
+    fn take_up(&mut self, number: u32) {
+        loop {
+            let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
+            let requests = turn.batch.requests.clone();
+            let configurations = self.configurations.clone();
+            let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
+            let rules = Rules { configurations: &configurations, context: &self.context, at: self.clock.now(), busy };
+            let mut group = take_up(&self.world, &requests, &rules);
+            if let Some(at) = group.repairs {
+                if self.repair_for(&requests[0], at) {
+                    continue;
                 }
-            }
-            Ask::UndoOf(id) => {
-                if !self.configurations.contains_key(&id) {
-                    self.answer(request, Verdict::UndoFailed, Some(Reason::Unknown(id)));
-                } else if self.is_culprit(id, request.requester) {
-                    self.undo_by_recovery(request);
-                } else {
-                    match self.find_frame(id, request.requester, taken) {
-                        Ok(None) => self.answer(request, Verdict::Undone, None),
-                        Err(reason) => self.answer(request, Verdict::UndoFailed, Some(reason)),
-                        Ok(Some(op)) => match &self.broken {
-                            Some(broken) => {
-                                let reason = Reason::StillBroken(broken.residual.clone());
-                                self.answer(request, Verdict::UndoFailed, Some(reason));
-                            }
-                            None => return Some(op),
-                        },
-                    }
-                }
-            }
-            Ask::Undo | Ask::UndoTo(_) | Ask::Commit => {}
-        }
-        None
-    }
-
-    fn is_culprit(&self, id: ConfigId, by: Requester) -> bool {
-        self.broken
-            .as_ref()
-            .and_then(|broken| broken.culprit)
-            .is_some_and(|(culprit, asked)| culprit == id && (by == Requester::Operator || by == asked))
-    }
-
-    /// The undo of the very application that broke the system: goes back to the system before it.
-    fn undo_by_recovery(&mut self, request: Request) {
-        let Some(broken) = self.broken.take() else { return };
-        match self.recover_back(broken) {
-            Ok(()) => self.answer(request, Verdict::Undone, None),
-            Err(residual) => self.answer(request, Verdict::UndoBroken, Some(Reason::Broken(residual))),
-        }
-    }
-
-    /// Undos and pushes of one step of a coordinator: one transaction, by their net difference. When it cannot be had,
-    /// the undos still count for themselves: a failing push does not keep the old configuration in force.
-    fn together(&mut self, mut undos: SmallVec<[Part; 4]>, mut pushes: SmallVec<[Part; 4]>) {
-        while !undos.is_empty() && !pushes.is_empty() {
-            let ops: SmallVec<[Op; 8]> = undos.iter().chain(&pushes).map(|part| part.op).collect();
-            match self.plan_ops(&ops) {
-                Err((at, reason)) => {
-                    if at < undos.len() {
-                        let part = undos.remove(at);
-                        self.answer(part.request, Verdict::UndoFailed, Some(reason));
-                    } else {
-                        let part = pushes.remove((at - undos.len()).min(pushes.len() - 1));
-                        self.answer(part.request, Verdict::Failed, Some(reason));
-                    }
-                }
-                Ok(planned) => {
-                    let spec = self.spec(undos.iter().chain(&pushes).map(|part| part.op));
-                    let first = pushes[0].request;
-                    match self.carry(first, planned, spec) {
-                        Ended::Applied => {
-                            for part in undos {
-                                self.answer(part.request, Verdict::Undone, None);
-                            }
-                            for part in pushes {
-                                self.applied(part);
-                            }
-                        }
-                        Ended::Undone(reason) => {
-                            for part in pushes {
-                                self.answer(part.request, Verdict::Failed, Some(reason.clone()));
-                            }
-                            for part in undos {
-                                self.again(part);
-                            }
-                        }
-                        Ended::Broken(residual) => {
-                            self.blame(&pushes[0]);
-                            for part in undos.into_iter().chain(pushes) {
-                                let verdict = self.broken_verdict(&part);
-                                self.answer(part.request, verdict, Some(Reason::Broken(residual.clone())));
-                            }
-                        }
-                    }
+                if self.desk.answered(number, 0) {
                     return;
                 }
+                continue;
             }
-        }
-        for part in undos.into_iter().chain(pushes) {
-            self.again(part);
-        }
-    }
-
-    /// What was looked up before something else was done is looked up anew.
-    fn again(&mut self, part: Part) {
-        if let Some(op) = self.look_up(part.request, &[]) {
-            self.alone(Part { op, ..part });
-        }
-    }
-
-    /// One request by itself.
-    fn alone(&mut self, part: Part) {
-        let failed = if part.op.is_push() { Verdict::Failed } else { Verdict::UndoFailed };
-        let planned = match self.plan_ops(&[part.op]) {
-            Ok(planned) => planned,
-            Err((_, reason)) => return self.answer(part.request, failed, Some(reason)),
-        };
-        let spec = self.spec([part.op]);
-        match self.carry(part.request, planned, spec) {
-            Ended::Applied if failed == Verdict::Failed => {
-                self.applied(part);
-                if let Op::Push(id, ..) = part.op {
-                    self.prepare(id);
+            if group.down {
+                self.down.insert(requests[0].requester);
+                if self.all_down() && self.world.broken.is_empty() {
+                    self.world.settle_down();
+                    self.confirming.clear();
+                    self.changed();
+                }
+                self.forget(requests[0]);
+                group.told.clear();
+                if self.desk.answered(number, 0) {
+                    return;
+                }
+                continue;
+            }
+            if group.commits {
+                self.world.stack.make_floor();
+                self.confirming.clear();
+                self.changed();
+            }
+            let Some(planned) = group.planned.take() else {
+                self.book(number, group, Vec::new(), None);
+                if self.desk.under_way().iter().all(|turn| turn.number != number) {
+                    return;
+                }
+                continue;
+            };
+            let serves: SmallVec<[RequestId; 2]> = group.places.iter().map(|place| requests[*place].id).collect();
+            for place in &group.places {
+                if let Some(progress) = &self.progress {
+                    progress(&Progress::Begun { request: requests[*place], steps: planned.steps.len() });
                 }
             }
-            Ended::Applied => self.answer(part.request, Verdict::Undone, None),
-            Ended::Undone(reason) => self.answer(part.request, failed, Some(reason)),
-            Ended::Broken(residual) => {
-                self.blame(&part);
-                let verdict = self.broken_verdict(&part);
-                self.answer(part.request, verdict, Some(Reason::Broken(residual)));
+            let spec = self.spec(&planned, false);
+            let machine = Transaction::new(planned, spec);
+            let running = Running::new(self.number(), machine, Purpose::Requests(number, group), serves);
+            self.running.push(running);
+            return;
+        }
+    }
+
+    /// How a plan is carried out: the time that its configurations give themselves, which then is also how long one step of
+    /// theirs, or of their undoing, may take.
+    pub(super) fn spec(&self, planned: &Planned, asked_back: bool) -> Spec {
+        let of = |id: &ConfigId| self.configurations.get(id).and_then(|c| c.timeout);
+        let timeout = planned.parts.iter().filter_map(|part| part.pushes.as_ref().and_then(of)).max();
+        let popped = planned.popped.iter().filter_map(|frame| of(&frame.configuration)).max();
+        let patience = self.limits.step_timeout.max(timeout.unwrap_or_default()).max(popped.unwrap_or_default());
+        let until = timeout.map_or(Time::NEVER, |limit| self.clock.now() + limit);
+        Spec { until, timeout: timeout.unwrap_or_default(), patience, best_effort: false, asked_back }
+    }
+
+    /// A transaction is over.
+    pub(super) fn ended(&mut self, running: Running) {
+        let Running { machine, purpose, .. } = running;
+        match purpose {
+            Purpose::Requests(number, group) => {
+                let planned = machine.planned().clone();
+                let end = machine.end();
+                self.book(number, group, end.parts, Some(&planned));
+                self.take_up(number);
+            }
+            Purpose::Safe(safe) => self.safe_ended(*safe, machine),
+            Purpose::Own => {}
+        }
+    }
+
+    /// Books what came of a group of requests and answers them, in the order of the batch.
+    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<&Planned>) {
+        let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
+        let requests = turn.batch.requests.clone();
+        let busy = self.held_frames();
+        let mut answers: Vec<(usize, Option<Verdict>, Option<Reason>)> = Vec::new();
+        let mut confirm: Vec<(Request, FrameId)> = Vec::new();
+        let mut end = group.takes;
+        for (part, ended) in parts.into_iter().enumerate() {
+            let place = group.places[part];
+            let request = requests[place];
+            let Some(planned) = planned else { break };
+            match ended {
+                PartEnd::Anew => {
+                    end = place;
+                    break;
+                }
+                PartEnd::Done => {
+                    let pushed = self.world.stack.apply([&planned.parts[part].edits], &busy);
+                    confirm.extend(pushed.first().map(|frame| (request, *frame)));
+                    answers.push((place, Some(request.ask.done()), None));
+                }
+                PartEnd::Failed(reason) => {
+                    self.stays(&request, planned.parts[part].frame.as_deref());
+                    answers.push((place, Some(request.ask.failed()), Some(reason)));
+                }
+                PartEnd::Cancelled => answers.push((place, Some(Verdict::Cancelled), Some(Reason::GivenUp))),
+                PartEnd::Broken(broken) => {
+                    self.stays(&request, planned.parts[part].frame.as_deref());
+                    let residual = broken.residual.clone();
+                    self.left_broken(&request, *broken);
+                    answers.push((place, Some(request.ask.broken()), Some(Reason::Broken(residual))));
+                }
             }
         }
-    }
-
-    fn broken_verdict(&self, part: &Part) -> Verdict {
-        if part.op.is_push() { Verdict::Broken } else { Verdict::UndoBroken }
-    }
-
-    pub(super) fn blame(&mut self, part: &Part) {
-        if let (Op::Push(id, by, _), Some(broken)) = (part.op, &mut self.broken) {
-            broken.culprit = Some((id, by));
+        if group.commits {
+            answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), None)));
         }
-    }
-
-    /// Carries out what was planned, and takes it into the stack when it was done.
-    fn carry(&mut self, request: Request, planned: Planned, spec: Spec) -> Ended {
-        if let Some(progress) = &self.progress {
-            progress(&Progress::Begun { request, steps: planned.steps().len() });
-        }
-        let ended = self.transact(planned.steps(), spec);
-        if matches!(ended, Ended::Applied) {
-            self.commit(planned);
-        }
-        ended
-    }
-
-    /// How the ops are carried out: the time that their configurations give themselves, which then is also how long one
-    /// step of theirs, or of their undoing, may take.
-    pub(super) fn spec(&self, ops: impl IntoIterator<Item = Op>) -> Spec {
-        let mut spec = Spec { timeout: None, hold: false, patience: self.limits.step_timeout };
-        let mut undoes = false;
-        for op in ops {
-            let Op::Push(id, ..) = op else {
-                undoes = true;
-                continue;
-            };
-            if let Some(Configuration { timeout, on_failure, group, .. }) = self.configurations.get(&id) {
-                undoes |= group.is_some();
-                spec.hold |= *on_failure == OnFailure::Hold;
-                spec.timeout = spec.timeout.max(*timeout);
+        let told = group.told.into_iter().filter(|told| told.place < end);
+        answers.extend(told.map(|told| (told.place, told.verdict, told.reason)));
+        answers.sort_by_key(|(place, ..)| *place);
+        self.forget_confirmations();
+        self.changed();
+        for (request, frame) in confirm {
+            self.await_confirmation(request, frame);
+            if let Ask::Apply(id) = request.ask {
+                self.prepare(id);
             }
         }
-        spec.patience = spec.patience.max(spec.timeout.unwrap_or_default());
-        if undoes {
-            let frames = self.stack.frames().iter();
-            let longest = frames.filter_map(|f| self.configurations.get(&f.configuration)?.timeout).max();
-            spec.patience = spec.patience.max(longest.unwrap_or_default());
+        // From the last on, so that places stay.
+        for (place, ..) in answers.iter().rev() {
+            self.desk.answered(number, *place);
         }
-        spec
+        for (place, verdict, reason) in answers {
+            let request = requests[place];
+            self.finish(request, verdict, reason);
+            self.answer_giving_up(number, &request, verdict);
+        }
     }
 
-    pub(super) fn applied(&mut self, part: Part) {
-        let Op::Push(id, ..) = part.op else { return };
-        if let Some(confirm) = self.configurations.get(&id).and_then(|c| c.confirm)
-            && !self.heard.contains(&confirm.event)
+    /// Answers a request, or tells what came of what nobody asked for.
+    fn finish(&mut self, request: Request, verdict: Option<Verdict>, reason: Option<Reason>) {
+        match (request.why, verdict) {
+            (_, None) | (Why::Down, _) => self.forget(request),
+            (Why::Unconfirmed(_, event, within), Some(verdict)) => {
+                let (verdict, reason) = match verdict {
+                    Verdict::Undone => (Verdict::Reverted, Some(Reason::NotConfirmed(event, within))),
+                    other => (other, reason),
+                };
+                let begun = self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
+                self.forget(request);
+                // It carries the number of the request that had pushed the frame, and is about that.
+                let Ask::UndoOf(id) = request.ask else { return };
+                let told = Request { ask: if verdict == Verdict::Reverted { Ask::Apply(id) } else { request.ask }, ..request };
+                self.tell_answer(told, verdict, reason.map(Arc::new), begun);
+            }
+            (Why::Asked, Some(verdict)) => self.answer(request, verdict, reason),
+        }
+    }
+
+    /// A frame that was to be undone stays: it no longer belongs to the state that was left.
+    fn stays(&mut self, request: &Request, frame: Option<&Frame>) {
+        if request.ask.is_undo()
+            && request.scope.is_some()
+            && let Some(frame) = frame
         {
-            self.confirming.push(Confirming {
-                request: part.request,
-                event: confirm.event,
-                within: confirm.within,
-                until: self.clock.now() + confirm.within,
-            });
-        }
-        self.answer(part.request, Verdict::Ok, None);
-    }
-
-    fn handle_undo(&mut self, request: Request) {
-        if let Some(broken) = &self.broken {
-            if broken.culprit.is_some() && request.requester == Requester::Operator {
-                return self.undo_by_recovery(request);
-            }
-            let reason = Reason::StillBroken(broken.residual.clone());
-            return self.answer(request, Verdict::UndoFailed, Some(reason));
-        }
-        if let Some(foreign) = self.stack.frames().last().and_then(|top| top.foreign_to(request.requester)) {
-            return self.answer(request, Verdict::UndoFailed, Some(Reason::Refused(vec![foreign])));
-        }
-        self.alone(Part { request, op: Op::Top });
-    }
-
-    /// Pops until `frames` are left, in one transaction.
-    fn handle_undo_to(&mut self, request: Request, frames: usize) {
-        if let Some(broken) = &self.broken {
-            let reason = Reason::StillBroken(broken.residual.clone());
-            return self.answer(request, Verdict::UndoFailed, Some(reason));
-        }
-        if self.stack.len() <= frames {
-            return self.answer(request, Verdict::UndoFailed, Some(Reason::NothingToUndo));
-        }
-        self.alone(Part { request, op: Op::To(frames) });
-    }
-
-    fn handle_commit(&mut self, request: Request) {
-        match &self.broken {
-            Some(broken) => {
-                let reason = Reason::StillBroken(broken.residual.clone());
-                self.answer(request, Verdict::Failed, Some(reason));
-            }
-            None => {
-                self.stack.make_floor();
-                self.confirming.clear();
-                self.answer(request, Verdict::Ok, None);
-            }
+            self.world.stack.unscope(frame.id);
         }
     }
 
-    /// Pops the frames whose confirmation did not come in time, and says so.
-    pub(super) fn revert_unconfirmed(&mut self) {
-        let now = self.clock.now();
-        while let Some(at) = self.confirming.iter().position(|waiting| waiting.until <= now) {
-            let Confirming { request, event, within, .. } = self.confirming.remove(at);
-            let (Ask::Apply(id), reason) = (request.ask, Reason::NotConfirmed(event, within)) else { continue };
-            if self.broken.is_some() {
-                continue;
+    /// What is left of a request that ended *broken*: its partial frame, and what is not known.
+    pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart) {
+        let BrokenPart { residual, frame, instead, expected } = broken;
+        let frame = match (frame, instead) {
+            (Some(frame), Some(of)) => {
+                self.world.stack.replace(Frame { id: of, ..frame });
+                Some(of)
             }
-            let Ok(Some(op)) = self.find_frame(id, request.requester, &[]) else { continue };
-            let begun = self.clock.now();
-            let (verdict, reason) = match self.plan_ops(&[op]) {
-                Err((_, refused)) => (Verdict::UndoFailed, refused),
-                Ok(planned) => match self.carry(request, planned, self.spec([op])) {
-                    Ended::Applied => (Verdict::Reverted, reason),
-                    Ended::Undone(failed) => (Verdict::UndoFailed, failed),
-                    Ended::Broken(residual) => (Verdict::UndoBroken, Reason::Broken(residual)),
-                },
+            (Some(frame), None) => Some(self.push_partial(frame)),
+            (None, _) => None,
+        };
+        if !residual.is_settled() {
+            let components = residual.components().collect();
+            let culprit = match request.ask {
+                Ask::Apply(id) | Ask::UndoOf(id) => Some((id, request.requester)),
+                _ => None,
             };
-            self.tell_answer(request, verdict, Some(std::sync::Arc::new(reason)), begun);
+            let broken = Broken { residual, components, culprit, frame, mendable: true, expected };
+            self.world.broken.push(broken);
         }
+        self.changed();
+    }
+
+    /// A partial frame lies below those of the safe configurations that interrupted what it is left of.
+    fn push_partial(&mut self, frame: Frame) -> FrameId {
+        self.world.stack.push_below_safe(frame)
+    }
+
+    /// Frames that those under way pop or hand over to.
+    pub(super) fn held_frames(&self) -> Vec<FrameId> {
+        self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned())).collect()
+    }
+
+    /// What is under way is given up by its own undo.
+    pub(super) fn give_up_request(&mut self, number: u32, undo: Request) {
+        let Ask::UndoOf(id) = undo.ask else { return };
+        self.giving_up.push((number, undo));
+        let of_batch = |running: &&mut Running| matches!(&running.purpose, Purpose::Requests(of, _) if *of == number);
+        let requests = match self.desk.under_way().iter().find(|turn| turn.number == number) {
+            Some(turn) => turn.batch.requests.clone(),
+            None => return,
+        };
+        let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
+        let place = requests.iter().position(fits);
+        let running = self.running.iter_mut().find(of_batch);
+        let part = match (&running, place) {
+            (Some(running), Some(place)) => match &running.purpose {
+                Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
+                _ => None,
+            },
+            _ => None,
+        };
+        match (running, part, place) {
+            (Some(running), Some(part), _) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
+            // It stands behind in its batch and has not begun.
+            (_, None, Some(place)) => {
+                let request = requests[place];
+                self.desk.answered(number, place);
+                self.shift_places(number, place);
+                self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
+                self.answer_giving_up(number, &request, Some(Verdict::Cancelled));
+            }
+            _ => {}
+        }
+    }
+
+    /// A request was taken out of a batch under way: those behind it have moved up.
+    fn shift_places(&mut self, number: u32, gone: usize) {
+        for running in &mut self.running {
+            if let Purpose::Requests(of, group) = &mut running.purpose
+                && *of == number
+            {
+                group.takes -= usize::from(gone < group.takes);
+                group.places.iter_mut().filter(|place| **place > gone).for_each(|place| *place -= 1);
+                group.told.iter_mut().filter(|told| told.place > gone).for_each(|told| told.place -= 1);
+            }
+        }
+    }
+
+    /// Answers the undo that gave `request` up.
+    fn answer_giving_up(&mut self, number: u32, request: &Request, verdict: Option<Verdict>) {
+        let fits = |(of, undo): &(u32, Request)| {
+            *of == number && matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b)
+        };
+        let Some(at) = self.giving_up.iter().position(fits) else { return };
+        let (_, undo) = self.giving_up.remove(at);
+        match verdict {
+            // It was through before it could be given up: the undo is a request like others.
+            Some(Verdict::Ok) => {
+                self.forget(undo);
+                self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
+                let _ = self.desk.arrive(Batch::one(undo), |_| false, &self.claims);
+            }
+            Some(Verdict::Broken) => {
+                let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
+                self.answer(undo, Verdict::UndoBroken, reason);
+            }
+            _ => self.answer(undo, Verdict::Undone, None),
+        }
+    }
+
+    /// A frame waits for its confirmation, unless that has come already.
+    pub(super) fn await_confirmation(&mut self, request: Request, frame: FrameId) {
+        let Ask::Apply(id) = request.ask else { return };
+        let Some(confirm) = self.configurations.get(&id).and_then(|c| c.confirm) else { return };
+        let begun = self.current.iter().find(|(r, _)| r.id == request.id).map_or(Time::default(), |(_, begun)| *begun);
+        if !self.heard.iter().any(|(event, at)| *event == confirm.event && *at >= begun) {
+            let until = self.clock.now() + confirm.within;
+            self.confirming.push(Confirming { request, frame, event: confirm.event, within: confirm.within, until });
+        }
+    }
+
+    pub(super) fn forget_confirmations(&mut self) {
+        // A frame that is gone needs no confirmation any more.
+        let stack = &self.world.stack;
+        self.confirming.retain(|waiting| stack.frame(waiting.frame).is_some());
+    }
+
+    /// Frames whose confirmation did not come in time are to be taken back. True: there were some.
+    pub(super) fn revert_unconfirmed(&mut self) -> bool {
+        let now = self.clock.now();
+        let mut some = false;
+        while let Some(at) = self.confirming.iter().position(|waiting| waiting.until <= now) {
+            let Confirming { request, frame, event, within, .. } = self.confirming.remove(at);
+            let Ask::Apply(id) = request.ask else { continue };
+            let why = Why::Unconfirmed(frame, event, within);
+            let revert = Request { ask: Ask::UndoOf(id), scope: None, why, ..request };
+            let _ = self.desk.arrive(Batch::one(revert), |_| false, &self.claims);
+            some = true;
+        }
+        some
+    }
+
+    /// The frames as they are shown, oldest first.
+    pub(super) fn frame_views(&self) -> Vec<FrameView> {
+        let view = |frame: &Arc<Frame>| FrameView {
+            configuration: frame.configuration,
+            by: frame.requester,
+            at: frame.at,
+            floor: frame.floor.is_some(),
+            parts: frame.parts.len().max(1),
+            partial: frame.partial,
+        };
+        self.world.stack.frames().iter().map(view).collect()
     }
 }
+

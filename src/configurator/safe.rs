@@ -1,226 +1,245 @@
-//! Safe configurations: applied at once and best effort, whatever is under way and also when the system is broken.
+//! Safe configurations: applied at once and best effort, whatever is under way and also when something is broken.
 //!
-//! The picture of what *should* be gets a safe configuration planned on it as if nothing else had happened: so the
-//! interrupted work can be taken back around it, and the frame it leaves on the stack undoes to where the stack was.
+//! The frame it leaves is planned on the picture without what was interrupted: so it undoes to where the stack was before
+//! both, and what is rolled back around it does not matter to it.
 
-use super::control::Command;
-use super::engine::{Broken, Engine};
-use super::exec::Run;
-use super::frames::Op;
-use super::request::{Reason, Request, Residual};
-use super::touched::Touched;
-use super::transaction::{Interruption, Left};
-use super::work::Item;
+use super::engine::Engine;
+use super::request::{Reason, Request};
+use super::running::{Purpose, Running};
 use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
-use crate::plan;
-use crate::system::{System, step};
+use crate::plan::{PlannedStep, plan_on};
+use crate::stack::{Edits, Frame, Op, Planned, transaction};
+use crate::system::{Overlay, System, step};
 use crate::time::Time;
-use std::sync::Arc;
+use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
+use smallvec::SmallVec;
 use std::time::Duration;
 
-/// What came of a best effort.
-#[derive(Default)]
-pub(super) struct Effort {
-    /// What could not be done.
-    pub troubles: Vec<Reason>,
-    /// Steps of which nobody knows.
-    pub unsettled: Vec<crate::model::Step>,
-}
-
-impl Effort {
-    fn is_whole(&self) -> bool {
-        self.troubles.is_empty() && self.unsettled.is_empty()
-    }
-}
-
 impl Engine {
-    /// A safe request while nothing else is under way.
-    pub(super) fn handle_safe(&mut self, request: Request) {
-        let Ask::Apply(id) = request.ask else { return };
-        let planned = if self.broken.is_none() {
-            self.plan_ops(&[Op::Push(id, request.requester, request.scoped)]).ok()
-        } else {
-            None
-        };
-        let effort = match planned {
-            Some(planned) => {
-                let effort = self.do_what_goes(planned.steps(), &mut Interruption::default());
-                if !effort.is_whole() {
-                    // The frame holds all of it, so all of it is what should be.
-                    let mut expected = self.system.clone();
-                    for item in planned.steps() {
-                        let _ = step::apply(&item.step, &mut expected);
-                    }
-                    self.break_safe(&effort, expected);
-                }
-                self.commit(planned);
-                effort
-            }
-            None => {
-                let mut between = Interruption::default();
-                let effort = self.apply_safe(id, &mut between);
-                match self.broken.take() {
-                    Some(mut broken) => {
-                        self.fold_in(&mut broken.expected, id, request, &mut between.touched);
-                        // What should be has changed; what remains is told anew.
-                        let left = Left::of(broken.residual.cause.clone());
-                        let residual = Arc::new(self.residual(left, &broken.expected, broken.residual.observed));
-                        self.broken = Some(Broken { residual, mendable: false, ..broken });
-                        self.changed();
-                    }
-                    None => self.break_safe(&effort, self.system.clone()),
-                }
-                effort
-            }
-        };
-        self.answer_safe(request, effort);
-    }
-
-    fn break_safe(&mut self, effort: &Effort, expected: System) {
-        let left = Left { unsettled: effort.unsettled.clone(), ..Left::of(first(effort)) };
-        let residual = Arc::new(self.residual(left, &expected, false));
-        self.broken = Some(Broken { residual, expected, culprit: None, mendable: true });
-        self.changed();
-    }
-
-    fn answer_safe(&mut self, request: Request, effort: Effort) {
-        if effort.is_whole() {
-            return self.answer(request, Verdict::Ok, None);
+    /// Begins the safe configurations that were asked for. True: there were some.
+    pub(super) fn serve_safe(&mut self) -> bool {
+        if self.safe.is_empty() && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) == 0 {
+            return false;
         }
-        let residual = match &self.broken {
-            Some(broken) => broken.residual.clone(),
-            None => Arc::new(Residual {
-                cause: first(&effort),
-                difference: Vec::new(),
-                unsettled: effort.unsettled,
-                irreversible: Vec::new(),
-                faulted: Vec::new(),
-                quarantined: self.quarantined.clone(),
-                observed: false,
-            }),
-        };
-        self.answer(request, Verdict::Broken, Some(Reason::Broken(residual)));
-    }
-
-    /// Serves what waits urgently, in the middle of something.
-    pub(super) fn serve_urgent(&mut self, between: &mut Interruption) {
         self.glance();
-        if self.commands.iter().any(Command::is_urgent) {
-            between.by.get_or_insert(Reason::TakenDown);
-            if !std::mem::replace(&mut between.teardown, true)
-                && self.commands.iter().any(|command| matches!(command, Command::TakeDown { forced: true, .. }))
-            {
-                // Not after what is out has come in: now.
-                self.forced_safe = Some(self.apply_all_safe());
-            }
-            return;
+        let mut some = false;
+        while let Some(request) = self.safe.pop_front() {
+            self.owe(request);
+            self.begin_safe(request);
+            some = true;
         }
-        let mut served = false;
-        while let Some(request) = self.next_safe() {
-            let Ask::Apply(id) = request.ask else { continue };
-            served = true;
-            self.begin(request);
-            let effort = self.apply_safe(id, between);
-            between.by.get_or_insert(Reason::Interrupted(id));
-            between.safe.push((id, request));
-            self.answer_safe(request, effort);
-        }
-        if !served && self.urgent() {
+        if !some && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) > 0 {
             // It was announced and is on its way.
             self.pump(self.clock.now() + Duration::from_millis(1));
         }
+        some
     }
 
-    /// Applies every safe configuration, in the order of their names; what they could not do.
-    pub(super) fn apply_all_safe(&mut self) -> (Vec<ConfigId>, Vec<Reason>) {
-        let mut safe: Vec<ConfigId> = self.configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
-        safe.sort_unstable();
-        let mut troubles = Vec::new();
-        for id in &safe {
-            troubles.extend(self.apply_safe(*id, &mut Interruption::default()).troubles);
-        }
-        (safe, troubles)
-    }
-
-    /// Applies a safe configuration on the live system as far as it goes.
-    pub(super) fn apply_safe(&mut self, id: ConfigId, between: &mut Interruption) -> Effort {
+    /// A safe configuration begins: what is under way is interrupted, and told so.
+    fn begin_safe(&mut self, request: Request) {
+        let Ask::Apply(id) = request.ask else { return };
         let configurations = self.configurations.clone();
-        let Some(configuration) = configurations.get(&id) else { return Effort::default() };
+        let Some(configuration) = configurations.get(&id) else { return };
+        let before = self.interrupt(id);
+        let frame = match before {
+            // The frame as it would be if what is interrupted had never been.
+            Some(before) => self.plan_safe(configuration, request, &before).0,
+            None => None,
+        };
+        let system = self.world.system.clone();
+        let (own, planned, troubles) = self.plan_whole(configuration, request, &system);
+        let frame = frame.or(own);
+        let mut touched = Touched::default();
         for entry in configuration.pre.iter().chain(&configuration.post) {
             if let Target::Component(component) = entry.target {
-                between.touched.add_state(component);
+                touched.add_state(component);
             }
         }
-        match plan::plan(&self.system, configuration, &self.context) {
-            Ok(plan) => self.do_what_goes(&plan.steps, between),
-            Err(_) => {
-                let mut whole = Effort::default();
-                for piece in pieces(configuration) {
-                    match plan::plan(&self.system, &piece, &self.context) {
-                        Ok(plan) => {
-                            let effort = self.do_what_goes(&plan.steps, between);
-                            whole.troubles.extend(effort.troubles);
-                            whole.unsettled.extend(effort.unsettled);
-                        }
-                        Err(refusal) => whole.troubles.push(Reason::Refused(refusal.findings)),
+        planned.steps.iter().for_each(|planned| touched.add(&planned.step));
+        for planned in frame.iter().flat_map(|frame| frame.steps()) {
+            touched.add(&planned.step);
+        }
+        self.troubles.push((request.id, troubles));
+        let spec = Spec {
+            until: Time::NEVER,
+            timeout: Duration::ZERO,
+            patience: self.limits.step_timeout,
+            best_effort: true,
+            asked_back: false,
+        };
+        let purpose = Purpose::Safe(Box::new((request, frame, touched)));
+        let machine = Transaction::new(planned, spec);
+        let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
+        self.running.insert(0, running);
+        // Now, not after what else waits to go on.
+        self.advance(0);
+    }
+
+    /// Interrupts what is under way; the picture without it, if it has done anything.
+    fn interrupt(&mut self, id: ConfigId) -> Option<System> {
+        let mut before: Option<System> = None;
+        for at in 0..self.running.len() {
+            let running = &mut self.running[at];
+            if running.is_safe() || running.over {
+                continue;
+            }
+            running.machine.on(Input::Interrupt(id), &mut self.world.system);
+            let done: Vec<_> = running.machine.done_so_far().map(|(_, undo)| undo.clone()).collect();
+            if !done.is_empty() {
+                let picture = before.get_or_insert_with(|| self.world.system.clone());
+                for undo in done.iter().rev() {
+                    for back in undo.steps() {
+                        let _ = step::apply(back, picture);
                     }
                 }
-                whole
             }
+            // Calls that are out are told first.
+            self.advance(at);
         }
+        before
     }
 
-    fn do_what_goes(&mut self, work: &[Item], between: &mut Interruption) -> Effort {
-        let patience = std::mem::replace(&mut self.patience, self.limits.step_timeout);
-        let mut run = Run::new(work, true, false, Time::NEVER);
-        run.safe = true;
-        self.carry_out(work, &mut run);
-        self.collect(work, &mut run);
-        self.patience = patience;
-        for item in work {
-            between.touched.add(&item.step);
-        }
-        let undo = run.done.iter().rev().flat_map(|i| work[*i as usize].undo.steps().iter().cloned());
-        between.undo.splice(0..0, undo);
-        Effort {
-            troubles: run.failures.into_iter().map(|(_, reason)| reason).collect(),
-            unsettled: run.unsettled.iter().map(|i| work[*i as usize].step.clone()).collect(),
-        }
-    }
-
-    /// Plans a safe configuration that was applied on the picture of what should be, and pushes its frame.
-    /// What it does there is touched: the rollback of what it interrupted must not even pass through the opposite.
-    pub(super) fn fold_in(&mut self, expected: &mut System, id: ConfigId, request: Request, touched: &mut Touched) {
-        std::mem::swap(&mut self.system, expected);
-        match self.plan_ops(&[Op::Push(id, request.requester, request.scoped)]) {
+    /// A safe configuration planned as a frame on a system, if it can be.
+    fn plan_safe(&self, configuration: &Configuration, request: Request, system: &System) -> (Option<Frame>, Option<Planned>) {
+        let Request { requester, scope, .. } = request;
+        let op = Op::Push { configuration, requester, at: self.clock.now(), scope };
+        match transaction(system, &self.world.stack, &[op], &self.context) {
             Ok(planned) => {
-                for item in planned.steps() {
-                    touched.add(&item.step);
-                    let _ = step::apply(&item.step, &mut self.system);
-                }
-                self.commit(planned);
+                let frame = planned.parts[0].edits.push.as_deref().cloned();
+                (frame, Some(planned))
             }
-            Err(_) => {
-                let configurations = self.configurations.clone();
-                for piece in configurations.get(&id).map(pieces).unwrap_or_default() {
-                    if let Ok(plan) = plan::plan(&self.system, &piece, &self.context) {
-                        for item in &plan.steps {
-                            touched.add(&item.step);
-                            let _ = step::apply(&item.step, &mut self.system);
-                        }
+            Err(_) => (None, None),
+        }
+    }
+
+    /// A safe configuration as far as it can be planned, whole or piece by piece, with why pieces cannot.
+    pub(super) fn plan_whole(
+        &self,
+        configuration: &Configuration,
+        request: Request,
+        system: &System,
+    ) -> (Option<Frame>, Planned, Vec<Reason>) {
+        if let (frame, Some(planned)) = self.plan_safe(configuration, request, system) {
+            return (frame, planned, Vec::new());
+        }
+        let mut view = Overlay::new(system);
+        let mut steps: Vec<PlannedStep> = Vec::new();
+        let mut troubles = Vec::new();
+        let (mut footprint, mut saved) = (crate::plan::footprint::Footprint::default(), Vec::new());
+        for piece in pieces(configuration) {
+            let mut trial = view.clone();
+            match plan_on(&mut trial, &piece, &self.context) {
+                Ok(plan) => {
+                    view = trial;
+                    let base = steps.len() as u32;
+                    let wave = steps.last().map_or(0, |step| step.wave + 1);
+                    footprint.touches.extend(plan.footprint.touches);
+                    saved.extend(plan.saved.into_iter().map(|mut value| {
+                        value.at += base;
+                        value
+                    }));
+                    for mut planned in plan.steps {
+                        planned.id += base;
+                        planned.wave += wave;
+                        planned.after.iter_mut().for_each(|id| *id += base);
+                        steps.push(planned);
                     }
                 }
+                Err(refusal) => troubles.push(Reason::Refused(refusal.findings)),
             }
         }
-        std::mem::swap(&mut self.system, expected);
+        let frame = Frame {
+            id: crate::stack::FrameId(u64::MAX),
+            configuration: configuration.id,
+            group: configuration.group,
+            requester: request.requester,
+            at: self.clock.now(),
+            inverse: crate::stack::Inverse::Steps(steps.clone()),
+            footprint,
+            saved,
+            floor: crate::plan::irreversible(&steps).map(str::to_owned),
+            parts: std::collections::BTreeSet::new(),
+            acts: Vec::new(),
+            scope: request.scope,
+            partial: !troubles.is_empty(),
+            safe: true,
+        };
+        let part = crate::stack::Part {
+            range: 0..steps.len() as u32,
+            edits: Edits::default(),
+            pushes: Some(configuration.id),
+            on_failure: configuration.on_failure,
+            frame: Some(std::sync::Arc::new(frame.clone())),
+        };
+        let planned = Planned {
+            steps,
+            of: Vec::new(),
+            whole: Vec::new(),
+            parts: vec![part],
+            revision: system.revision(),
+            warnings: Vec::new(),
+            popped: Vec::new(),
+        };
+        (Some(frame), planned, troubles)
     }
-}
 
-fn first(effort: &Effort) -> Reason {
-    effort.troubles.first().cloned().unwrap_or_else(|| match effort.unsettled.first() {
-        Some(step) => Reason::Step { step: step.clone(), cause: crate::platform::Cause::Timeout },
-        None => Reason::TakenDown,
-    })
+    /// A safe configuration has been applied as far as it goes: its frame is pushed, it is answered, and what it interrupted
+    /// goes back.
+    pub(super) fn safe_ended(&mut self, safe: (Request, Option<Frame>, Touched), machine: Transaction) {
+        let (request, frame, touched) = safe;
+        let edits = machine.planned().parts[0].edits.pops.clone();
+        let end = machine.end();
+        let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
+        let mut troubles = troubles.map(|at| self.troubles.remove(at).1).unwrap_or_default();
+        let mut broken = None;
+        if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
+            broken = Some(part);
+        }
+        self.world.stack.apply([&Edits { pops: edits, push: None }], &[]);
+        let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
+        let frame = match (&broken, interrupted) {
+            (Some(part), false) => part.frame.clone().map(|part| Frame { partial: true, ..part }),
+            _ => frame.map(|frame| Frame { partial: frame.partial || broken.is_some(), ..frame }),
+        };
+        let pushed = frame.map(|frame| self.world.stack.push(Frame { safe: true, ..frame }));
+        let (verdict, reason) = match broken {
+            None if troubles.is_empty() => (Verdict::Ok, None),
+            None => {
+                let residual = crate::stack::Residual::of(troubles.swap_remove(0));
+                (Verdict::Broken, Some(Reason::Broken(std::sync::Arc::new(residual))))
+            }
+            Some(part) => {
+                let residual = part.residual.clone();
+                let part = crate::transaction::BrokenPart { frame: None, instead: None, ..*part };
+                self.left_broken(&request, part);
+                if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
+                    last.frame = pushed;
+                }
+                (Verdict::Broken, Some(Reason::Broken(residual)))
+            }
+        };
+        self.forget_confirmations();
+        self.changed();
+        if verdict == Verdict::Ok
+            && let Some(frame) = pushed
+        {
+            self.await_confirmation(request, frame);
+        }
+        self.answer(request, verdict, reason);
+        self.release(touched);
+    }
+
+    /// What was interrupted goes back, once no safe configuration is being applied any more.
+    fn release(&mut self, touched: Touched) {
+        self.touched.join(touched);
+        if self.running.iter().any(|running| running.is_safe() && !running.over) {
+            return;
+        }
+        let touched = std::mem::take(&mut self.touched);
+        for running in self.running.iter_mut().filter(|running| !running.is_safe() && !running.over) {
+            running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
+        }
+    }
 }
 
 /// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.

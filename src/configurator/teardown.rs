@@ -1,19 +1,18 @@
-//! Taking everything down, comparing with the platform, and recovering.
+//! Taking everything down.
 
-use super::control::{Command, Drift, Recovery, TakenDown};
-use super::engine::{Broken, Engine};
-use super::exec::Run;
-use super::frames::Op;
-use super::progress::Progress;
-use super::request::{Reason, Residual};
-use super::transaction::{Ended, Interruption, Left};
-use super::work::{Item, item};
-use crate::model::{Ask, RunState, Step, Verdict};
-use crate::stack::Stack;
-use crate::system::{self, System, View as _};
+use super::control::{Command, TakenDown};
+use super::engine::Engine;
+use super::request::{Reason, Request};
+use super::running::{Purpose, Running};
+use crate::model::{ConfigId, Origin, RequestId, Step};
+use crate::plan::{PlannedStep, Stage};
+use crate::stack::{Broken, Op, Part, Planned, Requester, Residual, Why, transaction};
+use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
+use crate::transaction::{Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
+use std::time::Duration;
 
 impl Engine {
     pub(super) fn command(&mut self, command: Command) {
@@ -33,86 +32,13 @@ impl Engine {
                 let down = self.take_down(forced, deadline);
                 let _ = reply.try_send(down);
             }
+            Command::Down(_) => {}
             Command::DiscardStack => {
-                self.stack = Stack::new(self.limits.stack);
+                self.world.stack.discard();
                 self.confirming.clear();
                 self.changed();
             }
             Command::Stop => self.stopping = true,
-        }
-    }
-
-    fn drift(&mut self) -> Drift {
-        let mut between = Interruption::closed();
-        let Some(seen) = self.look(&mut between) else { return Drift::default() };
-        let Ok(actual) = System::from_snapshot(&seen, self.system.catalogue().clone()) else { return Drift::default() };
-        let wanted = self.broken.as_ref().map_or(&self.system, |broken| &broken.expected);
-        let mut faulted: Vec<_> = actual
-            .graph()
-            .node_weights()
-            .filter(|node| {
-                node.state == RunState::Faulted
-                    && wanted.component(node.name).is_none_or(|wanted| wanted.state != RunState::Faulted)
-            })
-            .map(|node| node.name)
-            .collect();
-        faulted.sort_unstable();
-        Drift { steps: system::diff(wanted, &actual), faulted, observed: true }
-    }
-
-    /// Recovers a broken system.
-    fn recover(&mut self, direction: Recovery) -> Result<(), Arc<Residual>> {
-        let Some(broken) = self.broken.take() else { return Ok(()) };
-        match direction {
-            Recovery::Back => self.recover_back(broken),
-            Recovery::Accept => {
-                let mut between = Interruption::closed();
-                match self.look(&mut between) {
-                    Some(seen) if self.adopt(&seen).is_ok() => {
-                        self.stack = Stack::new(self.limits.stack);
-                        self.confirming.clear();
-                        self.changed();
-                        Ok(())
-                    }
-                    _ => {
-                        let residual = broken.residual.clone();
-                        self.broken = Some(broken);
-                        Err(residual)
-                    }
-                }
-            }
-        }
-    }
-
-    /// Goes back to the system as it should be. What is unsettled or irreversible has then been accepted.
-    pub(super) fn recover_back(&mut self, broken: Broken) -> Result<(), Arc<Residual>> {
-        let mut between = Interruption::default();
-        let before = self.look(&mut between);
-        let mut observed = before.is_some_and(|seen| self.adopt(&seen).is_ok());
-        if observed {
-            self.repair(&broken.expected, &mut between);
-            observed = self.look(&mut between).is_some_and(|seen| self.adopt(&seen).is_ok());
-        }
-        if observed && system::diff::reached(&self.system, &broken.expected) {
-            self.changed();
-            if let Some(progress) = &self.progress {
-                progress(&Progress::Recovered);
-            }
-            return Ok(());
-        }
-        let left = Left::of(broken.residual.cause.clone());
-        let residual = Arc::new(self.residual(left, &broken.expected, observed));
-        self.broken = Some(Broken { residual: residual.clone(), ..broken });
-        self.changed();
-        Err(residual)
-    }
-
-    /// A component came back from a call that had never returned: what could not be undone because of it may be now.
-    pub(super) fn mend(&mut self) {
-        self.note_quarantine();
-        if self.broken.as_ref().is_some_and(|broken| broken.mendable) {
-            let broken = self.broken.take().expect("it is broken");
-            let _ = self.recover_back(broken);
         }
     }
 
@@ -121,23 +47,35 @@ impl Engine {
         self.refuse_waiting();
         self.confirming.clear();
         if forced {
-            let (safe, troubles) = match self.forced_safe.take() {
-                Some(done) => done,
-                None => self.apply_all_safe(),
-            };
-            down.safe = safe;
-            down.troubles = troubles;
-        } else if self.broken.is_none() {
+            // Not after what is out has come in: now.
+            self.break_off();
+            self.apply_all_safe(&mut down);
+        }
+        self.end_running(forced);
+        if !forced && self.world.broken.is_empty() {
             self.pop_all(&mut down, deadline);
         }
         self.remove_all(&mut down, deadline);
-        self.stack = Stack::new(self.limits.stack);
-        self.broken = None;
+        self.world.stack.discard();
+        self.world.broken.clear();
         if !down.is_clean() {
-            let expected = System::new(self.system.catalogue().clone());
+            let expected = System::new(self.world.system.catalogue().clone());
             let cause = down.troubles.first().cloned().unwrap_or(Reason::TakenDown);
-            let residual = Arc::new(self.residual(Left::of(cause), &expected, down.observed));
-            self.broken = Some(Broken { residual, expected, culprit: None, mendable: true });
+            let residual = Residual {
+                difference: system::diff(&expected, &self.world.system),
+                quarantined: self.world.quarantined.clone(),
+                observed: down.observed,
+                ..Residual::of(cause)
+            };
+            let components = down.left.components.keys().copied().chain(down.quarantined.iter().copied()).collect();
+            self.world.broken.push(Broken {
+                residual: Arc::new(residual),
+                components,
+                culprit: None,
+                frame: None,
+                mendable: true,
+                expected: crate::model::Snapshot::default(),
+            });
         }
         down.in_time = self.clock.now() <= deadline;
         self.changed();
@@ -146,82 +84,193 @@ impl Engine {
 
     /// Everything that still waits is answered: nothing of it will be done.
     fn refuse_waiting(&mut self) {
-        while let Some(batch) = self.queue.pop_front() {
-            for request in batch.requests {
-                self.begin(request);
-                let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
-                    Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
-                };
-                self.answer(request, verdict, Some(Reason::TakenDown));
+        self.glance();
+        let safe: Vec<Request> = self.safe.drain(..).collect();
+        let waiting = self.desk.cancel_waiting(|_| true);
+        for request in waiting.into_iter().chain(safe) {
+            if request.why == Why::Asked {
+                self.owe(request);
+                self.answer(request, request.ask.failed(), Some(Reason::TakenDown));
             }
         }
     }
 
+    /// What is under way is broken off: calls that are out are told so.
+    fn break_off(&mut self) {
+        for at in 0..self.running.len() {
+            if !self.running[at].is_safe() {
+                self.running[at].machine.on(Input::TakenDown, &mut self.world.system);
+                self.advance(at);
+            }
+        }
+    }
+
+    /// Waits until nothing is under way any more; given up, what was done is taken back.
+    fn end_running(&mut self, forced: bool) {
+        if !forced {
+            for running in &mut self.running {
+                running.machine.on(Input::Stop, &mut self.world.system);
+            }
+        }
+        loop {
+            let did = self.advance_all();
+            // Nothing of a batch goes on with what had not begun.
+            self.refuse_rest();
+            if self.running.is_empty() {
+                return;
+            }
+            if !did {
+                self.pump(self.running_until());
+            }
+        }
+    }
+
+    /// Requests of batches under way that have not begun are answered.
+    fn refuse_rest(&mut self) {
+        let begun: Vec<u32> = self
+            .running
+            .iter()
+            .filter_map(|running| match &running.purpose {
+                Purpose::Requests(number, _) => Some(*number),
+                _ => None,
+            })
+            .collect();
+        let left: Vec<_> = self.desk.under_way().iter().filter(|turn| !begun.contains(&turn.number)).cloned().collect();
+        for turn in left {
+            self.desk.over(turn.number);
+            for request in turn.batch.requests {
+                match request.why {
+                    Why::Asked => self.answer(request, request.ask.failed(), Some(Reason::TakenDown)),
+                    _ => self.forget(request),
+                }
+            }
+        }
+    }
+
+    /// Applies every safe configuration, in the order of their names.
+    fn apply_all_safe(&mut self, down: &mut TakenDown) {
+        let mut safe: Vec<ConfigId> = self.configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
+        safe.sort_unstable();
+        let configurations = self.configurations.clone();
+        for id in &safe {
+            let Some(configuration) = configurations.get(id) else { continue };
+            let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
+            let system = self.world.system.clone();
+            let (_, planned, troubles) = self.plan_whole(configuration, request, &system);
+            down.troubles.extend(troubles);
+            let machine = Transaction::new(planned, self.effort(Time::NEVER));
+            let done = self.carry_out(machine);
+            down.troubles.extend(troubles_of(done));
+        }
+        down.safe = safe;
+    }
+
+    /// Carries something of one's own out, while everything else goes on.
+    pub(super) fn carry_out(&mut self, machine: Transaction) -> Transaction {
+        let number = self.number();
+        self.running.push(Running::new(number, machine, Purpose::Own, SmallVec::new()));
+        self.complete(number).machine
+    }
+
+    /// A best effort.
+    pub(super) fn effort(&self, until: Time) -> Spec {
+        Spec { until, timeout: Duration::ZERO, patience: self.limits.step_timeout, best_effort: true, asked_back: true }
+    }
+
     /// Removes what is there by the difference to nothing.
     fn remove_all(&mut self, down: &mut TakenDown, deadline: Time) {
-        let mut between = Interruption::closed();
-        if let Some(seen) = self.look(&mut between)
+        if let Some(seen) = self.look()
             && let Err(unknown) = self.adopt(&seen)
         {
             down.troubles.push(Reason::Panic(unknown.to_string()));
         }
         self.note_quarantine();
-        let nothing = System::new(self.system.catalogue().clone());
-        let steps = system::diff(&self.system, &nothing);
+        let nothing = System::new(self.world.system.catalogue().clone());
+        let quarantined = self.world.quarantined.clone();
+        let steps = system::diff(&self.world.system, &nothing);
         let work =
             taking_apart(steps.into_iter().filter(|step| {
-                matches!(step, Step::Disconnect { .. }) || !self.quarantined.contains(&step.component())
+                matches!(step, Step::Disconnect { .. }) || !quarantined.contains(&step.component())
             }));
-        self.patience = self.limits.step_timeout;
-        let mut run = Run::new(&work, true, false, deadline);
-        self.carry_out(&work, &mut run);
-        self.collect(&work, &mut run);
-        down.forced = run.done.iter().map(|i| work[*i as usize].step.clone()).collect();
-        down.troubles.extend(run.failures.into_iter().map(|(_, reason)| reason));
-        match self.look(&mut between) {
+        let machine = Transaction::new(own_plan(work, &self.world.system), self.effort(deadline));
+        let done = self.carry_out(machine);
+        down.forced = done.done_so_far().map(|(planned, _)| planned.step.clone()).collect();
+        down.troubles.extend(troubles_of(done));
+        match self.look() {
             Some(seen) => {
                 down.observed = true;
                 let _ = self.adopt(&seen);
                 down.left = seen;
             }
-            None => down.left = self.system.snapshot(),
+            None => down.left = self.world.system.snapshot(),
         }
         self.note_quarantine();
-        down.quarantined.clone_from(&self.quarantined);
+        down.quarantined.clone_from(&self.world.quarantined);
     }
 
     /// Pops frame after frame, newest first, as long as that goes.
     fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
-        let spec = self.spec([Op::Top]);
-        while !self.stack.is_empty() && self.clock.now() < deadline {
-            let Some(configuration) = self.stack.top().map(|frame| frame.configuration) else { return };
-            match self.plan_ops(&[Op::Top]) {
-                Ok(planned) => match self.transact(planned.steps(), spec) {
-                    Ended::Applied => {
-                        self.commit(planned);
-                        down.popped.push(configuration);
-                    }
-                    Ended::Undone(reason) => return down.troubles.push(reason),
-                    Ended::Broken(residual) => return down.troubles.push(Reason::Broken(residual)),
-                },
-                Err((_, reason)) => return down.troubles.push(reason),
+        while self.clock.now() < deadline {
+            let Some(top) = self.world.stack.top().cloned() else { return };
+            let planned = match transaction(&self.world.system, &self.world.stack, &[Op::Undo(top.id)], &self.context) {
+                Ok(planned) => planned,
+                Err(refusal) => return down.troubles.push(Reason::Refused(refusal.findings)),
+            };
+            let edits = planned.parts[0].edits.clone();
+            let spec = Spec { asked_back: true, ..self.spec(&planned, true) };
+            let end = self.carry_out(Transaction::new(planned, spec)).end();
+            match end.parts.into_iter().next() {
+                Some(PartEnd::Done) | None => {
+                    self.world.stack.apply([&edits], &[]);
+                    self.changed();
+                    down.popped.push(top.configuration);
+                }
+                Some(PartEnd::Failed(reason)) => return down.troubles.push(reason),
+                Some(PartEnd::Broken(part)) => return down.troubles.push(Reason::Broken(part.residual)),
+                Some(PartEnd::Cancelled | PartEnd::Anew) => return,
             }
         }
     }
 }
 
+/// What a best effort could not do.
+fn troubles_of(machine: Transaction) -> Vec<Reason> {
+    machine.failures()
+}
+
+/// Steps of the configurator's own as a plan of one part.
+pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
+    let part = Part {
+        range: 0..steps.len() as u32,
+        edits: crate::stack::Edits::default(),
+        pushes: None,
+        on_failure: crate::model::OnFailure::Unset,
+        frame: None,
+    };
+    Planned {
+        steps,
+        of: Vec::new(),
+        whole: Vec::new(),
+        parts: vec![part],
+        revision: system.revision(),
+        warnings: Vec::new(),
+        popped: Vec::new(),
+    }
+}
+
 /// The steps to nothing in an order that leaves room: run states one after the other (producers before consumers), then
 /// all disconnections side by side, then all destructions.
-fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<Item> {
-    let mut work: Vec<Item> = Vec::new();
+fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
+    let mut work: Vec<PlannedStep> = Vec::new();
     for (id, step) in (0u32..).zip(steps) {
         let (wave, after) = match step {
             Step::State { .. } => (0, id.checked_sub(1).into_iter().collect()),
             Step::Destroy { .. } => (2, SmallVec::new()),
             _ => (1, SmallVec::new()),
         };
-        work.push(item(step, id, wave, after));
+        let undo = Undo::Nothing;
+        let reversibility = Reversibility::Exact;
+        work.push(PlannedStep { id, stage: Stage::Changes, wave, after, step, reversibility, undo, origin: Origin::NONE });
     }
     work
 }

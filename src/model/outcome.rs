@@ -31,6 +31,9 @@ pub enum Cause {
     /// The connection to the component was lost.
     #[error("the connection was lost: {0}")]
     Lost(String),
+    /// It was given up before it had begun.
+    #[error("given up before it began")]
+    Cancelled,
     /// The component is in quarantine: an earlier call never returned.
     #[error("in quarantine: an earlier call has not returned")]
     Quarantined,

@@ -125,7 +125,7 @@ fn call(operation: &str, undo: Option<&str>) -> ChangeKind {
 }
 
 fn attempt(system: &System, conf: &Configuration) -> Result<Plan, Refusal> {
-    plan(system, conf, &Context { activities: BTreeSet::from([ident("fast")]) })
+    plan(system, conf, &Context { activities: BTreeSet::from([ident("fast")]), ..Context::default() })
 }
 
 fn apply(system: &mut System, conf: &Configuration) -> Plan {

@@ -9,6 +9,7 @@ pub mod simulated;
 pub use crate::model::outcome::{Cause, Execution, Outcome};
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
 use crate::time::Time;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -43,7 +44,8 @@ pub enum PlatformEvent {
         /// When.
         at: Time,
     },
-    /// A component whose call had never returned came back and was cleaned up (it is gone, or as before the call).
+    /// A component that was in quarantine has left it: its call has returned and it was cleaned up (it is gone, or as
+    /// before the call); or a call that was given up has come to rest at last, and it is as that left it.
     Returned {
         /// Who.
         component: ComponentName,
@@ -78,6 +80,31 @@ pub trait Platform: Send + Sync {
     /// Checks its own precondition: a step that does not fit what is there is refused and changes nothing.
     fn execute(&self, step: &Step, deadline: Time) -> Outcome;
 
+    /// [`Platform::execute`], for a step of a `safe` configuration: it does not wait until a call that was given up has come
+    /// to rest, and quarantine does not keep it out, wherever the platform can do without: a value that is written without
+    /// waiting, an operation that runs beside the component's own activity (a brake).
+    fn execute_safe(&self, step: &Step, deadline: Time) -> Outcome {
+        self.execute(step, deadline)
+    }
+
+    /// Gives up the call that is under way for exactly this step: whoever carries it out is told so at once. Does not wait,
+    /// never blocks, and does nothing where no such call is under way (it is over, or has not reached the platform yet).
+    ///
+    /// The `execute` that is out returns as soon as the component has come to rest:
+    ///
+    /// * [`Cause::Cancelled`], *not done*: it had not begun, and never will.
+    /// * *Done*, with or without a value: it had begun. A call given up half way counts as done, whatever it answered: an
+    ///   error of an operation that has been told is no word that nothing happened, and only what counts as done is taken
+    ///   back by its compensation. Only a panic stays one.
+    /// * [`Cause::Failed`]: the component had said so before it was told.
+    /// * *Unknown* at its deadline: it has not come to rest, and is in quarantine until it has. The deadline stays; whoever
+    ///   wants to give the component time to come to rest gives up before it.
+    ///
+    /// Until then the component begins no other operation, except those that run beside its activity, and those of
+    /// [`Platform::execute_safe`]. Only operations can be told; making, dropping and moving between run states goes on to
+    /// its end once it has begun.
+    fn cancel(&self, step: &Step);
+
     /// Carries out brief steps, none of which needs another one, in their order: each has `each` from its beginning, and
     /// `until` at most. Begins no further one after one that is not done, nor after
     /// [`BRIEF_TURN`](crate::limits::BRIEF_TURN), nor once `stop` is set. Answers for those that were begun, at least one;
@@ -105,6 +132,20 @@ pub trait Platform: Send + Sync {
         deadline: Time,
     ) -> Result<Option<ComponentSnapshot>, ObserveError>;
 
+    /// Those of these components that exist, as [`Platform::observe`] has them, with the connections that begin or end at
+    /// any of them and their written ports. A platform that can costs in proportion to them, and not to all there is.
+    ///
+    /// # Errors
+    /// When they cannot be read by `deadline`.
+    fn observe_some(&self, components: &[ComponentName], deadline: Time) -> Result<Snapshot, ObserveError> {
+        let mut seen = self.observe(deadline)?;
+        let asked: BTreeSet<ComponentName> = components.iter().copied().collect();
+        seen.components.retain(|name, _| asked.contains(name));
+        seen.connections.retain(|(from, to), _| asked.contains(&from.component) || asked.contains(&to.component));
+        seen.ports.retain(|port, _| asked.contains(&port.component));
+        Ok(seen)
+    }
+
     /// Resolves a fixed list of steps (no create, destroy) to handles, so that running them again and again costs as
     /// little as the platform can make it. None: not supported, or some step is blocking.
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
@@ -115,7 +156,7 @@ pub trait Platform: Send + Sync {
     /// From now on events go to `sink` (one sink; the last one set).
     fn subscribe(&self, sink: EventSink);
 
-    /// Components whose call never returned.
+    /// Components whose call never returned, or did not come to rest when it was given up.
     fn quarantined(&self) -> Vec<ComponentName>;
 
     /// What the activities that have components did so far, by name: rounds, overruns, latencies, who holds one up.

@@ -3,14 +3,15 @@
 //! An activity shares with the configurator atomic words, a signal, a queue of operations and the latest list of its
 //! components, and no lock.
 
+use super::call::{Call, Reply};
 use super::cell::{Cell, Closed};
-use super::component::{Call, Reply};
 use super::latest::Reader;
 use crate::limits;
 use crate::model::monitor::Counter;
 use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState, Value};
 use crate::time::{Clock, Receiver, Signal, Time};
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -23,37 +24,8 @@ pub(crate) struct Request {
     pub(crate) operation: usize,
     pub(crate) args: Vec<Value>,
     pub(crate) call: Call,
-    pub(crate) stage: Arc<Stage>,
-}
-
-/// Whether a call has begun; decided once, between its caller's deadline and its thread.
-#[derive(Default)]
-pub(crate) struct Stage(AtomicU8);
-
-impl Stage {
-    const QUEUED: u8 = 0;
-    const BEGUN: u8 = 1;
-    const WITHDRAWN: u8 = 2;
-    const RETURNED: u8 = 3;
-
-    pub(crate) fn begin(&self) -> bool {
-        self.0.compare_exchange(Self::QUEUED, Self::BEGUN, Ordering::AcqRel, Ordering::Acquire).is_ok()
-    }
-
-    /// The component's code has come back (though its answer may come later).
-    pub(crate) fn returned(&self) {
-        self.0.store(Self::RETURNED, Ordering::Release);
-    }
-
-    /// Whether the component's code is being run.
-    pub(crate) fn is_inside(&self) -> bool {
-        self.0.load(Ordering::Acquire) == Self::BEGUN
-    }
-
-    /// Takes the call back if it has not begun.
-    pub(crate) fn withdraw(&self) -> bool {
-        self.0.compare_exchange(Self::QUEUED, Self::WITHDRAWN, Ordering::AcqRel, Ordering::Acquire).is_ok()
-    }
+    /// It does not wait until a call that was given up has come to rest.
+    pub(crate) safe: bool,
 }
 
 /// Counters of an activity. All times in nanoseconds.
@@ -119,8 +91,12 @@ impl Activity {
     }
 
     /// A component runs no longer.
-    pub(crate) fn stopped(&self) {
+    pub(crate) fn stopped(&self, cell: &Cell) {
         self.running.fetch_sub(1, Ordering::SeqCst);
+        if cell.beat.restless.load(Ordering::Acquire) > 0 {
+            // It is at rest now: what was kept back goes on.
+            self.signal.notify();
+        }
     }
 
     /// The thread is to end.
@@ -179,13 +155,14 @@ impl Activity {
     }
 
     /// Serves what is asked, and waits while nothing runs. False: the thread is to end.
-    fn attend(&self, requests: &Receiver<Request>) -> bool {
+    fn attend(&self, requests: &Receiver<Request>, held: &mut VecDeque<Request>) -> bool {
         loop {
             if self.ended.load(Ordering::SeqCst) {
                 return false;
             }
+            self.take_up(held);
             while let Ok(request) = requests.try_recv() {
-                self.serve(request);
+                self.admit(request, held);
             }
             if self.running.load(Ordering::SeqCst) > 0 {
                 return true;
@@ -201,9 +178,10 @@ impl Activity {
     fn run_periodic(&self, period: Duration, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
         let step = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         let mut release = self.clock.now();
+        let mut held = VecDeque::new();
         loop {
             let idle = self.running.load(Ordering::SeqCst) == 0;
-            if !self.attend(requests) {
+            if !self.attend(requests, &mut held) {
                 return;
             }
             let now = self.clock.now();
@@ -235,8 +213,9 @@ impl Activity {
 
     fn run_on_events(&self, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
         let mut restless = 0;
+        let mut held = VecDeque::new();
         loop {
-            if !self.attend(requests) {
+            if !self.attend(requests, &mut held) {
                 return;
             }
             let now = self.clock.now();
@@ -290,16 +269,43 @@ impl Activity {
         self.leave(cell, inside, fault);
     }
 
+    /// Serves a request, or keeps it back: until its component has come to rest from a call that was given up, it begins no
+    /// other; and requests of one component keep their order.
+    fn admit(&self, request: Request, held: &mut VecDeque<Request>) {
+        let waits = !request.safe
+            && (request.cell.is_restless() || held.iter().any(|other| Arc::ptr_eq(&other.cell, &request.cell)));
+        if !waits {
+            self.serve(request);
+        } else if held.len() < limits::ACTIVITY_REQUESTS {
+            held.push_back(request);
+        } else {
+            request.call.0.answer(Reply::Refused(format!("too many operations wait for the activity `{}`", self.name)));
+        }
+    }
+
+    /// What was kept back and may be served now.
+    fn take_up(&self, held: &mut VecDeque<Request>) {
+        if held.is_empty() {
+            return;
+        }
+        for request in std::mem::take(held) {
+            if !request.call.0.is_withdrawn() {
+                self.admit(request, held);
+            }
+        }
+    }
+
     fn serve(&self, request: Request) {
-        let Request { cell, operation, args, call, stage } = request;
-        if !stage.begin() {
+        let Request { cell, operation, args, call, safe } = request;
+        let progress = call.0.clone();
+        if !progress.begin() {
             return;
         }
         self.busy_since.store(self.clock.now().0, Ordering::Release);
-        match cell.enter_for_operation() {
+        match cell.enter_for_operation(safe) {
             Ok(mut inside) => {
                 let mut ended = inside.operation(&self.clock, operation, &args, call);
-                stage.returned();
+                progress.returned();
                 self.leave(&cell, inside, ended.fault.take());
                 ended.answer();
             }
@@ -308,7 +314,7 @@ impl Activity {
                     Closed::Quarantined => "the component is in quarantine",
                     _ => "another call is under way",
                 };
-                let _ = call.reply.try_send(Reply::Refused(text.to_owned()));
+                progress.answer(Reply::Refused(text.to_owned()));
             }
         }
         self.busy_since.store(Time::NEVER.0, Ordering::Release);
@@ -318,7 +324,7 @@ impl Activity {
     fn leave(&self, cell: &Arc<Cell>, inside: super::cell::Inside<'_>, fault: Option<String>) {
         let left = inside.leave(fault.is_some().then_some(RunState::Faulted));
         if left.ended_running {
-            self.stopped();
+            self.stopped(cell);
         }
         if let Some(reason) = fault {
             cell.beat.faulted(reason, self.clock.now());

@@ -3,7 +3,7 @@
 
 use crate::model::{ComponentName, EventName};
 use crate::time::{Signal, Time};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// What a component tells the platform by itself.
@@ -60,6 +60,9 @@ pub struct Beat {
     pub(crate) pending: AtomicBool,
     /// When it wants to be updated though nothing comes.
     pub(crate) wake_at: AtomicU64,
+    /// Its calls that were given up while they were under way and have not come to rest. For a moment one too few, when
+    /// the rest comes while it is being given up.
+    pub(crate) restless: AtomicI32,
     /// How its activity is woken; none for periodic ones.
     wake: Option<Signal>,
     notices: Arc<Notices>,
@@ -72,6 +75,7 @@ impl Beat {
             now: AtomicU64::new(0),
             pending: AtomicBool::new(false),
             wake_at: AtomicU64::new(Time::NEVER.0),
+            restless: AtomicI32::new(0),
             wake,
             notices,
         }

@@ -4,7 +4,8 @@
 //! component each time (the builder only hands out ports and properties; docs, units and limits cost nothing).
 
 use super::beat::Beat;
-use super::component::{Answer, Arguments, Component, Context, HookResult, Reply, Returned};
+use super::call::Reply;
+use super::component::{Answer, Arguments, Component, Context, HookResult, Returned};
 use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
 use super::probe::{Probes, ProbesEnd, Wanted};
 use super::property::{Prop, PropEnd};
@@ -388,7 +389,8 @@ impl<C: Component> Builder<C> {
         }
     }
 
-    /// An operation, run in the component's own activity between two updates (on a worker while it is not running).
+    /// An operation, run in the component's own activity between two updates (on a worker while it is not running). One that
+    /// takes long looks at [`Context::is_cancelled`], or at its ticket's, and comes to rest when it is given up.
     ///
     /// The function is the type's, not the component's: it gets the component as its first argument.
     pub fn operation<A: Arguments, R: Returned>(
@@ -413,7 +415,9 @@ impl<C: Component> Builder<C> {
     }
 
     /// An operation that runs in the caller's thread, also while the component is updated: it answers for its own
-    /// synchronisation, and so gets nothing but what it captures. It never answers [`Answer::Pending`].
+    /// synchronisation, and so gets nothing but what it captures. It never answers [`Answer::Pending`], and is not told when
+    /// it is given up: it should be short. A brake is written so: called from a `safe` configuration it waits for nothing
+    /// that the component does, not even in quarantine.
     pub fn caller_operation<A: Arguments, R: Returned>(
         &mut self,
         name: &str,

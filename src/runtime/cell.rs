@@ -1,11 +1,12 @@
 //! A component in its place: the gate that decides who may touch it, and the component behind the gate.
 
 use super::beat::Beat;
-use super::component::{Call, Context, HookResult, Reply};
+use super::call::{Call, Progress, Reply};
+use super::component::{Context, HookResult};
 use super::guard;
 use super::library::{Body, Kind};
 use crate::model::{ComponentName, RunState, Transition, Value};
-use crate::time::{Clock, Sender, Time};
+use crate::time::{Clock, Time};
 use std::cell::UnsafeCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -18,6 +19,11 @@ const BUSY: u32 = 4;
 const FAULTED: u32 = 8;
 /// A call of it did not return in time.
 const QUARANTINED: u32 = 16;
+/// From this bit on: how many calls of it that had been given up did not come to rest in time. While it runs steps are kept
+/// out as in quarantine, but it is updated on: only so can it come to rest.
+const RESTLESS: u32 = 32;
+/// What stays when the run state changes.
+const KEPT: u32 = !(RESTLESS - 1);
 
 /// A component and its gate.
 ///
@@ -66,6 +72,11 @@ fn bits_of(state: RunState) -> u32 {
     }
 }
 
+/// Whether quarantine keeps a step out. A `safe` one is let in wherever the component's code can still be called.
+fn keeps_out(gate: u32, safe: bool) -> bool {
+    gate & QUARANTINED != 0 || (!safe && gate & KEPT != 0 && gate & (RUN | BUSY) != 0)
+}
+
 impl Cell {
     pub(crate) fn new(kind: Arc<Kind>, beat: Arc<Beat>, body: Box<dyn Body>) -> Self {
         Self {
@@ -86,14 +97,35 @@ impl Cell {
         self.gate.load(Ordering::Acquire) & BUSY != 0
     }
 
+    /// Whether steps on it are refused.
     pub(crate) fn is_quarantined(&self) -> bool {
+        keeps_out(self.gate.load(Ordering::Acquire), false)
+    }
+
+    /// Whether a call of it never returned: its code is not to be called any more.
+    pub(crate) fn is_lost(&self) -> bool {
         self.gate.load(Ordering::Acquire) & QUARANTINED != 0
     }
 
+    /// Whether a call that was given up is still at work in it. Who is neither updated nor inside a call is at rest.
+    pub(crate) fn is_restless(&self) -> bool {
+        self.beat.restless.load(Ordering::Acquire) > 0 && self.gate.load(Ordering::Acquire) & (RUN | BUSY) != 0
+    }
+
+    /// A call that was given up has not come to rest in time.
+    pub(crate) fn keep_out_until_rest(&self) {
+        self.gate.fetch_add(RESTLESS, Ordering::AcqRel);
+    }
+
+    /// It has after all. Whether no other call keeps it restless.
+    pub(crate) fn came_to_rest(&self) -> bool {
+        self.gate.fetch_sub(RESTLESS, Ordering::AcqRel) & KEPT == RESTLESS
+    }
+
     /// Moves to another run state, for transitions without a hook. `stop` does not wait for an update under way.
-    pub(crate) fn shift(&self, transition: Transition) -> Result<(), Closed> {
+    pub(crate) fn shift(&self, transition: Transition, safe: bool) -> Result<(), Closed> {
         self.change(|gate| {
-            if gate & QUARANTINED != 0 {
+            if keeps_out(gate, safe) {
                 return Err(Closed::Quarantined);
             }
             let state = state_of(gate);
@@ -103,7 +135,7 @@ impl Cell {
             if gate & BUSY != 0 && transition != Transition::Stop {
                 return Err(Closed::Busy);
             }
-            Ok(bits_of(transition.target()) | (gate & BUSY))
+            Ok(bits_of(transition.target()) | (gate & (BUSY | KEPT)))
         })
         .map(drop)
     }
@@ -132,14 +164,17 @@ impl Cell {
     }
 
     /// Enters for an operation in its activity's thread: whether it runs or not.
-    pub(crate) fn enter_for_operation(&self) -> Result<Inside<'_>, Closed> {
-        self.enter(|_| Ok(()))
+    pub(crate) fn enter_for_operation(&self, safe: bool) -> Result<Inside<'_>, Closed> {
+        self.enter(safe, |_| Ok(()))
     }
 
     /// Enters while it does not run, for a hook or an operation on a worker.
-    pub(crate) fn enter_idle(&self, allowed: impl Fn(RunState) -> bool) -> Result<Inside<'_>, Closed> {
+    pub(crate) fn enter_idle(&self, safe: bool, allowed: impl Fn(RunState) -> bool) -> Result<Inside<'_>, Closed> {
         self.enter(
-            |state| if state != RunState::Running && allowed(state) { Ok(()) } else { Err(Closed::State(state)) },
+            safe,
+            |state| {
+                if state != RunState::Running && allowed(state) { Ok(()) } else { Err(Closed::State(state)) }
+            },
         )
     }
 
@@ -150,9 +185,9 @@ impl Cell {
             .map(|_| Inside { cell: self })
     }
 
-    fn enter(&self, allowed: impl Fn(RunState) -> Result<(), Closed>) -> Result<Inside<'_>, Closed> {
+    fn enter(&self, safe: bool, allowed: impl Fn(RunState) -> Result<(), Closed>) -> Result<Inside<'_>, Closed> {
         self.change(|gate| {
-            if gate & QUARANTINED != 0 {
+            if keeps_out(gate, safe) {
                 return Err(Closed::Quarantined);
             }
             if gate & BUSY != 0 {
@@ -192,13 +227,15 @@ pub(crate) struct Ended {
     pub(crate) fault: Option<String>,
     /// None: the answer comes later.
     reply: Option<Reply>,
-    to: Sender<Reply>,
+    to: Arc<Progress>,
+    /// The answering end, where no ticket has it: it answers by itself when it is dropped, so not before the answer.
+    _call: Option<Call>,
 }
 
 impl Ended {
     pub(crate) fn answer(self) {
         if let Some(reply) = self.reply {
-            let _ = self.to.try_send(reply);
+            self.to.answer(reply);
         }
     }
 }
@@ -274,21 +311,21 @@ impl<'a> Inside<'a> {
     pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Call) -> Ended {
         let cell = self.cell;
         cell.beat.set_now(clock.now());
-        let mut cx = Context::new(clock, &cell.beat, 0.0, false);
-        let to = call.reply.clone();
-        cx.call = Some(call);
+        let to = call.0.clone();
+        let mut cx = Context::of_call(clock, &cell.beat, call);
         let result = match self.body() {
             None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
             Some(body) => guard::call(|| body.operation(index, args, &mut cx)),
         };
+        let call = cx.take_call();
         let (reply, fault) = match result {
             Err(panic) => (Some(Reply::Panicked(panic.clone())), Some(panic)),
-            Ok(None) if cx.call.is_some() => {
+            Ok(None) if call.is_some() => {
                 (Some(Reply::Failed("it answered `Pending` without taking a ticket".to_owned())), cx.fault.take())
             }
             Ok(reply) => (reply, cx.fault.take()),
         };
-        Ended { fault, reply, to }
+        Ended { fault, reply, to, _call: call }
     }
 
     /// Leaves, in another state if one is given.
@@ -296,7 +333,9 @@ impl<'a> Inside<'a> {
         let cell = self.cell;
         std::mem::forget(self);
         let before = cell
-            .change(|gate| Ok((state.map_or(gate & (CONFIGURED | RUN | FAULTED), bits_of)) | (gate & QUARANTINED)))
+            .change(|gate| {
+                Ok((state.map_or(gate & (CONFIGURED | RUN | FAULTED), bits_of)) | (gate & (QUARANTINED | KEPT)))
+            })
             .unwrap_or_default();
         Left {
             ended_running: before & RUN != 0 && matches!(state, Some(s) if s != RunState::Running),

@@ -2,12 +2,13 @@
 
 use super::beat::Beat;
 use super::builder::Builder;
+use super::call::{Call, Progress, Reply};
 use super::value::PortValue;
 use crate::model::{ComponentName, EventName, Value, ValueType};
-use crate::time::{Clock, Sender, Time};
+use crate::time::{Clock, Time};
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// A component type, written in Rust.
 ///
@@ -151,23 +152,11 @@ macro_rules! arguments {
 }
 arguments! { () (A) (A, B) (A, B, C) (A, B, C, D) (A, B, C, D, E) (A, B, C, D, E, F) }
 
-/// How a call of an operation ended, without types.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Reply {
-    Done(Option<Value>),
-    Failed(String),
-    Panicked(String),
-    /// It was never begun: the component was busy, gone or faulted.
-    Refused(String),
-}
-
-/// The answering end of a call.
-pub(crate) struct Call {
-    pub(crate) reply: Sender<Reply>,
-    pub(crate) cancelled: Arc<AtomicBool>,
-}
-
 /// The answer to a call that takes longer than one update. Dropped unanswered, the call failed.
+///
+/// A call can be given up while it is under way: its deadline is past, or nobody wants it any more. Look at
+/// [`Ticket::is_cancelled`] in each update; when it says so, come to rest (what moves, holds where it is) and drop the
+/// ticket. Until then the component begins no other operation; see `Platform::cancel` for what the call then counts as.
 pub struct Ticket<R = ()> {
     call: Option<Call>,
     returned: PhantomData<fn(R)>,
@@ -186,14 +175,14 @@ impl<R: Returned> Ticket<R> {
 }
 
 impl<R> Ticket<R> {
-    /// Whether nobody waits for the answer any more: the deadline is past.
+    /// Whether the call has been given up: come to rest.
     pub fn is_cancelled(&self) -> bool {
-        self.call.as_ref().is_none_or(|call| call.cancelled.load(Ordering::Acquire))
+        self.call.as_ref().is_none_or(|call| call.0.is_told())
     }
 
     fn answer(&mut self, reply: Reply) {
         if let Some(call) = self.call.take() {
-            let _ = call.reply.try_send(reply);
+            call.0.answer(reply);
         }
     }
 }
@@ -211,12 +200,24 @@ pub struct Context<'a> {
     dt: f64,
     first: bool,
     pub(crate) fault: Option<String>,
-    pub(crate) call: Option<Call>,
+    call: Option<Call>,
+    /// The call that this is, if it is one of an operation.
+    progress: Option<Arc<Progress>>,
 }
 
 impl<'a> Context<'a> {
     pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>, dt: f64, first: bool) -> Self {
-        Self { clock, beat, dt, first, fault: None, call: None }
+        Self { clock, beat, dt, first, fault: None, call: None, progress: None }
+    }
+
+    pub(crate) fn of_call(clock: &'a Clock, beat: &'a Arc<Beat>, call: Call) -> Self {
+        let progress = Some(call.0.clone());
+        Self { call: Some(call), progress, ..Self::new(clock, beat, 0.0, false) }
+    }
+
+    /// The answering end, unless a ticket has it.
+    pub(crate) fn take_call(&mut self) -> Option<Call> {
+        self.call.take()
     }
 
     /// The moment this call stands for: the same in all of one update, and the time stamp of what it writes.
@@ -259,6 +260,13 @@ impl<'a> Context<'a> {
     /// In an event-driven activity: update me at `time` though nothing may have come. The last call counts.
     pub fn wake_at(&mut self, time: Time) {
         self.beat.wake_at.store(time.0, Ordering::Relaxed);
+    }
+
+    /// Inside an operation: whether its caller has given it up. One that waits or works for long looks at it now and then,
+    /// and when it says so comes to rest and returns, whatever it answers: an error then counts as done half way. What
+    /// answers later looks at [`Ticket::is_cancelled`] instead. In hooks and updates always false: they cannot be given up.
+    pub fn is_cancelled(&self) -> bool {
+        self.progress.as_ref().is_some_and(|progress| progress.is_told())
     }
 
     /// Inside an operation: the means to answer later. The operation then answers [`Answer::Pending`].

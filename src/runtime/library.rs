@@ -2,7 +2,8 @@
 
 use super::beat::Beat;
 use super::builder::{Builder, Ends, Table, hook_index};
-use super::component::{Component, Context, HookResult, Reply};
+use super::call::Reply;
+use super::component::{Component, Context, HookResult};
 use crate::model::{Catalogue, ComponentType, Ident, Transition, TypeName, Value};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;

@@ -10,6 +10,7 @@
 pub mod activity;
 pub mod beat;
 pub mod builder;
+pub(crate) mod call;
 pub(crate) mod cell;
 pub mod component;
 pub(crate) mod guard;

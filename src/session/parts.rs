@@ -4,7 +4,7 @@
 //! of the others that wait for it. A frame belongs to whoever asked for it, so none undoes another's.
 
 use super::hub::Hub;
-use super::routes::{Junction, ToConfigurator, lock, scoped};
+use super::routes::{Junction, ToConfigurator, lock};
 use crate::configurator::Requester;
 use crate::coordinator::Coordinator;
 use crate::functions::Opener;
@@ -49,7 +49,9 @@ impl Part {
                 junction: Arc::downgrade(junction),
                 name: requester,
                 prefix: if several { format!("{name}:") } else { String::new() },
-                scoped: scoped(&chart),
+                down: chart.find(&own.down).ok(),
+                is_down: false,
+                untold: false,
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
             let sees_all = functions.is_some();

@@ -3,13 +3,13 @@
 
 use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
-use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester};
+use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, Scope};
 use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
-use crate::model::{EventName, Verdict};
+use crate::model::{EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
-use crate::statechart::{Chart, EventId, NodeId, Printer, RaiseSite, Raised, Said, When};
-use rustc_hash::FxHashSet;
+use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
+use rustc_hash::FxHashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -44,16 +44,11 @@ pub(super) struct ToConfigurator {
     pub name: Requester,
     /// Written before the names of its states, where there are several coordinators.
     pub prefix: String,
-    /// Names that a state raises because of its state-scoped configurations.
-    pub scoped: FxHashSet<(EventName, NodeId)>,
-}
-
-pub(super) fn scoped(chart: &Chart) -> FxHashSet<(EventName, NodeId)> {
-    let of = |site: &RaiseSite| match site.when {
-        When::Entry(state) if site.scoped => Some((site.name, state)),
-        _ => None,
-    };
-    chart.raises().iter().filter_map(of).collect()
+    /// Its state that means down.
+    pub down: Option<NodeId>,
+    /// Whether it is in that, and whether that has not been told yet.
+    pub is_down: bool,
+    pub untold: bool,
 }
 
 impl Listener for ToConfigurator {
@@ -64,8 +59,8 @@ impl Listener for ToConfigurator {
                 Meaning::Request(ask) => {
                     let id = self.hub.request(ask, &self.name.to_string());
                     let tag = (raised.owner.index() as u64, u64::from(raised.visit));
-                    let scoped = self.scoped.contains(&(raised.name, raised.owner));
-                    requests.requests.push(Request { id, ask, requester: self.name, scoped, tag });
+                    let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
+                    requests.requests.push(Request { scope, tag, ..Request::new(id, ask, self.name) });
                 }
                 Meaning::Emitted(event) => {
                     self.hub.note(Happening::Emitted { event: event.to_string() });
@@ -87,9 +82,15 @@ impl Listener for ToConfigurator {
             // A full queue answers every request itself.
             let _ = configurator.submit(requests);
         }
+        // Behind what the same step asks for.
+        self.tell_down();
     }
 
     fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
+        self.tell_down();
+        let is_down = self.down.is_some_and(|down| active.contains(&down));
+        self.untold = is_down && !self.is_down;
+        self.is_down = is_down;
         self.hub.note(Happening::State {
             active: active.iter().map(|n| format!("{}{}", self.prefix, chart.fqn(*n))).collect(),
         });
@@ -100,6 +101,7 @@ impl Listener for ToConfigurator {
     }
 
     fn rested(&mut self) {
+        self.tell_down();
         // An event that moves nothing is written down nowhere: without this, who waits for "up" would not look again.
         self.hub.wake();
     }
@@ -120,6 +122,15 @@ impl Listener for ToConfigurator {
 }
 
 impl ToConfigurator {
+    /// Has it stand in the queue that the *down* state was entered, if it was.
+    fn tell_down(&mut self) {
+        if std::mem::take(&mut self.untold)
+            && let Some(configurator) = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
+        {
+            configurator.down(self.name);
+        }
+    }
+
     /// What one coordinator emits is an event of the others that wait for it somewhere. It goes by the lane of reports, so
     /// that two coordinators that answer each other for ever delay neither an operator nor an answer.
     fn tell_others(&self, event: EventName) {
@@ -141,14 +152,15 @@ impl ToConfigurator {
     }
 }
 
-/// Steps carried out since the last answer.
-pub(super) type Steps = Mutex<Vec<StepTime>>;
+/// Steps carried out for requests that are not answered yet.
+pub(super) type Steps = Mutex<FxHashMap<RequestId, Vec<StepTime>>>;
 
 pub(super) fn on_progress(hub: &Hub, steps: &Steps, progress: &Progress) {
     match progress {
-        Progress::Begun { .. } => lock(steps).clear(),
-        Progress::Ended { step, end, took, undoing } => {
+        Progress::Begun { .. } => {}
+        Progress::Ended { request, step, end, took, undoing } => {
             let mut steps = lock(steps);
+            let steps = steps.entry(*request).or_default();
             if steps.len() < limits::STEPS_LOGGED {
                 steps.push(StepTime { step: *step, undoing: *undoing, end: *end, took: *took });
             }
@@ -173,7 +185,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
         by: answer.request.requester.to_string(),
         took_us: answer.took.as_secs_f64() * 1e6,
         reasons,
-        steps: std::mem::take(&mut *lock(steps)),
+        steps: lock(steps).remove(&answer.request.id).unwrap_or_default(),
     });
     if let Some(coordinator) = junction.coordinator(answer.request.requester) {
         let (owner, visit) = answer.request.tag;

@@ -59,11 +59,12 @@ impl Session {
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
-        let steps = Arc::new(Mutex::new(Vec::new()));
+        let steps = Arc::new(Mutex::new(rustc_hash::FxHashMap::default()));
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
+            coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
             platform: platform.clone(),
             clock: clock.clone(),
             limits: deployment.limits,
@@ -151,7 +152,7 @@ impl Session {
     /// Makes a request in the name of an operator.
     pub fn request(&self, ask: Ask, by: &str) -> RequestId {
         let id = self.hub.request(ask, by);
-        let request = Request { id, ask, requester: Requester::Operator, scoped: false, tag: (0, 0) };
+        let request = Request { force: true, ..Request::new(id, ask, Requester::Operator) };
         // A full queue has answered it already.
         let _ = self.configurator.submit(Batch::one(request));
         id

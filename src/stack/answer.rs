@@ -132,7 +132,6 @@ impl Residual {
             && self.difference.is_empty()
             && self.unsettled.is_empty()
             && self.faulted.is_empty()
-            && self.quarantined.is_empty()
     }
 
     /// Whether nothing at all is left.
@@ -147,7 +146,7 @@ impl Residual {
             Step::Connect { from, to, .. } | Step::Disconnect { from, to } => [from.component, to.component],
             other => [other.component(); 2],
         };
-        steps.flat_map(of).chain(self.faulted.iter().copied()).chain(self.quarantined.iter().copied())
+        steps.flat_map(of).chain(self.faulted.iter().copied())
     }
 }
 

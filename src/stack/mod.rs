@@ -27,6 +27,7 @@ pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
 pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
+pub use prepared::switch_frame;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};
@@ -260,6 +261,17 @@ impl Stack {
         if let Some(at) = self.frames.iter().position(|f| f.id == frame.id) {
             self.frames[at] = Arc::new(frame);
         }
+    }
+
+    /// Pushes a frame, but below those of safe configurations at the top: they stand above what they interrupted.
+    pub fn push_below_safe(&mut self, frame: Frame) -> FrameId {
+        let id = self.push(frame);
+        let mut at = self.frames.len() - 1;
+        while at > 0 && self.frames[at - 1].safe && self.frames[at].id == id {
+            self.frames.swap(at - 1, at);
+            at -= 1;
+        }
+        id
     }
 
     /// Pushes a frame as it is, but for its number.

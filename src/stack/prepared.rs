@@ -28,26 +28,7 @@ impl Stack {
         let frame = match spare.and_then(|mut frame| refreshed(&mut frame, switch, id, requester, at, scope).then_some(frame))
         {
             Some(frame) => frame,
-            None => {
-                let steps = switch.steps(switch.acts());
-                let saved = switch.saved(&steps);
-                Arc::new(Frame {
-                    id,
-                    configuration: switch.configuration(),
-                    group: switch.group(),
-                    requester,
-                    at,
-                    inverse: Inverse::Steps(steps),
-                    footprint: switch.footprint(),
-                    saved,
-                    floor: None,
-                    parts: BTreeSet::new(),
-                    acts: switch.acts().to_vec(),
-                    scope,
-                    partial: false,
-                    safe: false,
-                })
-            }
+            None => Arc::new(Frame { id, ..switch_frame(switch, requester, at, scope) }),
         };
         self.frames.push(frame);
         id
@@ -65,6 +46,28 @@ impl Stack {
                 self.spares.push(frame);
             }
         }
+    }
+}
+
+/// The frame of a switch whose acts are planned, without a number.
+pub fn switch_frame(switch: &Switch, requester: Requester, at: Time, scope: Option<Scope>) -> Frame {
+    let steps = switch.steps(switch.acts());
+    let saved = switch.saved(&steps);
+    Frame {
+        id: FrameId(u64::MAX),
+        configuration: switch.configuration(),
+        group: switch.group(),
+        requester,
+        at,
+        inverse: Inverse::Steps(steps),
+        footprint: switch.footprint(),
+        saved,
+        floor: None,
+        parts: BTreeSet::new(),
+        acts: switch.acts().to_vec(),
+        scope,
+        partial: false,
+        safe: false,
     }
 }
 

@@ -67,7 +67,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
     let mut parts: BTreeSet<_> = lower.parts.iter().chain(&upper.parts).copied().collect();
     for frame in [lower, upper] {
         if !frame.is_squashed() {
-            parts.insert(frame.part());
+            parts.insert(frame.buried());
         }
     }
     let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::default();

@@ -1,6 +1,6 @@
 //! What the laws leave to examples: groups, floors, hand-over, the bound, failed components.
 
-use super::{FrameId, Request, Requester, Stack, Transaction, transaction};
+use super::{FrameId, Op, Requester, Scope, Stack, Planned, transaction};
 use crate::model::*;
 use crate::plan::{Context, Refusal};
 use crate::system::{System, View, step};
@@ -75,8 +75,8 @@ fn call(operation: &str) -> ChangeKind {
     ChangeKind::OperationCall { call: Call { operation: member(operation), args: vec![] }, undo: None }
 }
 
-fn push(configuration: &Configuration) -> Request<'_> {
-    Request::Push { configuration, requester: Requester::Operator, at: Time(0), active: false }
+fn push(configuration: &Configuration) -> Op<'_> {
+    Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None }
 }
 
 impl Bench {
@@ -96,12 +96,12 @@ impl Bench {
         bench
     }
 
-    fn ask(&self, requests: &[Request<'_>]) -> Result<Transaction, Refusal> {
+    fn ask(&self, requests: &[Op<'_>]) -> Result<Planned, Refusal> {
         transaction(&self.system, &self.stack, requests, &Context::default())
     }
 
     /// Executes, and answers the steps and the frames pushed.
-    fn ok(&mut self, requests: &[Request<'_>]) -> (Vec<String>, Vec<FrameId>) {
+    fn ok(&mut self, requests: &[Op<'_>]) -> (Vec<String>, Vec<FrameId>) {
         let transaction = self.ask(requests).unwrap_or_else(|r| panic!("{r:?}"));
         let steps = transaction.steps.iter().map(|s| s.step.to_string()).collect();
         for s in &transaction.steps {
@@ -110,7 +110,7 @@ impl Bench {
         (steps, self.stack.commit(transaction))
     }
 
-    fn codes(&self, requests: &[Request<'_>]) -> Vec<&'static str> {
+    fn codes(&self, requests: &[Op<'_>]) -> Vec<&'static str> {
         self.ask(requests).expect_err("it is refused").findings.iter().map(|f| f.code.0).collect()
     }
 
@@ -132,7 +132,7 @@ fn alternatives_never_pass_through_what_was_before_both() {
     assert_eq!(steps, ["property_set A.gain = 0.0", "stop A", "property_set A.mass = 5.0", "start A"]);
     assert_eq!(bench.stack.len(), 1);
     // The new frame remembers what was before both.
-    bench.ok(&[Request::UndoTop]);
+    bench.ok(&[Op::UndoTop]);
     assert_eq!((bench.value("A.mass"), bench.value("A.gain")), (0.0, 0.0));
     // The same one again changes nothing at all.
     bench.ok(&[push(&eight)]);
@@ -152,7 +152,7 @@ fn a_group_that_cannot_be_replaced_refuses_and_changes_nothing() {
     assert_eq!(bench.codes(&[push(&two)]), ["stack::group", "stack::shared"]);
     assert_eq!((bench.system.revision(), bench.stack.len()), (before, 2));
     // In one batch the frame above goes first.
-    bench.ok(&[Request::UndoTop, push(&two)]);
+    bench.ok(&[Op::UndoTop, push(&two)]);
     assert_eq!(bench.stack.len(), 1);
 }
 
@@ -164,16 +164,16 @@ fn undo_does_not_pass_a_floor() {
     bench.ok(&[push(&conf("weld", None, &[], vec![call("A.weld")], &[]))]);
     let above = conf("above", None, &[], vec![set("B.gain", 1.0)], &[]);
     bench.ok(&[push(&above)]);
-    assert_eq!(bench.codes(&[Request::UndoTo(0)]), ["stack::floor"]);
-    assert_eq!(bench.codes(&[Request::Undo(below)]), ["stack::floor"]);
-    bench.ok(&[Request::UndoTop]);
-    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+    assert_eq!(bench.codes(&[Op::UndoTo(0)]), ["stack::floor"]);
+    assert_eq!(bench.codes(&[Op::Undo(below)]), ["stack::floor"]);
+    bench.ok(&[Op::UndoTop]);
+    assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
     bench.stack.make_floor();
-    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+    assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
     assert!(bench.stack.is_buried(ConfigId::new("weld").unwrap(), None));
     bench.stack.discard();
-    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::empty"]);
-    assert_eq!(bench.codes(&[Request::Undo(below)]), ["stack::no_frame"]);
+    assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::empty"]);
+    assert_eq!(bench.codes(&[Op::Undo(below)]), ["stack::no_frame"]);
 }
 
 #[test]
@@ -181,20 +181,20 @@ fn values_are_handed_over_and_what_blocks_is_named() {
     let mut bench = Bench::new(64);
     let first = bench.ok(&[push(&conf("first", None, &[], vec![set("A.gain", 1.0)], &[]))]).1[0];
     bench.ok(&[push(&conf("second", None, &[], vec![set("A.gain", 2.0)], &[]))]);
-    assert!(bench.ok(&[Request::Undo(first)]).0.is_empty(), "nothing is sent");
+    assert!(bench.ok(&[Op::Undo(first)]).0.is_empty(), "nothing is sent");
     assert_eq!(bench.value("A.gain"), 2.0);
-    bench.ok(&[Request::UndoTop]);
+    bench.ok(&[Op::UndoTop]);
     assert_eq!(bench.value("A.gain"), 0.0, "what was before the first");
     // A demand that was true already counts as a write, and takes the value over.
     let first = bench.ok(&[push(&conf("first", None, &[], vec![set("A.gain", 1.0)], &[]))]).1[0];
     bench.ok(&[push(&conf("second", None, &[], vec![set("A.gain", 1.0)], &[]))]);
-    bench.ok(&[Request::Undo(first)]);
+    bench.ok(&[Op::Undo(first)]);
     assert_eq!(bench.value("A.gain"), 1.0);
-    assert_eq!(bench.ok(&[Request::UndoTop]).0, ["property_set A.gain = 0.0"]);
+    assert_eq!(bench.ok(&[Op::UndoTop]).0, ["property_set A.gain = 0.0"]);
     // A state that a frame above demanded by name blocks, though no step was needed.
     let stop = bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![], &[]))]).1[0];
     bench.ok(&[push(&conf("needs", None, &[("A", RunState::Stopped)], vec![], &[]))]);
-    let refusal = bench.ask(&[Request::Undo(stop)]).unwrap_err();
+    let refusal = bench.ask(&[Op::Undo(stop)]).unwrap_err();
     assert_eq!(refusal.findings[0].message, "`stop` cannot be undone before `needs`, which needs the run state of `A`");
 }
 
@@ -203,7 +203,7 @@ fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(3);
     let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
     let scoped = of(1);
-    let request = Request::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), active: true };
+    let request = Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) };
     let kept = bench.ok(&[request]).1[0];
     for n in 2..9 {
         bench.ok(&[push(&of(n))]);
@@ -214,14 +214,14 @@ fn frames_of_active_states_are_never_squashed() {
     assert_eq!((squashed.parts.len(), squashed.configuration.as_str()), (6, "c7"));
     assert!(bench.stack.is_buried(ConfigId::new("c3").unwrap(), Some(Requester::Operator)));
     // Left: popped from the bottom; the squashed frame takes its value over.
-    bench.ok(&[Request::Undo(kept)]);
-    bench.ok(&[Request::UndoTo(0)]);
+    bench.ok(&[Op::Undo(kept)]);
+    bench.ok(&[Op::UndoTo(0)]);
     assert_eq!(bench.value("A.gain"), 0.0);
     // Nothing but active frames: refused.
     let mut bench = Bench::new(2);
     for n in 0..2 {
         let conf = of(n);
-        bench.ok(&[Request::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), active: true }]);
+        bench.ok(&[Op::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) }]);
     }
     assert_eq!(bench.codes(&[push(&of(3))]), ["stack::full"]);
 }
@@ -234,8 +234,8 @@ fn calls_that_pile_up_become_a_floor() {
     }
     let oldest = &bench.stack.frames()[0];
     assert!(oldest.floor.as_ref().is_some_and(|why| why.contains("operation calls")));
-    bench.ok(&[Request::UndoTop]);
-    assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
+    bench.ok(&[Op::UndoTop]);
+    assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
 }
 
 #[test]
@@ -264,10 +264,10 @@ fn a_failed_component_is_taken_down_without_being_started() {
     };
     bench.ok(&[push(&conf("more", None, &[], vec![create], &[("C", RunState::Running)]))]);
     bench.system.set_state(a, RunState::Faulted);
-    assert_eq!(bench.ok(&[Request::UndoTop]).0, ["destroy C"]);
+    assert_eq!(bench.ok(&[Op::UndoTop]).0, ["destroy C"]);
     // Where it stays, it goes from the fault to where the inverse wants it.
     bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![set("A.mass", 3.0)], &[]))]);
     bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
-    let (steps, _) = bench.ok(&[Request::UndoTop]);
+    let (steps, _) = bench.ok(&[Op::UndoTop]);
     assert_eq!(steps, ["cleanup A", "property_set A.mass = 0.0", "configure A", "start A"]);
 }

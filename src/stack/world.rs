@@ -1,7 +1,7 @@
 //! System, stack and what is broken, as one: all that requests are judged by and that they change.
 
 use super::{FrameId, Requester, Residual, Stack};
-use crate::model::{ComponentName, ConfigId};
+use crate::model::{ComponentName, ConfigId, Snapshot};
 use crate::system::System;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -19,6 +19,8 @@ pub struct Broken {
     pub frame: Option<FrameId>,
     /// May be mended without being asked, when a component comes back.
     pub mendable: bool,
+    /// The components as the model has them.
+    pub expected: Snapshot,
 }
 
 /// The configurator's half of a running deployment.

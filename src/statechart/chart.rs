@@ -144,6 +144,8 @@ pub(super) struct EdgeRow {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Op {
     Raise(EventName),
+    /// Of a state-scoped configuration of the state that is entered or left.
+    RaiseScoped(EventName),
     Call(FunctionId),
 }
 

@@ -240,7 +240,7 @@ impl Chart {
     fn add_entry_and_exit(&mut self, state: Addition<'_, State>) -> (Span, Span) {
         let State { entry, exit, config, .. } = state.what;
         let mut entered = self.add_actions(entry, state.functions);
-        let named = |text: &str| Op::Raise(EventName::new(text).expect("a configuration's name is an event's"));
+        let named = |text: &str| Op::RaiseScoped(EventName::new(text).expect("a configuration's name is an event's"));
         self.ops.extend(config.iter().map(|(config, _)| named(config.as_str())));
         entered.len = length(&self.ops) - entered.start;
         let start = length(&self.ops);

@@ -18,6 +18,8 @@ pub struct Raised {
     pub owner: NodeId,
     /// The owner's how-manieth visit this is, from 1. Once the owner has been left, the visit is over for good.
     pub visit: u32,
+    /// The state whose state-scoped configuration asks: by being entered for it, by being left for its undo.
+    pub scope: Option<NodeId>,
 }
 
 /// Where a function of a model is called.

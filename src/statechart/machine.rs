@@ -491,7 +491,14 @@ impl Machine {
         for op in ops.of(&chart.ops) {
             match *op {
                 Op::Raise(name) => {
-                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()] });
+                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()], scope: None });
+                }
+                Op::RaiseScoped(name) => {
+                    let scope = match place {
+                        Place::Entry(state) | Place::Exit(state) => Some(state),
+                        _ => None,
+                    };
+                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()], scope });
                 }
                 Op::Call(function) => hook.action(function, place, &mut self.view(chart)),
             }

@@ -26,8 +26,9 @@ struct Reaction {
     /// It leaves one leaf for another of the same state, and at most that one raises something, one name; the chart has no
     /// time events. So nearly all reactions of nearly all machines: the rows below need not be looked at.
     simple: bool,
-    /// What a simple one raises.
+    /// What a simple one raises, and whether it is its state-scoped configuration.
     name: Option<EventName>,
+    scoped: bool,
     /// The states entered before the leaf, outermost first.
     around: Span,
     /// What is raised, in order, with its owner.
@@ -53,6 +54,7 @@ impl Known {
             keep: 0,
             simple: false,
             name: None,
+            scoped: false,
             around: none,
             raised: none,
         };
@@ -67,7 +69,7 @@ pub(super) struct Reactions {
     of: Vec<Known>,
     rows: Vec<Reaction>,
     around: Vec<NodeId>,
-    raised: Vec<(EventName, NodeId)>,
+    raised: Vec<(EventName, NodeId, Option<NodeId>)>,
 }
 
 /// What playing a reaction came to.
@@ -115,7 +117,8 @@ impl Machine {
             *visits = visits.wrapping_add(1);
             (self.leaf, self.mode) = (Some(row.leaf), Mode::Done);
             if let Some(name) = row.name {
-                hook.raised(chart, Raised { name, owner: row.leaf, visit: *visits });
+                let scope = row.scoped.then_some(row.leaf);
+                hook.raised(chart, Raised { name, owner: row.leaf, visit: *visits, scope });
             }
             return AtOnce::Rests;
         }
@@ -133,8 +136,9 @@ impl Machine {
         self.visit_next(row.leaf);
         self.leaf = Some(row.leaf);
         self.mode = Mode::Done;
-        for (name, owner) in row.raised.of(&all.raised) {
-            hook.raised(chart, Raised { name: *name, owner: *owner, visit: self.visits[owner.index()] });
+        for (name, owner, scope) in row.raised.of(&all.raised) {
+            let visit = self.visits[owner.index()];
+            hook.raised(chart, Raised { name: *name, owner: *owner, visit, scope: *scope });
         }
         if chart.timers.is_empty() { AtOnce::Rests } else { self.time_after(chart, row, now) }
     }
@@ -255,7 +259,9 @@ impl Reactions {
         let keep = machine.path.len() - notes.entered.len();
         let name = match notes.raised[..] {
             [] => Some(None),
-            [(name, owner)] if owner == leaf => Some(Some(name)),
+            [(name, owner, scope)] if owner == leaf && scope.is_none_or(|scope| scope == leaf) => {
+                Some(Some((name, scope.is_some())))
+            }
             _ => None,
         };
         let simple = around.is_empty() && chart.depth(from) == keep && name.is_some() && chart.timers.is_empty();
@@ -264,7 +270,8 @@ impl Reactions {
             leaf,
             keep: u32::try_from(keep).expect("less deep than ids are many"),
             simple,
-            name: name.flatten(),
+            name: name.flatten().map(|(name, _)| name),
+            scoped: name.flatten().is_some_and(|(_, scoped)| scoped),
             around: span(starts.0, self.around.len()),
             raised: span(starts.1, self.raised.len()),
         })
@@ -279,7 +286,7 @@ fn span(start: usize, end: usize) -> Span {
 /// Writes down one step.
 struct Notes {
     entered: Vec<NodeId>,
-    raised: Vec<(EventName, NodeId)>,
+    raised: Vec<(EventName, NodeId, Option<NodeId>)>,
     /// First only exits, then only entries, and nothing to report.
     plain: bool,
 }
@@ -310,7 +317,7 @@ impl Hook for Notes {
     }
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
-        self.raised.push((raised.name, raised.owner));
+        self.raised.push((raised.name, raised.owner, raised.scope));
     }
 
     fn conflict(&mut self, _: &Chart, _: NodeId, _: &mut dyn Iterator<Item = EdgeId>) {

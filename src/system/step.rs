@@ -184,10 +184,21 @@ pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
     }
 }
 
-/// Whether `step` moves hardware: it is run when somebody asks for it, and not by itself.
+/// Whether `step` moves hardware: an operation that is declared so, or starting or stopping a component whose type says so.
+/// Such a step is run when somebody asks for it, and not by itself (design §3).
 pub fn moves(step: &Step, view: &impl View) -> bool {
-    let _ = (step, view);
-    false
+    match step {
+        Step::Operation(call) => view
+            .component(call.operation.component)
+            .and_then(|node| node.ty.operations.get(&call.operation.member))
+            .is_some_and(|operation| operation.moves),
+        Step::State { component, transition } => view.component(*component).is_some_and(|node| match transition {
+            Transition::Start => node.ty.moves.start,
+            Transition::Stop => node.ty.moves.stop,
+            Transition::Configure | Transition::Cleanup => false,
+        }),
+        _ => false,
+    }
 }
 
 /// Makes `step` happen in the picture, when its precondition holds.

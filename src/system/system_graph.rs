@@ -92,6 +92,114 @@ impl System {
         &self.types
     }
 
+    /// Takes over what was observed of some components (those that are not in `seen` are not there), with the connections
+    /// that begin or end at them. Answers whether anything was otherwise.
+    ///
+    /// # Errors
+    /// [`UnknownType`] for a component whose type is not in the catalogue; nothing has changed then.
+    pub fn adopt(&mut self, names: &[ComponentName], seen: &Snapshot) -> Result<bool, UnknownType> {
+        let mut types = Vec::with_capacity(names.len());
+        for name in names {
+            types.push(match seen.components.get(name) {
+                None => None,
+                Some(component) => Some(
+                    self.types.get(component.ty).cloned().ok_or(UnknownType { component: *name, ty: component.ty })?,
+                ),
+            });
+        }
+        let mut changed = false;
+        // Connections first: a component that goes has none.
+        let set: rustc_hash::FxHashSet<ComponentName> = names.iter().copied().collect();
+        let concerns = |from: &MemberRef, to: &MemberRef| set.contains(&from.component) || set.contains(&to.component);
+        let gone: Vec<(MemberRef, MemberRef)> = self
+            .links
+            .iter()
+            .filter(|((from, to), edge)| {
+                concerns(from, to) && seen.connections.get(&(*from, *to)) != Some(&self.graph[**edge].policy)
+            })
+            .map(|(ends, _)| *ends)
+            .collect();
+        for (from, to) in gone {
+            self.remove_link(from, to);
+            changed = true;
+        }
+        for (name, ty) in names.iter().zip(types) {
+            changed |= self.adopt_one(*name, ty, seen);
+        }
+        for ((from, to), policy) in seen.connections.iter().filter(|((from, to), _)| concerns(from, to)) {
+            let known = self.names.contains_key(&from.component) && self.names.contains_key(&to.component);
+            if known && !self.links.contains_key(&(*from, *to)) {
+                self.insert_link(*from, *to, *policy);
+                changed = true;
+            }
+        }
+        Ok(changed)
+    }
+
+    fn adopt_one(&mut self, name: ComponentName, ty: Option<Arc<crate::model::ComponentType>>, seen: &Snapshot) -> bool {
+        let (Some(ty), Some(component)) = (ty, seen.components.get(&name)) else {
+            let there = self.names.contains_key(&name);
+            if there {
+                let ends: Vec<_> =
+                    self.links.keys().filter(|(a, b)| a.component == name || b.component == name).copied().collect();
+                ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
+                self.remove_component(name);
+            }
+            return there;
+        };
+        let present = self.component(name);
+        let another = present.is_none_or(|node| node.ty.name != component.ty || node.activity != component.activity);
+        if another {
+            if present.is_some() {
+                let ends: Vec<_> =
+                    self.links.keys().filter(|(a, b)| a.component == name || b.component == name).copied().collect();
+                ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
+                self.remove_component(name);
+            }
+            let values = ty.properties.iter().map(|(_, declared)| declared.default.clone().unwrap_or(Value::Bool(false)));
+            let values = values.collect();
+            self.insert_component(Node::new(name, ty.clone(), component.activity, values));
+        }
+        let mut changed = another;
+        if self.component(name).is_some_and(|node| node.state != component.state) {
+            self.put_state(name, component.state);
+            changed = true;
+        }
+        for (index, property) in ty.properties.keys().enumerate() {
+            let (Some(value), Some(node)) = (component.properties.get(property), self.component(name)) else { continue };
+            if node.properties.get(index) != Some(value) {
+                self.put_property(name, index, value);
+                changed = true;
+            }
+        }
+        for (index, port) in ty.ports.keys().enumerate() {
+            let value = seen.ports.get(&name.member(*port));
+            if self.component(name).is_some_and(|node| node.written(index) != value) {
+                self.put_port(name, index, value);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Some of its components as they are observed, with the connections that begin or end at them.
+    pub fn snapshot_some(&self, names: &[ComponentName]) -> Snapshot {
+        let set: rustc_hash::FxHashSet<ComponentName> = names.iter().copied().collect();
+        let mut snapshot = Snapshot::default();
+        for node in names.iter().filter_map(|name| self.component(*name)) {
+            snapshot.components.insert(node.name, node.snapshot());
+            for (port, value) in node.written_ports() {
+                snapshot.ports.insert(node.name.member(port), value.clone());
+            }
+        }
+        for ((from, to), edge) in &self.links {
+            if set.contains(&from.component) || set.contains(&to.component) {
+                snapshot.connections.insert((*from, *to), self.graph[*edge].policy);
+            }
+        }
+        snapshot
+    }
+
     /// A number that every change raises. A plan is valid for the revision it was made from.
     pub fn revision(&self) -> u64 {
         self.revision

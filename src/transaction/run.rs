@@ -80,11 +80,6 @@ impl Run {
         }
     }
 
-    /// Whether a step is over, done or not.
-    pub fn is_over_at(&self, i: u32) -> bool {
-        self.state[i as usize] == State::Over
-    }
-
     /// The steps that are out.
     pub fn outstanding(&self) -> impl Iterator<Item = u32> + '_ {
         (0..).zip(&self.state).filter(|(_, state)| matches!(state, State::Out(_))).map(|(i, _)| i)
@@ -234,6 +229,19 @@ impl Run {
         self.finish(i);
         self.failures.push((i, reason));
         false
+    }
+
+    /// A step was done before this took over; the model has it.
+    pub fn was_done(&mut self, i: u32) {
+        self.state[i as usize] = State::Over;
+        self.done.push(i);
+        self.at = i as usize + 1;
+    }
+
+    /// A step is out that was begun before this took over.
+    pub fn is_out(&mut self, i: u32, live: &System) {
+        self.state[i as usize] = State::Out(live.revision());
+        self.out += 1;
     }
 
     /// A step that was taken did not begin.

@@ -113,6 +113,16 @@ macro_rules! leaves_to_inner {
         fn observe(&self, deadline: Time) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
             self.inner.observe(deadline)
         }
+        fn observe_some(
+            &self,
+            components: &[davit::model::ComponentName],
+            deadline: Time,
+        ) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
+            self.inner.observe_some(components, deadline)
+        }
+        fn cancel(&self, step: &davit::model::Step) {
+            self.inner.cancel(step);
+        }
         fn observe_component(
             &self,
             component: davit::model::ComponentName,
@@ -188,6 +198,7 @@ impl Rig {
             configurations,
             catalogue,
             activities,
+            coordinators: BTreeSet::new(),
             platform: wrap(platform.clone()),
             clock: clock.clone(),
             limits,
@@ -223,7 +234,9 @@ impl Rig {
         };
         let mut next = self.next.lock().unwrap();
         *next += 1;
-        let request = Request { id: RequestId(*next), ask, requester, scoped: false, tag: (*next, 7) };
+        // The scenario's operator means it.
+        let force = requester == Requester::Operator;
+        let request = Request { force, tag: (*next, 7), ..Request::new(RequestId(*next), ask, requester) };
         self.submitted.lock().unwrap().push(request);
         request
     }

@@ -2,22 +2,32 @@
 
 use davit::model::*;
 use davit::platform::{Cause, Outcome, Platform, PlatformEvent};
-use davit::time::{Clock, Time};
+use davit::time::{Clock, Receiver, Time};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// What a component of the test type `Misbehaving` does in one of its hooks.
+/// What a component of the test type `Misbehaving` does in one of its hooks, or in its operation `work`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(dead_code)]
 pub enum Trouble {
-    /// The hook answers an error.
+    /// The hook or operation answers an error.
     Fail,
     /// The hook panics.
     Panic,
     /// The hook never returns, or so long after it was called.
     Hang(Option<Duration>),
+    /// The operation takes [`WORK`]; given up meanwhile it comes to rest within [`REST`].
+    Long,
+    /// The operation takes [`WORK`], and takes no notice of being given up.
+    Deaf,
 }
+
+/// How long the operation `work` of a `Misbehaving` in trouble takes.
+pub const WORK: Duration = Duration::from_secs(10);
+
+/// How long a component takes at most to come to rest.
+pub const REST: Duration = Duration::from_millis(50);
 
 /// Lets the component of that name raise that event.
 pub type Raise = Box<dyn Fn(&str, &str)>;
@@ -37,7 +47,8 @@ pub struct Made {
 pub trait Bed {
     /// A platform with nothing on it, on a simulated clock that the calling thread has entered, with the test types;
     /// in every component of type `Misbehaving`, the given hooks (`configure`, `start`, `stop`, `cleanup`), or its making
-    /// and its end (`create`, `destroy`: they only hang), are in trouble.
+    /// and its end (`create`, `destroy`: they only hang), or its operation `work` (`Fail`, `Long`, `Deaf`), are in trouble.
+    /// Its operation `brake` needs nothing of its activity.
     fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made;
 }
 
@@ -103,7 +114,12 @@ pub fn types() -> Vec<ComponentType> {
     }
     plant.operations.insert(ident("nothing"), operation(&[], None));
     plant.operations.insert(ident("scale"), operation(&["float", "int"], Some("float")));
-    vec![plant, ComponentType::new("Misbehaving", "Does in its hooks what the test asks for.")]
+    let mut misbehaving = ComponentType::new("Misbehaving", "Does in its hooks what the test asks for.");
+    for name in ["work", "brake", "nothing"] {
+        misbehaving.operations.insert(ident(name), operation(&[], None));
+    }
+    misbehaving.operations.insert(ident("echo"), operation(&["int"], None));
+    vec![plant, misbehaving]
 }
 
 pub fn pose(x: f64, y: f64) -> Value {
@@ -228,6 +244,18 @@ impl Made {
         let sink = heard.clone();
         self.platform.subscribe(Arc::new(move |event| sink.lock().unwrap().push(event)));
         heard
+    }
+
+    /// Has another thread carry the step out within `limit` from now on; what it answers, and when.
+    pub fn begin(&self, step: &Step, limit: Duration) -> Receiver<(Outcome, Time)> {
+        let (answer, answered) = self.clock.channel(1);
+        let (platform, clock, step) = (self.platform.clone(), self.clock.clone(), step.clone());
+        let deadline = self.clock.now() + limit;
+        self.clock.spawn("another", move || {
+            let outcome = platform.execute(&step, deadline);
+            let _ = answer.try_send((outcome, clock.now()));
+        });
+        answered
     }
 
     /// Lets so much time pass.

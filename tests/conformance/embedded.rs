@@ -1,15 +1,16 @@
 //! The embedded platform, to be tested.
 
-use crate::bed::{Bed, Made, Trouble};
+use crate::bed::{Bed, Made, Trouble, WORK};
 use davit::model::{EventName, Transition, Tunable};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::record;
 use davit::runtime::{
-    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Kind, Libraries, Library, Out, Prop,
+    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Kind, Libraries, Library, Out, Prop, Ticket,
 };
-use davit::time::Clock;
+use davit::time::{Clock, Time};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 pub struct EmbeddedBed;
 
@@ -84,13 +85,22 @@ impl Component for Plant {
     }
 }
 
-/// It has no clock of its own when it is made and dropped.
-struct Misbehaving(Option<Clock>);
+struct Misbehaving {
+    /// None while it is made: so it has none when it is dropped at once.
+    clock: Option<Clock>,
+    /// It is updated.
+    runs: bool,
+    /// When what is to be answered.
+    task: Option<(Time, Ticket)>,
+}
+
+fn trouble_of(clock: &Clock, what: &str) -> Option<Trouble> {
+    with_wish(clock, |w| w.trouble.iter().find(|(h, _)| *h == what).map(|(_, t)| *t)).flatten()
+}
 
 fn misbehave(clock: &Clock, hook: &str) -> HookResult {
-    let trouble = with_wish(clock, |w| w.trouble.iter().find(|(h, _)| *h == hook).map(|(_, t)| *t)).flatten();
-    match trouble {
-        None => Ok(()),
+    match trouble_of(clock, hook) {
+        None | Some(Trouble::Long | Trouble::Deaf) => Ok(()),
         Some(Trouble::Fail) => Err(Failure::from("on purpose")),
         Some(Trouble::Panic) => panic!("on purpose"),
         Some(Trouble::Hang(None)) => clock.hang(),
@@ -105,16 +115,61 @@ impl Component for Misbehaving {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe("Does in its hooks what the test asks for.");
         b.on_configure(|_, cx| misbehave(cx.clock(), Transition::Configure.as_str()));
-        b.on_start(|_, cx| misbehave(cx.clock(), Transition::Start.as_str()));
-        b.on_stop(|_, cx| misbehave(cx.clock(), Transition::Stop.as_str()));
+        b.on_start(|c, cx| {
+            c.runs = true;
+            misbehave(cx.clock(), Transition::Start.as_str())
+        });
+        b.on_stop(|c, cx| {
+            c.runs = false;
+            misbehave(cx.clock(), Transition::Stop.as_str())
+        });
         b.on_cleanup(|_, cx| misbehave(cx.clock(), Transition::Cleanup.as_str()));
-        Self(None)
+        b.no_effect().operation("work", Self::work);
+        b.no_effect().operation("nothing", |_, _, (): ()| Answer::Done(()));
+        b.no_effect().operation("echo", |_, _, (_,): (i64,)| Answer::Done(()));
+        b.no_effect().caller_operation("brake", |(): ()| Answer::Done(()));
+        Self { clock: None, runs: false, task: None }
+    }
+
+    fn update(&mut self, cx: &mut Context) {
+        let Some((end, ticket)) = self.task.take() else { return };
+        if cx.now() >= end {
+            ticket.done(());
+        } else if ticket.is_cancelled() && trouble_of(cx.clock(), "work") == Some(Trouble::Long) {
+            ticket.failed("it was given up");
+        } else {
+            self.task = Some((end, ticket));
+        }
+    }
+}
+
+impl Misbehaving {
+    /// Takes many updates while it is updated; on a worker it takes its time there.
+    fn work(&mut self, cx: &mut Context, (): ()) -> Answer {
+        let trouble = trouble_of(cx.clock(), "work");
+        let end = cx.clock().now() + WORK;
+        match trouble {
+            Some(Trouble::Long | Trouble::Deaf) => {}
+            Some(Trouble::Fail) => return Answer::failed("on purpose"),
+            _ => return Answer::Done(()),
+        }
+        if self.runs {
+            self.task = Some((end, cx.ticket()));
+            return Answer::Pending;
+        }
+        while cx.clock().now() < end {
+            if trouble == Some(Trouble::Long) && cx.is_cancelled() {
+                return Answer::failed("it was given up");
+            }
+            cx.clock().sleep(Duration::from_millis(1));
+        }
+        Answer::Done(())
     }
 }
 
 impl Drop for Misbehaving {
     fn drop(&mut self) {
-        if let Some(clock) = &self.0 {
+        if let Some(clock) = &self.clock {
             let _ = misbehave(clock, "destroy");
         }
     }
@@ -125,7 +180,7 @@ pub fn libraries(clock: &Clock) -> Libraries {
     let misbehaving = Kind::made_by("Misbehaving", move |b| {
         let mut made = Misbehaving::new(b);
         let _ = misbehave(&clock, "create");
-        made.0 = Some(clock.clone());
+        made.clock = Some(clock.clone());
         made
     });
     Libraries::new().with(Library::new("bed").with::<Plant>("Plant").with_kind(misbehaving))

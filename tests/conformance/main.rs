@@ -1,12 +1,19 @@
 //! One contract for every platform (design §11): each test is a rule of the `Platform` trait, run on every platform.
 //!
 //! A platform joins by a [`bed::Bed`]: how to make one with the test types of [`bed::types`], how to make a component of it
-//! fail, panic or hang in a hook, hang while it is made or dropped, and how to make one raise an event.
+//! fail, panic or hang in a hook, hang while it is made or dropped, work long in an operation and hear, or not, that it is
+//! given up, and how to make one raise an event.
 
 mod bed;
+mod cancelling;
 mod embedded;
 mod rules;
 mod simulated;
+
+/// All rules, wherever they are written.
+mod all {
+    pub use crate::{cancelling::*, rules::*};
+}
 
 /// Every rule as a test of its own, for the platform that `$bed` makes.
 macro_rules! conforms {
@@ -15,7 +22,7 @@ macro_rules! conforms {
             $(
                 #[test]
                 fn $rule() {
-                    crate::rules::$rule(&$bed);
+                    crate::all::$rule(&$bed);
                 }
             )*
         }
@@ -50,6 +57,14 @@ macro_rules! every_rule {
             events_of_components_reach_the_sink,
             prepared_steps_do_what_executed_ones_do,
             one_component_observed_is_the_one_of_the_whole,
+            some_components_observed_are_those_of_the_whole,
+            safe_steps_do_what_others_do,
+            a_call_that_is_given_up_comes_to_rest_and_counts_as_done,
+            giving_up_what_is_not_under_way_does_nothing,
+            a_failure_before_being_told_stays_one,
+            what_has_no_ear_goes_on_when_it_is_given_up,
+            until_it_rests_a_component_begins_no_other_operation,
+            a_component_that_does_not_rest_is_quarantined_until_it_does,
         );
     };
 }

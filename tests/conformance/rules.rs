@@ -478,3 +478,45 @@ pub fn one_component_observed_is_the_one_of_the_whole(bed: &dyn Bed) {
         assert_eq!(one.as_ref(), whole.components.get(&name(component)), "{component}");
     }
 }
+
+pub fn some_components_observed_are_those_of_the_whole(bed: &dyn Bed) {
+    let made = bed.make(&[]);
+    made.all([create("a"), create("b"), create("c"), create("d"), state("a", Configure), set("a.gain", 2.5)]);
+    made.all([connect("a.y", "b.u", Data), connect("a.y2", "b.q", Buffer(3)), connect("c.y", "b.q", Buffer(2))]);
+    made.all([connect("c.y", "c.u", Data), connect("a.w", "d.v", Data), connect("a.y", "c.u_plain", Data)]);
+    made.all([write("a.u", Some(Value::Float(1.0))), write("b.n", Some(Value::Int(2)))]);
+    let check = |made: &Made| {
+        for asked in
+            [&[][..], &["a"], &["b"], &["c"], &["d"], &["b", "c"], &["nobody", "d", "d"], &["a", "b", "c", "d"]]
+        {
+            let names: Vec<ComponentName> = asked.iter().map(|n| name(n)).collect();
+            let some = made.platform.observe_some(&names, made.deadline()).expect("an answer");
+            let mut whole = made.see();
+            whole.components.retain(|n, _| names.contains(n));
+            whole.connections.retain(|(f, t), _| names.contains(&f.component) || names.contains(&t.component));
+            whole.ports.retain(|port, _| names.contains(&port.component));
+            assert_eq!(some, whole, "{asked:?}");
+        }
+    };
+    check(&made);
+    made.all([disconnect("a.y2", "b.q"), disconnect("c.y", "c.u"), write("a.u", None)]);
+    check(&made);
+    made.all([disconnect("a.w", "d.v"), destroy("d"), create("d"), connect("c.w", "d.v", Data)]);
+    check(&made);
+}
+
+pub fn safe_steps_do_what_others_do(bed: &dyn Bed) {
+    let made = bed.make(&[]);
+    let safe = |step: Step| made.platform.execute_safe(&step, made.deadline());
+    made.does(create("a"));
+    for step in
+        [set("a.gain", 2.0), write("a.n", Some(Value::Int(1))), state("a", Configure), call("a.nothing", vec![])]
+    {
+        assert_eq!(safe(step.clone()), Outcome::Done(None), "{step}");
+    }
+    let before = made.see();
+    for step in [set("a.gain", 11.0), state("a", Configure), call("a.unknown", vec![]), call("b.nothing", vec![])] {
+        assert!(matches!(safe(step.clone()), Outcome::NotDone(Cause::Refused(_))), "{step}");
+    }
+    assert_eq!(made.see(), before);
+}

@@ -1,12 +1,71 @@
-//! Atomicity, model part: fail at any step of any transaction, take back what was done, and the system is the one before.
+//! Atomicity of what the configurator carries out: with a failure at any step, in any permitted order, the transaction's own
+//! machine ends whole, or with the system as it was, or names exactly what is left. Undos before a failing push stand.
 
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
-use davit::plan::undo::rollback;
-use davit::stack::{Request, Stack, transaction};
-use davit::system::step;
+use davit::model::{Cause, Execution, Outcome, Step};
+use davit::stack::{Op, Planned, Stack, transaction};
+use davit::system::{System, step};
+use davit::time::Time;
+use davit::transaction::{Can, Input, PartEnd, Poll, Spec, Transaction};
 use proptest::prelude::*;
+use std::time::Duration;
+
+/// A machine, the model it works on, and a platform that does what it is told but for the steps it fails.
+pub struct Bench {
+    pub model: System,
+    pub platform: System,
+    asked: usize,
+    fails: Vec<usize>,
+    picks: Vec<u8>,
+}
+
+impl Bench {
+    fn new(system: &System, fails: Vec<usize>, picks: Vec<u8>) -> Self {
+        Self { model: system.clone(), platform: system.clone(), asked: 0, fails, picks }
+    }
+
+    fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
+        let spec = Spec {
+            until: Time::NEVER,
+            timeout: Duration::ZERO,
+            patience: Duration::from_secs(1),
+            best_effort: false,
+            asked_back: false,
+        };
+        let mut machine = Transaction::new(planned, spec);
+        let mut out: Vec<u32> = Vec::new();
+        let blocking = |_: &Step| Execution::Blocking;
+        for turn in 0usize.. {
+            assert!(turn < 10_000, "it ends");
+            let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[] };
+            match machine.poll(&mut self.model, Time::default(), &can) {
+                Poll::Begin(steps) => out.extend(steps),
+                Poll::Cancel(_) => {}
+                Poll::Read(components) => {
+                    let seen = self.platform.snapshot_some(&components);
+                    machine.on(Input::Seen(Some(seen)), &mut self.model);
+                }
+                Poll::Wait => {
+                    assert!(!out.is_empty(), "it waits for something");
+                    let at = self.picks[turn % self.picks.len()] as usize % out.len();
+                    let number = out.remove(at);
+                    self.asked += 1;
+                    let outcome = if self.fails.contains(&self.asked) {
+                        Outcome::NotDone(Cause::Failed("as told".to_owned()))
+                    } else {
+                        step::apply(&machine.step(number).step, &mut self.platform).expect("soundness");
+                        Outcome::Done(None)
+                    };
+                    machine.on(Input::Ended { step: number, outcome }, &mut self.model);
+                }
+                Poll::Over => return machine.end().parts,
+            }
+        }
+        unreachable!("it ends")
+    }
+}
 
 proptest! {
     #![proptest_config(settings())]
@@ -16,10 +75,11 @@ proptest! {
         types in generate::types(),
         genes in generate::configs(2..6),
         what in any::<u8>(),
-        fail in any::<prop::sample::Index>(),
+        fail in 1usize..12,
+        again in prop::option::of(1usize..6),
         picks in prop::collection::vec(any::<u8>(), 24),
     ) {
-        let mut system = davit::system::System::new(generate::catalogue(&types, false));
+        let mut system = System::new(generate::catalogue(&types, false));
         let mut stack = Stack::new(8);
         let (last, first) = genes.split_last().unwrap();
         for gene in first {
@@ -31,33 +91,49 @@ proptest! {
             stack.commit(push);
         }
         let conf = read(last, &system);
-        let requests = [Request::UndoTop, operator(&conf)];
+        let ops = [Op::UndoTop, operator(&conf)];
         // A push, an undo, or the net of both.
-        let requests = [&requests[..1], &requests[1..], &requests[..]][what as usize % 3];
-        let Ok(transaction) = transaction(&system, &stack, requests, &context()) else { return Ok(()) };
-        let before = system.snapshot();
-        // So many steps are done, in any permitted order; then one fails.
-        let count = fail.index(transaction.steps.len() + 1);
-        let mut done = Vec::new();
-        for i in 0..count {
-            let is_done = |id: u32| done.iter().any(|d: &davit::plan::PlannedStep| d.id == id);
-            let wave = transaction.steps.iter().find(|s| !is_done(s.id)).unwrap().wave;
-            let ready: Vec<_> = transaction
-                .steps
-                .iter()
-                .filter(|s| s.wave == wave && !is_done(s.id) && s.after.iter().all(|id| is_done(*id)))
-                .collect();
-            let chosen = ready[picks[i % picks.len()] as usize % ready.len()];
-            step::apply(&chosen.step, &mut system).unwrap();
-            done.push(chosen.clone());
+        let ops = [&ops[..1], &ops[1..], &ops[..]][what as usize % 3];
+        let Ok(planned) = transaction(&system, &stack, ops, &context()) else { return Ok(()) };
+        let edits: Vec<_> = planned.parts.iter().map(|part| part.edits.clone()).collect();
+        // The system after the first so many operations alone.
+        let after: Vec<System> = (0..=ops.len())
+            .map(|n| {
+                let mut after = system.clone();
+                if n > 0 && let Ok(some) = transaction(&system, &stack, &ops[..n], &context()) {
+                    some.steps.iter().for_each(|s| step::apply(&s.step, &mut after).unwrap());
+                }
+                after
+            })
+            .collect();
+        let fails = std::iter::once(fail).chain(again.map(|later| fail + later)).collect();
+        let mut bench = Bench::new(&system, fails, picks);
+        let ends = bench.drive(planned);
+        prop_assert_eq!(bench.model.snapshot(), bench.platform.snapshot(), "the model is the platform");
+        let stands = ends.iter().take_while(|end| matches!(end, PartEnd::Done)).count();
+        match ends.get(stands) {
+            None | Some(PartEnd::Failed(_)) => {
+                prop_assert_eq!(bench.model.snapshot(), after[stands].snapshot(), "those before stand, the rest is not there");
+                prop_assert!(ends[stands..].iter().skip(1).all(|end| matches!(end, PartEnd::Anew)));
+            }
+            Some(PartEnd::Broken(broken)) => {
+                // What is left is exact: with it done again, the system before becomes the one there is.
+                let mut there = after[stands].clone();
+                for step in broken.residual.left.iter().chain(&broken.residual.difference) {
+                    let _ = step::apply(step, &mut there);
+                }
+                if stands == 0 && ops.len() == 1 && matches!(ops[0], Op::Push { .. }) {
+                    prop_assert_eq!(there.snapshot(), bench.model.snapshot(), "{}", broken.residual);
+                }
+                return Ok(());
+            }
+            Some(other) => panic!("{other:?}"),
         }
-        for s in rollback(&system, &done).unwrap_or_else(|v| panic!("{v:?}")) {
-            step::apply(&s.step, &mut system).unwrap();
-        }
-        prop_assert_eq!(system.snapshot(), before);
-        // The transaction was dropped: the stack is as before, and still fits the system.
+        // The stack still fits the system.
+        stack.apply(&edits[..stands], &[]);
+        let mut system = bench.model;
         while !stack.is_empty() {
-            let pop = davit::stack::transaction(&system, &stack, &[Request::UndoTop], &context()).unwrap();
+            let pop = transaction(&system, &stack, &[Op::UndoTop], &context()).unwrap();
             for s in &pop.steps {
                 step::apply(&s.step, &mut system).unwrap();
             }

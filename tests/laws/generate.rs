@@ -149,7 +149,7 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
 }
 
 pub fn context() -> Context {
-    Context { activities: BTreeSet::from([ident("fast"), ident("slow")]) }
+    Context { activities: BTreeSet::from([ident("fast"), ident("slow")]), ..Context::default() }
 }
 
 /// Reads a gene against a system.

@@ -6,7 +6,7 @@ use crate::plain::Plain;
 use crate::settings;
 use crate::stacks::{Both, record};
 use davit::model::{Configuration, Ident, Snapshot, Step};
-use davit::stack::{FrameId, Request, Requester};
+use davit::stack::{FrameId, Op, Requester};
 use davit::time::Time;
 use proptest::prelude::*;
 use proptest_state_machine::{ReferenceStateMachine, StateMachineTest, prop_state_machine};
@@ -105,7 +105,7 @@ impl Subject {
         }
     }
 
-    fn ask(&mut self, requests: &[Request<'_>], conf: Option<&Configuration>) {
+    fn ask(&mut self, requests: &[Op<'_>], conf: Option<&Configuration>) {
         let before = self.both.system.snapshot();
         let Ok(transaction) = self.both.ask(requests) else {
             assert_eq!(self.both.system.snapshot(), before);
@@ -136,7 +136,7 @@ impl StateMachineTest for Machine {
 
     fn apply(mut s: Subject, _: &Types, act: Act) -> Subject {
         let push =
-            |configuration| Request::Push { configuration, requester: Requester::Operator, at: Time(0), active: false };
+            |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let chosen = |s: &Subject, n: u8| {
             let frames = s.both.stack.frames();
             (!frames.is_empty()).then(|| frames[n as usize % frames.len()].id)
@@ -146,28 +146,28 @@ impl StateMachineTest for Machine {
                 let conf = read(&gene, &s.both.system);
                 s.ask(&[push(&conf)], Some(&conf));
             }
-            Act::UndoTop => s.ask(&[Request::UndoTop], None),
+            Act::UndoTop => s.ask(&[Op::UndoTop], None),
             Act::Undo(n) => {
                 if let Some(id) = chosen(&s, n) {
-                    s.ask(&[Request::Undo(id)], None);
+                    s.ask(&[Op::Undo(id)], None);
                 }
             }
             Act::UndoTo(n) => {
                 let to = n as usize % (BOUND + 1);
-                s.ask(&[Request::UndoTo(to)], None);
+                s.ask(&[Op::UndoTo(to)], None);
                 assert!(s.both.stack.len() <= to);
             }
             Act::UndoAndPush(n, gene) => {
                 if let Some(id) = chosen(&s, n) {
                     let conf = read(&gene, &s.both.system);
-                    s.ask(&[Request::Undo(id), push(&conf)], Some(&conf));
+                    s.ask(&[Op::Undo(id), push(&conf)], Some(&conf));
                 }
             }
             Act::Commit => {
                 s.both.stack.make_floor();
                 s.base = s.both.system.snapshot();
                 s.frames.clear();
-                assert!(s.both.ask(&[Request::UndoTop]).is_err());
+                assert!(s.both.ask(&[Op::UndoTop]).is_err());
             }
         }
         s
@@ -178,7 +178,7 @@ impl StateMachineTest for Machine {
     }
 
     fn teardown(mut s: Subject, _: Types) {
-        s.ask(&[Request::UndoTo(0)], None);
+        s.ask(&[Op::UndoTo(0)], None);
         assert_eq!(s.both.system.snapshot(), s.base);
     }
 }

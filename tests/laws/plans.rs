@@ -5,7 +5,7 @@ use crate::plain::Plain;
 use crate::settings;
 use davit::model::{MemberRef, Snapshot};
 use davit::plan::{PlannedStep, plan, plan_on};
-use davit::stack::{Request, Requester, Stack, transaction};
+use davit::stack::{Op, Requester, Stack, transaction};
 use davit::system::{Access, Overlay, Reversibility, Slot, View, step};
 use davit::time::Time;
 use proptest::prelude::*;
@@ -132,8 +132,8 @@ fn changed(was: &Snapshot, is: &Snapshot) -> Vec<Slot> {
     slots
 }
 
-pub fn operator(configuration: &davit::model::Configuration) -> Request<'_> {
-    Request::Push { configuration, requester: Requester::Operator, at: Time(1), active: false }
+pub fn operator(configuration: &davit::model::Configuration) -> Op<'_> {
+    Op::Push { configuration, requester: Requester::Operator, at: Time(1), scope: None }
 }
 
 proptest! {
@@ -225,7 +225,7 @@ proptest! {
             }
         }
         stack.commit(push);
-        if let Ok(pop) = transaction(&system, &stack, &[Request::UndoTop], &context()) {
+        if let Ok(pop) = transaction(&system, &stack, &[Op::UndoTop], &context()) {
             prop_assert_eq!(every_order(&after, &pop.steps, seed).is, before.is);
         }
     }

@@ -6,7 +6,7 @@ use crate::settings;
 use crate::stacks::Both;
 use davit::model::{ChangeKind, Step, Target};
 use davit::plan::prepare::Switch;
-use davit::stack::{Request, Requester};
+use davit::stack::{Op, Requester};
 use davit::time::Time;
 use proptest::prelude::*;
 
@@ -63,7 +63,7 @@ proptest! {
                     continue;
                 }
                 act(&mut fast, switch)?;
-                fast.stack.push_switch(switch, Requester::Operator, Time(1), false);
+                fast.stack.push_switch(switch, Requester::Operator, Time(1), None);
                 pushed += 1;
                 prop_assert_eq!(fast.system.snapshot(), plain.system.snapshot());
                 let (a, b) = (fast.stack.top().unwrap(), plain.stack.top().unwrap());
@@ -80,12 +80,12 @@ proptest! {
             if between & (1 << round) != 0 && pushed > 1 {
                 let at = plain.stack.len() - 2;
                 let ids = (plain.stack.frames()[at].id, fast.stack.frames()[at].id);
-                let done = (plain.make(&[Request::Undo(ids.0)]).is_ok(), fast.make(&[Request::Undo(ids.1)]).is_ok());
+                let done = (plain.make(&[Op::Undo(ids.0)]).is_ok(), fast.make(&[Op::Undo(ids.1)]).is_ok());
                 prop_assert_eq!(done.0, done.1);
                 pushed -= usize::from(done.0);
             }
             for _ in 0..pushed {
-                plain.make(&[Request::UndoTop]).unwrap();
+                plain.make(&[Op::UndoTop]).unwrap();
                 let id = fast.stack.top().unwrap().configuration;
                 // Several may have one name; the one whose acts these are takes it back.
                 let at = (0..confs.len()).rev().find(|i| {
@@ -99,7 +99,7 @@ proptest! {
                         act(&mut fast, prepared[at].as_ref().unwrap())?;
                         fast.stack.pop_switch();
                     }
-                    _ => _ = fast.make(&[Request::UndoTop]).unwrap(),
+                    _ => _ = fast.make(&[Op::UndoTop]).unwrap(),
                 }
                 prop_assert_eq!(fast.system.snapshot(), plain.system.snapshot());
             }

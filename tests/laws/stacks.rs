@@ -6,7 +6,7 @@ use crate::plans::{every_order, operator, show};
 use crate::settings;
 use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
 use davit::plan::{PlannedStep, Refusal, Stage};
-use davit::stack::{FrameId, Request, Stack, Transaction, transaction};
+use davit::stack::{FrameId, Op, Scope, Stack, Planned, transaction};
 use davit::system::{System, View, step};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -24,11 +24,11 @@ impl Both {
         Self { system: System::new(types.clone()), stack: Stack::new(bound), types }
     }
 
-    pub fn ask(&self, requests: &[Request<'_>]) -> Result<Transaction, Refusal> {
+    pub fn ask(&self, requests: &[Op<'_>]) -> Result<Planned, Refusal> {
         transaction(&self.system, &self.stack, requests, &context())
     }
 
-    pub fn execute(&mut self, transaction: Transaction) -> Vec<FrameId> {
+    pub fn execute(&mut self, transaction: Planned) -> Vec<FrameId> {
         for s in &transaction.steps {
             step::apply(&s.step, &mut self.system)
                 .unwrap_or_else(|v| panic!("{}: {v:?} in {:?}", s.step, show(&transaction.steps)));
@@ -36,7 +36,7 @@ impl Both {
         self.stack.commit(transaction)
     }
 
-    pub fn make(&mut self, requests: &[Request<'_>]) -> Result<Vec<FrameId>, Refusal> {
+    pub fn make(&mut self, requests: &[Op<'_>]) -> Result<Vec<FrameId>, Refusal> {
         let transaction = self.ask(requests)?;
         Ok(self.execute(transaction))
     }
@@ -100,7 +100,7 @@ proptest! {
         let mut jump = both.clone();
         let depth = to.index(before.len() + 1);
         let top = Plain::new(jump.system.snapshot(), &jump.types);
-        let down = jump.ask(&[Request::UndoTo(depth)]).unwrap();
+        let down = jump.ask(&[Op::UndoTo(depth)]).unwrap();
         let reached = every_order(&top, &down.steps, seed);
         jump.execute(down);
         prop_assert_eq!(&jump.system.snapshot(), &reached.is);
@@ -109,10 +109,10 @@ proptest! {
             prop_assert_eq!(&reached.is, &before[depth].0);
         }
         for (earlier, _) in before.iter().rev() {
-            both.make(&[Request::UndoTop]).unwrap();
+            both.make(&[Op::UndoTop]).unwrap();
             prop_assert_eq!(&both.system.snapshot(), earlier);
         }
-        prop_assert!(both.stack.is_empty() && both.ask(&[Request::UndoTop]).is_err());
+        prop_assert!(both.stack.is_empty() && both.ask(&[Op::UndoTop]).is_err());
     }
 
     /// Popping a frame from the middle gives the system of the other frames' steps, or is refused; and the rest of the
@@ -128,7 +128,7 @@ proptest! {
         let id = both.stack.frames()[at].id;
         let before = both.system.snapshot();
         let frames = both.stack.len();
-        match both.make(&[Request::Undo(id)]) {
+        match both.make(&[Op::Undo(id)]) {
             Err(refusal) => {
                 prop_assert!(at + 1 < frames, "the top can always be popped: {:?}", refusal);
                 prop_assert_eq!(both.system.snapshot(), before);
@@ -143,7 +143,7 @@ proptest! {
                 prop_assert_eq!(&both.system.snapshot(), &plain.is);
                 // What is left pops as if the frame had never been.
                 while !both.stack.is_empty() {
-                    both.make(&[Request::UndoTop]).unwrap();
+                    both.make(&[Op::UndoTop]).unwrap();
                     let mut plain = Plain::new(Snapshot::default(), &both.types);
                     let left = records.iter().enumerate().filter(|(i, _)| *i != at).take(both.stack.len());
                     for step in left.flat_map(|(_, r)| r) {
@@ -168,13 +168,13 @@ proptest! {
         let id = one.stack.frames()[pick.index(one.stack.len())].id;
         let mut two = one.clone();
         let start = Plain::new(one.system.snapshot(), &one.types);
-        let Ok(undo) = two.ask(&[Request::Undo(id)]) else { return Ok(()) };
+        let Ok(undo) = two.ask(&[Op::Undo(id)]) else { return Ok(()) };
         let mut steps = undo.steps.len();
         two.execute(undo);
         let mut conf = read(last, &two.system);
         conf.group = None;
         let push = two.ask(&[operator(&conf)]);
-        let net = one.ask(&[Request::Undo(id), operator(&conf)]);
+        let net = one.ask(&[Op::Undo(id), operator(&conf)]);
         prop_assert_eq!(push.is_ok(), net.is_ok());
         let (Ok(push), Ok(net)) = (push, net) else { return Ok(()) };
         steps += push.steps.len();
@@ -192,8 +192,8 @@ proptest! {
         prop_assert_eq!(&reached.is, &two.system.snapshot());
         while !two.stack.is_empty() {
             prop_assert_eq!(one.system.snapshot(), two.system.snapshot());
-            one.make(&[Request::UndoTop]).unwrap();
-            two.make(&[Request::UndoTop]).unwrap();
+            one.make(&[Op::UndoTop]).unwrap();
+            two.make(&[Op::UndoTop]).unwrap();
         }
         prop_assert!(one.stack.is_empty() && one.system.is_empty());
     }
@@ -212,7 +212,7 @@ proptest! {
             let now = large.system.snapshot();
             let active = i < 2 && keep & (1 << i) != 0;
             let request = [match operator(&conf) {
-                Request::Push { configuration, requester, at, .. } => Request::Push { configuration, requester, at, active },
+                Op::Push { configuration, requester, at, .. } => Op::Push { configuration, requester, at, scope: active.then_some(Scope(1)) },
                 other => other,
             }];
             let Ok(pushed) = small.make(&request) else {
@@ -228,9 +228,9 @@ proptest! {
         while !small.stack.is_empty() {
             let frame = small.stack.top().unwrap().clone();
             prop_assert!(frame.floor.is_none());
-            small.make(&[Request::UndoTop]).unwrap_or_else(|r| panic!("{r:?} {frame:?}"));
+            small.make(&[Op::UndoTop]).unwrap_or_else(|r| panic!("{r:?} {frame:?}"));
             let parts = frames_below(&small, &before);
-            large.make(&[Request::UndoTo(parts)]).unwrap();
+            large.make(&[Op::UndoTo(parts)]).unwrap();
             prop_assert_eq!(small.system.snapshot(), large.system.snapshot());
         }
         prop_assert!(small.system.is_empty());

@@ -3,6 +3,7 @@
 
 mod activities;
 mod calls;
+mod cancelling;
 mod flow;
 mod monitors;
 mod standard;

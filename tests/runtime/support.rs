@@ -12,7 +12,7 @@ use std::time::Duration;
 pub const MS: Duration = Duration::from_millis(1);
 
 pub struct Bench {
-    pub platform: EmbeddedPlatform,
+    pub platform: Arc<EmbeddedPlatform>,
     pub clock: Clock,
     pub events: Arc<Mutex<Vec<PlatformEvent>>>,
     // Last: the others need the token while they are dropped.
@@ -39,7 +39,7 @@ pub fn bench_with(clock: Clock, libraries: impl IntoIterator<Item = Library>) ->
     let guard = clock.enter();
     let standard = Libraries::new().with(davit::libraries::standard::library());
     let libraries = libraries.into_iter().fold(standard, Libraries::with);
-    let platform = EmbeddedPlatform::new(&clock, &libraries, &activities());
+    let platform = Arc::new(EmbeddedPlatform::new(&clock, &libraries, &activities()));
     let events = Arc::new(Mutex::new(Vec::new()));
     let sink = events.clone();
     platform.subscribe(Arc::new(move |event| sink.lock().unwrap().push(event)));

@@ -11,7 +11,7 @@ use davit::platform::{Outcome, Platform, PlatformEvent};
 use davit::runtime::{Builder, Component, Context, In, Libraries, Library, Prop};
 use davit::system::System;
 use davit::system::step::apply;
-use davit::time::{Clock, Guard, Time};
+use davit::time::{Clock, Guard, Receiver, Time};
 use nalgebra::Vector3;
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -127,7 +127,7 @@ type Events = Arc<Mutex<Vec<(f64, String)>>>;
 
 pub struct Bench {
     pub clock: Clock,
-    pub platform: EmbeddedPlatform,
+    pub platform: Arc<EmbeddedPlatform>,
     pub system: System,
     pub deployment: Deployment,
     events: Events,
@@ -158,7 +158,7 @@ impl Bench {
             .with(Library::new("test").with::<Probe>("test.Probe"));
         let clock = Clock::simulated();
         let guard = clock.enter();
-        let platform = EmbeddedPlatform::new(&clock, &libraries, &deployment.activities);
+        let platform = Arc::new(EmbeddedPlatform::new(&clock, &libraries, &deployment.activities));
         let events = Events::default();
         let heard = events.clone();
         platform.subscribe(Arc::new(move |event| match event {
@@ -183,7 +183,7 @@ impl Bench {
 
     /// A configuration of the deployment, step by step.
     pub fn apply(&mut self, id: &str) {
-        let context = PlanContext { activities: self.deployment.activities.keys().copied().collect() };
+        let context = PlanContext { activities: self.deployment.activities.keys().copied().collect(), ..Default::default() };
         let id = ConfigId::new(id).unwrap();
         let configuration = self.deployment.configuration(id).unwrap_or_else(|| panic!("no {id}"));
         let within = configuration.timeout.unwrap_or(Duration::from_secs(1));
@@ -213,6 +213,22 @@ impl Bench {
     pub fn call(&mut self, operation: (&str, &str), args: Vec<Value>) -> Outcome {
         let call = Call { operation: member(operation.0, operation.1), args };
         self.platform.execute(&Step::Operation(call), self.clock.now() + Duration::from_secs(10))
+    }
+
+    /// Has another thread call an operation without arguments; what it answers, and when.
+    pub fn begin(&self, operation: (&str, &str)) -> Receiver<(Outcome, Time)> {
+        let (answer, answered) = self.clock.channel(1);
+        let (platform, clock) = (self.platform.clone(), self.clock.clone());
+        let step = Step::Operation(Call { operation: member(operation.0, operation.1), args: vec![] });
+        self.clock.spawn("another", move || {
+            let outcome = platform.execute(&step, clock.now() + Duration::from_secs(10));
+            let _ = answer.try_send((outcome, clock.now()));
+        });
+        answered
+    }
+
+    pub fn give_up(&self, operation: (&str, &str)) {
+        self.platform.cancel(&Step::Operation(Call { operation: member(operation.0, operation.1), args: vec![] }));
     }
 
     pub fn state(&mut self, component: &str, transition: Transition) {

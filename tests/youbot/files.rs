@@ -57,7 +57,7 @@ pub fn deployment(name: &str) -> (Deployment, Arc<Catalogue>) {
 }
 
 fn go(system: &mut System, deployment: &Deployment, ids: &[&str]) {
-    let context = Context { activities: deployment.activities.keys().copied().collect() };
+    let context = Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
     for id in ids {
         let configuration = deployment.configuration(ConfigId::new(id).unwrap()).unwrap_or_else(|| panic!("no {id}"));
         let plan = plan(system, configuration, &context).unwrap_or_else(|r| panic!("{id}: {:?}", r.findings));

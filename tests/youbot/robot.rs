@@ -3,6 +3,7 @@
 use crate::bench::{Bench, Row};
 use davit::model::{Transition, Value};
 use davit::platform::Outcome;
+use std::time::Duration;
 
 const DOWN: &[&str] =
     &["base_stop", "hold", "park", "stop_control", "stop_all", "cleanup_all", "disconnect_all", "destroy_all"];
@@ -202,6 +203,35 @@ fn the_driver_refuses_what_would_hurt() {
     assert!(failed(bench.call(("youbot", "start_calibration"), vec![])));
     assert!(failed(bench.call(("youbot", "setControlMode"), vec![Value::Int(3)])));
     bench.apply("hold");
+    assert!(matches!(bench.call(("youbot", "fold"), vec![]), Outcome::Done(_)));
+}
+
+#[test]
+fn a_motion_that_is_given_up_ends_where_it_is() {
+    let mut bench = Bench::up("youbot_arm");
+    bench.apply("hold");
+    for operation in ["fold", "unfold"] {
+        bench.rows();
+        let moving = bench.begin(("youbot", operation));
+        bench.run(1.0);
+        let told = bench.now();
+        bench.give_up(("youbot", operation));
+        let (outcome, at) = moving.recv_deadline(bench.clock.now() + Duration::from_secs(10)).expect("an answer");
+        assert_eq!(outcome, Outcome::Done(None), "{operation} counts as done half way");
+        assert!(at.as_secs_f64() - told < 0.005, "{operation}: {} s", at.as_secs_f64() - told);
+        // The drives listen again at once, and hold.
+        assert!(matches!(bench.call(("youbot", "setControlMode"), vec![Value::Int(1)]), Outcome::Done(_)));
+        bench.run(1.0);
+        let rows = bench.rows();
+        let speed = |w: &[Row]| (w[1].tool - w[0].tool).norm() / (w[1].t - w[0].t);
+        let before = rows.windows(2).filter(|w| w[1].t < told).map(speed).fold(0.0, f64::max);
+        let after = rows.windows(2).filter(|w| w[0].t > told + 0.3).map(speed).fold(0.0, f64::max);
+        assert!(before > 0.05, "{operation} was under way at {before} m/s");
+        assert!(after < 0.02, "{operation}: {after} m/s after 0.3 s");
+        assert_eq!(rows.last().unwrap().mode, 1);
+        assert!(!bench.since(told).iter().any(|(_, e)| e == "e_arrived" || e == "e_arm_dropped"));
+    }
+    // And it goes on from there when it is asked to.
     assert!(matches!(bench.call(("youbot", "fold"), vec![]), Outcome::Done(_)));
 }
 

@@ -1,41 +1,33 @@
 //! Steps that run a component's own code: hooks and operations, on workers or in the component's activity, under a
 //! deadline; and what becomes of those that come back too late.
 
-use super::steps::closed;
+use super::steps::{Naps, closed};
+use super::under_way::{Settled, What};
 use super::workers::Job;
 use super::{Inner, Outcome};
 use crate::model::{Call as Step, RunState, Transition, Value};
 use crate::platform::{Cause, PlatformEvent};
-use crate::runtime::activity::{Request, Stage};
-use crate::runtime::cell::{Cell, Inside};
-use crate::runtime::component::{Call, Reply};
+use crate::runtime::activity::{Activity, Request};
+use crate::runtime::builder::CallerFn;
+use crate::runtime::call::{Call, Progress, Reply};
+use crate::runtime::cell::{Cell, Closed, Inside};
 use crate::runtime::guard;
-use crate::time::{Receiver, RecvError, Time, lock};
+use crate::time::{Receiver, RecvError, Sender, Time, lock};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-
-/// Who settles a call: its worker by answering, or its caller by giving up. Exactly one does.
-#[derive(Default)]
-struct Settled(AtomicU8);
-
-impl Settled {
-    fn first(&self) -> bool {
-        self.0.compare_exchange(0, 1, Ordering::AcqRel, Ordering::Acquire).is_ok()
-    }
-}
 
 impl Inner {
     /// Runs a hook on a worker. The component must not be running.
-    pub(super) fn hook(&self, cell: &Arc<Cell>, transition: Transition, deadline: Time) -> Outcome {
+    pub(super) fn hook(&self, cell: &Arc<Cell>, transition: Transition, deadline: Time, safe: bool) -> Outcome {
         // A stop has closed the gate already; its hook runs in what is, for everybody else, `stopped`.
         let may = |state| {
             if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) }
         };
-        match cell.enter_idle(may) {
+        match cell.enter_idle(safe, may) {
             Ok(inside) => inside.hand_over(),
             Err(why) => return Outcome::NotDone(closed(why, cell.name, transition.as_str())),
         }
         let settled = Arc::new(Settled::default());
+        let _entered = self.under_way.enter(What::Hook(cell.name, transition, settled.clone()));
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
             let (inner, cell, settled) = (self.own.clone(), cell.clone(), settled.clone());
@@ -43,6 +35,11 @@ impl Inner {
             Box::new(move || {
                 // SAFETY: `BUSY` was set above and handed over to this job alone.
                 let mut inside = unsafe { Inside::resume(&cell) };
+                if !settled.begin() {
+                    drop(inside);
+                    let _ = answer.try_send(Outcome::NotDone(Cause::Cancelled));
+                    return;
+                }
                 let result = inside.hook(&clock, transition);
                 let Some(inner) = inner.upgrade() else { return };
                 if settled.first() {
@@ -65,6 +62,7 @@ impl Inner {
         }
         match answered.recv_deadline(deadline) {
             Ok(outcome) => outcome,
+            Err(_) if settled.withdraw() => Outcome::NotDone(Cause::Timeout),
             Err(_) if self.give_up(cell, false, || settled.first()) => Outcome::Unknown(Cause::Timeout),
             Err(_) => answered.recv().unwrap_or(Outcome::Unknown(Cause::Timeout)),
         }
@@ -116,114 +114,199 @@ impl Inner {
     }
 
     /// Calls an operation.
-    pub(super) fn operation(&self, step: &Step, deadline: Time) -> Outcome {
-        match self.begin_operation(step) {
+    pub(super) fn operation(&self, step: &Step, deadline: Time, safe: bool) -> Outcome {
+        let (reply, replied) = self.clock.channel(1);
+        match self.find_operation(step, reply, safe) {
             Err(cause) => Outcome::NotDone(cause),
-            Ok(begun) => self.await_answer(&begun, deadline),
+            Ok(begun) => {
+                let _entered = self.under_way.enter(What::Operation(step.clone(), begun.progress.clone()));
+                match self.begin_operation(&begun, step, deadline, safe) {
+                    Err(cause) => Outcome::NotDone(cause),
+                    Ok(()) => self.await_answer(begun, replied, deadline),
+                }
+            }
         }
     }
 
-    fn begin_operation(&self, step: &Step) -> Result<Begun, Cause> {
+    fn find_operation(&self, step: &Step, reply: Sender<Reply>, safe: bool) -> Result<Begun, Cause> {
         let (name, operation) = (step.operation.component, step.operation.member);
         let registry = lock(&self.registry);
         let slot = registry.find(name)?;
         let cell = registry.entry(slot).cell.clone();
-        if cell.is_quarantined() {
-            return Err(Cause::Quarantined);
-        }
         let index = cell
             .kind
             .operations
             .binary_search(&operation)
             .map_err(|_| Cause::Refused(format!("`{name}` has no operation `{operation}`")))?;
+        let place = match registry.entry(slot).caller(operation) {
+            Some(function) => Place::Beside(function),
+            None if cell.state() == RunState::Running => {
+                let crew = registry.crew_of(slot);
+                Place::Activity(crew.requests.clone(), crew.activity.clone())
+            }
+            None => Place::Worker,
+        };
+        // Beside the component a safe call disturbs nobody, and inside it one is let in that can still come to rest.
+        let keeps_out = if safe { !matches!(place, Place::Beside(_)) && cell.is_lost() } else { cell.is_quarantined() };
+        if keeps_out {
+            return Err(Cause::Quarantined);
+        }
         let args = &cell.kind.ty.operations[&operation].args;
         if args.len() != step.args.len() || !args.iter().zip(&step.args).all(|(ty, arg)| arg.is_of(ty)) {
             return Err(Cause::Refused(format!("the arguments do not fit {}", step.operation)));
         }
-        let args: Vec<Value> = step.args.clone();
-        let stage = Arc::new(Stage::default());
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let (reply, replied) = self.clock.channel(1);
-        let in_activity = cell.state() == RunState::Running;
-        let mut begun =
-            Begun { cell: cell.clone(), in_activity, stage: stage.clone(), cancelled: cancelled.clone(), replied };
-        if let Some(caller) = registry.entry(slot).caller(operation) {
-            drop(registry);
-            begun.in_activity = false;
-            self.workers
-                .run(Box::new(move || {
-                    if stage.begin() {
+        let (holds, wake) = match &place {
+            Place::Beside(_) => (None, None),
+            Place::Worker | Place::Activity(..) => {
+                (Some(cell.beat.clone()), Some(registry.crew_of(slot).activity.signal.clone()))
+            }
+        };
+        let progress = Arc::new(Progress::new(reply, holds, wake));
+        Ok(Begun { cell, index, place, progress })
+    }
+
+    fn begin_operation(&self, begun: &Begun, step: &Step, deadline: Time, safe: bool) -> Result<(), Cause> {
+        let Begun { cell, index, place, progress } = begun;
+        let (progress, args): (_, Vec<Value>) = (progress.clone(), step.args.clone());
+        match place {
+            Place::Beside(function) => {
+                let function = function.clone();
+                let job = move || {
+                    if progress.begin() {
                         // It is never inside the component: if it hangs it costs a worker, and the component goes on.
-                        stage.returned();
-                        let answer = guard::call(|| caller(&args)).unwrap_or_else(Reply::Panicked);
-                        let _ = reply.try_send(answer);
+                        progress.returned();
+                        progress.answer(guard::call(|| function(&args)).unwrap_or_else(Reply::Panicked));
                     }
-                }))
-                .map_err(Cause::Refused)?;
-            return Ok(begun);
+                };
+                self.workers.run(Box::new(job)).map_err(Cause::Refused)
+            }
+            Place::Activity(requests, activity) => {
+                let request = Request { cell: cell.clone(), operation: *index, args, call: Call(progress), safe };
+                requests.try_send(request).map_err(|_| {
+                    Cause::Refused(format!("too many operations wait for the activity `{}`", activity.name))
+                })?;
+                activity.signal.notify();
+                Ok(())
+            }
+            Place::Worker => {
+                if safe || !cell.is_restless() {
+                    let refused = |why| closed(why, cell.name, "call an operation of");
+                    cell.enter_idle(safe, |_| true).map_err(refused)?.hand_over();
+                } else {
+                    self.enter_rested(cell, &progress, deadline)?.hand_over();
+                }
+                self.operate_idle(cell, *index, args, Call(progress))
+            }
         }
-        let call = Call { reply, cancelled };
-        if in_activity {
-            let crew = registry.crew_of(slot);
-            let request = Request { cell, operation: index, args, call, stage };
-            crew.requests.try_send(request).map_err(|_| {
-                Cause::Refused(format!("too many operations wait for the activity `{}`", crew.activity.name))
-            })?;
-            crew.activity.signal.notify();
-            return Ok(begun);
+    }
+
+    /// Enters a component that does not run when it has come to rest from a call that was given up; others may wait too.
+    fn enter_rested<'a>(&self, cell: &'a Cell, progress: &Progress, deadline: Time) -> Result<Inside<'a>, Cause> {
+        let mut naps = Naps::default();
+        loop {
+            match cell.enter_idle(false, |_| true) {
+                Ok(inside) => return Ok(inside),
+                Err(Closed::Busy) if progress.is_withdrawn() => return Err(Cause::Cancelled),
+                Err(Closed::Busy) if naps.take(&self.clock, deadline) => {}
+                Err(Closed::Busy) => return Err(Cause::Timeout),
+                Err(why) => return Err(closed(why, cell.name, "call an operation of")),
+            }
         }
-        drop(registry);
-        cell.enter_idle(|_| true).map_err(|why| closed(why, name, "call an operation of"))?.hand_over();
+    }
+
+    /// Calls an operation of a component that does not run, on a worker. `BUSY` is set and handed over to this call.
+    fn operate_idle(&self, cell: &Arc<Cell>, index: usize, args: Vec<Value>, call: Call) -> Result<(), Cause> {
         let (inner, clock, own) = (self.own.clone(), self.clock.clone(), cell.clone());
         let job: Job = Box::new(move || {
-            // SAFETY: `BUSY` was set above and handed over to this job alone.
-            let mut inside = unsafe { Inside::resume(&cell) };
-            if !stage.begin() {
+            // SAFETY: `BUSY` was set by the caller and handed over to this job alone.
+            let mut inside = unsafe { Inside::resume(&own) };
+            let progress = call.0.clone();
+            if !progress.begin() {
                 return;
             }
             let mut ended = inside.operation(&clock, index, &args, call);
-            stage.returned();
+            progress.returned();
             let left = inside.leave(ended.fault.is_some().then_some(RunState::Faulted));
             if let Some(reason) = ended.fault.take() {
-                cell.beat.faulted(reason, clock.now());
+                own.beat.faulted(reason, clock.now());
             }
             ended.answer();
             if left.quarantined
                 && let Some(inner) = inner.upgrade()
             {
-                inner.clean_up(&cell, None, cell.state() == RunState::Stopped);
+                inner.clean_up(&own, None, own.state() == RunState::Stopped);
             }
         });
-        if let Err(text) = self.workers.run(job) {
+        self.workers.run(job).map_err(|text| {
             // SAFETY: it was handed over to the job, and the job is gone.
-            drop(unsafe { Inside::resume(&own) });
-            return Err(Cause::Refused(text));
-        }
-        Ok(begun)
+            drop(unsafe { Inside::resume(cell) });
+            Cause::Refused(text)
+        })
     }
 
-    fn await_answer(&self, begun: &Begun, deadline: Time) -> Outcome {
-        let reply = match begun.replied.recv_deadline(deadline) {
+    fn await_answer(&self, begun: Begun, replied: Receiver<Reply>, deadline: Time) -> Outcome {
+        let Begun { cell, place, progress, .. } = begun;
+        let reply = match replied.recv_deadline(deadline) {
             Ok(reply) => reply,
             Err(RecvError::Closed) => Reply::Failed("the component ended before it answered".to_owned()),
             Err(RecvError::Timeout) => {
-                begun.cancelled.store(true, Ordering::Release);
-                if begun.stage.withdraw() {
+                let given_up_before = progress.is_told();
+                if progress.withdraw() {
                     return Outcome::NotDone(Cause::Timeout);
                 }
+                progress.tell();
                 // What answers later is only late; what has not come back at all may never.
-                self.give_up(&begun.cell, begun.in_activity, || begun.stage.is_inside());
-                match begun.replied.try_recv() {
+                self.give_up(&cell, matches!(place, Place::Activity(..)), || progress.is_inside());
+                match replied.try_recv() {
                     Ok(reply) => reply,
-                    Err(_) => return Outcome::Unknown(Cause::Timeout),
+                    Err(_) => {
+                        if given_up_before && !matches!(place, Place::Beside(_)) {
+                            self.leave_restless(&cell, &progress, replied);
+                        }
+                        return Outcome::Unknown(Cause::Timeout);
+                    }
                 }
             }
         };
         match reply {
             Reply::Done(value) => Outcome::Done(value),
+            Reply::HalfWay => Outcome::Done(None),
             Reply::Failed(text) => Outcome::NotDone(Cause::Failed(text)),
             Reply::Panicked(text) => Outcome::NotDone(Cause::Panicked(text)),
             Reply::Refused(text) => Outcome::NotDone(Cause::Refused(text)),
+            Reply::Withdrawn => Outcome::NotDone(Cause::Cancelled),
+        }
+    }
+
+    /// A call that was given up has not come to rest, though its code returns: the component is in quarantine until it has.
+    fn leave_restless(&self, cell: &Arc<Cell>, progress: &Arc<Progress>, replied: Receiver<Reply>) {
+        let mut registry = lock(&self.registry);
+        if progress.is_answered() || progress.is_inside() {
+            return;
+        }
+        cell.keep_out_until_rest();
+        registry.quarantined.insert(cell.name);
+        drop(registry);
+        let (inner, cell) = (self.own.clone(), cell.clone());
+        // Without a worker (the operating system has no thread left) it stays so.
+        let _ = self.workers.run(Box::new(move || {
+            let _ = replied.recv();
+            if let Some(inner) = inner.upgrade() {
+                inner.come_to_rest(&cell);
+            }
+        }));
+    }
+
+    /// It answers all the time, so nothing is to be cleaned up: it stays as it is, at rest.
+    fn come_to_rest(&self, cell: &Cell) {
+        let mut registry = lock(&self.registry);
+        if !cell.came_to_rest() || cell.is_lost() {
+            return;
+        }
+        let was = registry.quarantined.remove(&cell.name);
+        drop(registry);
+        if was {
+            self.tell(PlatformEvent::Returned { component: cell.name, at: self.clock.now() });
         }
     }
 
@@ -266,12 +349,20 @@ impl Inner {
     }
 }
 
-/// A call of an operation under way.
+/// Where an operation runs.
+enum Place {
+    /// In the caller's thread, beside the component.
+    Beside(CallerFn),
+    /// In the component's activity, between two updates.
+    Activity(Sender<Request>, Arc<Activity>),
+    /// On a worker: the component does not run.
+    Worker,
+}
+
+/// A call of an operation.
 struct Begun {
     cell: Arc<Cell>,
-    /// It runs in the component's activity.
-    in_activity: bool,
-    stage: Arc<Stage>,
-    cancelled: Arc<AtomicBool>,
-    replied: Receiver<Reply>,
+    index: usize,
+    place: Place,
+    progress: Arc<Progress>,
 }

@@ -3,7 +3,7 @@
 //! * [`registry`]: what is there, behind one lock that no activity ever takes; [`crews`] its activities, [`wiring`] its
 //!   ports and properties.
 //! * [`steps`]: the steps that are immediate. [`turn`], [`calls`]: those that run a component's own code, on workers under
-//!   a deadline; [`workers`]: their threads.
+//!   a deadline; [`under_way`]: how they are given up; [`workers`]: their threads.
 //! * [`watchers`]: the probes by which monitors look at components. [`prepared`]: fixed lists of immediate steps.
 //!   [`order`]: the data-flow order.
 //!
@@ -12,8 +12,13 @@
 //! hooks is blocking: it may close devices. A `stop` waits until an update under way has ended, at most until its deadline.
 //!
 //! A call of a component that has not returned by its deadline is *unknown*, the component in quarantine: it is not updated
-//! any more and every step on it is refused, but disconnecting its neighbours. When the call does return, the component is
-//! cleaned up, disconnected and destroyed, and [`PlatformEvent::Returned`] says so.
+//! any more and every step on it is refused, but disconnecting its neighbours, and of a `safe` configuration what it writes
+//! and what runs beside the component. When the call does return, the component is cleaned up, disconnected and destroyed,
+//! and [`PlatformEvent::Returned`] says so.
+//!
+//! An operation that was given up and has not answered by its deadline, though its code has come back (it answers in a later
+//! update), also puts the component in quarantine; but that is updated on, lets all `safe` steps in, and leaves quarantine as
+//! it is when it answers.
 
 mod calls;
 mod crews;
@@ -22,6 +27,7 @@ mod prepared;
 mod registry;
 mod steps;
 mod turn;
+mod under_way;
 mod watchers;
 mod wiring;
 mod workers;
@@ -40,6 +46,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 use std::time::Duration;
+use under_way::UnderWay;
 use workers::Workers;
 
 /// The embedded platform. Dropping it ends its threads and drops its components, without calling their hooks: taking a
@@ -61,6 +68,7 @@ struct Inner {
     sink: RwLock<Option<EventSink>>,
     registry: Mutex<Registry>,
     workers: Workers,
+    under_way: UnderWay,
 }
 
 impl EmbeddedPlatform {
@@ -90,6 +98,7 @@ impl EmbeddedPlatform {
             sink: RwLock::new(None),
             registry: Mutex::new(Registry::default()),
             workers: Workers::new(clock),
+            under_way: UnderWay::default(),
         });
         Self { inner }
     }
@@ -154,7 +163,15 @@ impl Platform for EmbeddedPlatform {
     }
 
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
-        self.inner.execute(step, deadline)
+        self.inner.execute(step, deadline, false)
+    }
+
+    fn execute_safe(&self, step: &Step, deadline: Time) -> Outcome {
+        self.inner.execute(step, deadline, true)
+    }
+
+    fn cancel(&self, step: &Step) {
+        self.inner.under_way.cancel(step);
     }
 
     fn observe(&self, _: Time) -> Result<Snapshot, ObserveError> {
@@ -164,6 +181,10 @@ impl Platform for EmbeddedPlatform {
     fn observe_component(&self, component: ComponentName, _: Time) -> Result<Option<ComponentSnapshot>, ObserveError> {
         let registry = lock(&self.inner.registry);
         Ok(registry.find(component).ok().map(|slot| registry.component(slot)))
+    }
+
+    fn observe_some(&self, components: &[ComponentName], _: Time) -> Result<Snapshot, ObserveError> {
+        Ok(lock(&self.inner.registry).some(components))
     }
 
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
@@ -181,7 +202,10 @@ impl Platform for EmbeddedPlatform {
     }
 
     fn quarantined(&self) -> Vec<ComponentName> {
-        let mut names: Vec<_> = lock(&self.inner.registry).quarantined.iter().copied().collect();
+        let registry = lock(&self.inner.registry);
+        // Who was restless and does not run any more is at rest.
+        let at_rest = |name| registry.find(name).is_ok_and(|slot| !registry.entry(slot).cell.is_quarantined());
+        let mut names: Vec<_> = registry.quarantined.iter().copied().filter(|name| !at_rest(*name)).collect();
         names.sort_unstable();
         names
     }

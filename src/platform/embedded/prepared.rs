@@ -69,10 +69,14 @@ impl Prepared for Resolved {
             return Outcome::NotDone(Cause::Refused("the component is not there any more".to_owned()));
         }
         match act {
-            Act::Property(index, prepared) => outcome(registry.set_property(*slot, *index, value.unwrap_or(prepared))),
-            Act::Port(index, prepared) => outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), now)),
+            Act::Property(index, prepared) => {
+                outcome(registry.set_property(*slot, *index, value.unwrap_or(prepared), false))
+            }
+            Act::Port(index, prepared) => {
+                outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), now, false))
+            }
             Act::Shift(transition) => {
-                if let Err(cause) = inner.shift(&mut registry, *slot, *transition) {
+                if let Err(cause) = inner.shift(&mut registry, *slot, *transition, false) {
                     return Outcome::NotDone(cause);
                 }
                 if *transition != Transition::Stop || !registry.entry(*slot).cell.is_busy() {

@@ -2,12 +2,13 @@
 
 use super::crews::Crew;
 use super::watchers::Watcher;
-use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, Policy, Snapshot, Value};
+use crate::model::{ComponentName, ComponentSnapshot, Direction, Ident, MemberRef, Policy, Snapshot, Value};
 use crate::platform::Cause;
 use crate::runtime::builder::{CallerFn, Ends};
 use crate::runtime::cell::Cell;
 use crate::time::Join;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -68,7 +69,8 @@ pub(super) struct Entry {
 
 #[derive(Default)]
 pub(super) struct PortUse {
-    pub(super) connections: u32,
+    /// The ports at the other ends of its connections.
+    pub(super) others: SmallVec<[MemberRef; 1]>,
     /// Its connection is one of policy `data`.
     pub(super) data: bool,
     pub(super) written: bool,
@@ -168,6 +170,19 @@ impl Registry {
         }
     }
 
+    /// The connections that begin or end at a component; those to itself twice.
+    fn ends_at(&self, slot: u32) -> impl Iterator<Item = (MemberRef, MemberRef)> + '_ {
+        let entry = self.entry(slot);
+        let ports = entry.cell.kind.ports.iter().zip(&entry.ports).zip(entry.cell.kind.ty.ports.values());
+        ports.flat_map(move |((port, used), ty)| {
+            let own = entry.cell.name.member(*port);
+            used.others.iter().map(move |other| match ty.direction {
+                Direction::Out => (own, *other),
+                Direction::In => (*other, own),
+            })
+        })
+    }
+
     /// Whether the component may be destroyed as far as its connections go.
     pub(super) fn is_unconnected(&self, slot: u32) -> Result<(), Cause> {
         let entry = self.entry(slot);
@@ -175,14 +190,9 @@ impl Registry {
             return Ok(());
         }
         let name = entry.cell.name;
-        let mut named: Vec<String> = self
-            .connections
-            .keys()
-            .map(|ends| ends.0)
-            .filter(|(from, to)| from.component == name || to.component == name)
-            .map(|(from, to)| format!("{from} -> {to}"))
-            .collect();
+        let mut named: Vec<String> = self.ends_at(slot).map(|(from, to)| format!("{from} -> {to}")).collect();
         named.sort();
+        named.dedup();
         refused(format!("`{name}` still has connections: {}", named.join(", ")))
     }
 
@@ -210,12 +220,8 @@ impl Registry {
 
     /// Removes all connections of a component.
     pub(super) fn sever(&mut self, name: ComponentName) {
-        let mut own: Vec<(MemberRef, MemberRef)> = self
-            .connections
-            .keys()
-            .map(|ends| ends.0)
-            .filter(|(from, to)| from.component == name || to.component == name)
-            .collect();
+        let Ok(slot) = self.find(name) else { return };
+        let mut own: Vec<(MemberRef, MemberRef)> = self.ends_at(slot).collect();
         own.sort_unstable();
         for (from, to) in own {
             let _ = self.disconnect(from, to);
@@ -252,15 +258,25 @@ impl Registry {
         let connections = self.connections.iter().map(|(ends, connection)| (ends.0, connection.policy)).collect();
         let mut ports = BTreeMap::new();
         for entry in self.slots.iter().flatten() {
-            for (port, used) in entry.cell.kind.ports.iter().zip(&entry.ports) {
-                if used.written
-                    && let Some(value) = &used.value
-                {
-                    ports.insert(entry.cell.name.member(*port), value.clone());
-                }
-            }
+            written(entry, &mut ports);
         }
         Snapshot { components, connections, ports }
+    }
+
+    /// Those of these components that exist, what they are connected with, and what was written to them.
+    pub(super) fn some(&self, names: &[ComponentName]) -> Snapshot {
+        let mut seen = Snapshot::default();
+        for name in names {
+            let Ok(slot) = self.find(*name) else { continue };
+            seen.components.insert(*name, self.component(slot));
+            for ends in self.ends_at(slot) {
+                if let Some(connection) = self.connections.get(&ByAddress(ends)) {
+                    seen.connections.insert(ends, connection.policy);
+                }
+            }
+            written(self.entry(slot), &mut seen.ports);
+        }
+        seen
     }
 
     pub(super) fn overflows(&self) -> Vec<((MemberRef, MemberRef), u64)> {
@@ -271,5 +287,16 @@ impl Registry {
             .collect();
         list.sort_unstable();
         list
+    }
+}
+
+/// Adds the values written to a component's ports.
+fn written(entry: &Entry, ports: &mut BTreeMap<MemberRef, Value>) {
+    for (port, used) in entry.cell.kind.ports.iter().zip(&entry.ports) {
+        if used.written
+            && let Some(value) = &used.value
+        {
+            ports.insert(entry.cell.name.member(*port), value.clone());
+        }
     }
 }

@@ -5,7 +5,7 @@ use super::{Inner, Outcome};
 use crate::model::{ComponentName, Policy, RunState, Step, Transition};
 use crate::platform::{Cause, PlatformEvent};
 use crate::runtime::cell::{Cell, Closed};
-use crate::time::{Time, lock};
+use crate::time::{Clock, Time, lock};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -24,6 +24,28 @@ const SPINS: u32 = 200;
 const FIRST_SLEEP: Duration = Duration::from_micros(20);
 const LAST_SLEEP: Duration = Duration::from_millis(1);
 
+/// Sleeping between looks at something that cannot wake whoever looks.
+pub(super) struct Naps(Duration);
+
+impl Default for Naps {
+    fn default() -> Self {
+        Self(FIRST_SLEEP)
+    }
+}
+
+impl Naps {
+    /// Sleeps for a while, longer each time, at most until `deadline`; false: it is past.
+    pub(super) fn take(&mut self, clock: &Clock, deadline: Time) -> bool {
+        let now = clock.now();
+        if now >= deadline {
+            return false;
+        }
+        clock.sleep_until((now + self.0).min(deadline));
+        self.0 = (self.0 * 2).min(LAST_SLEEP);
+        true
+    }
+}
+
 pub(super) fn closed(closed: Closed, name: ComponentName, what: &str) -> Cause {
     match closed {
         Closed::State(state) => Cause::Refused(format!("cannot {what} `{name}` while it is {state}")),
@@ -33,9 +55,10 @@ pub(super) fn closed(closed: Closed, name: ComponentName, what: &str) -> Cause {
 }
 
 impl Inner {
-    pub(super) fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+    /// `safe`: a step of a `safe` configuration, which quarantine does not keep out where it can be let in.
+    pub(super) fn execute(&self, step: &Step, deadline: Time, safe: bool) -> Outcome {
         match step {
-            Step::State { component, transition } => self.transition(*component, *transition, deadline),
+            Step::State { component, transition } => self.transition(*component, *transition, deadline, safe),
             Step::Create { ty, .. } if self.kinds.get(ty).is_none_or(|kind| kind.is_immediate()) => self.at_once(step),
             Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step),
             Step::Create { .. } | Step::Destroy { .. } => {
@@ -49,17 +72,17 @@ impl Inner {
                 let mut registry = lock(&self.registry);
                 outcome(registry.find(property.component).and_then(|slot| {
                     let index = registry.property(slot, property.member)?;
-                    registry.set_property(slot, index, value)
+                    registry.set_property(slot, index, value, safe)
                 }))
             }
             Step::PortWrite { port, value } => {
                 let mut registry = lock(&self.registry);
                 outcome(registry.find(port.component).and_then(|slot| {
                     let index = registry.writable(slot, port.member)?;
-                    registry.write_port(slot, index, value.as_ref(), self.clock.now())
+                    registry.write_port(slot, index, value.as_ref(), self.clock.now(), safe)
                 }))
             }
-            Step::Operation(call) => self.operation(call, deadline),
+            Step::Operation(call) => self.operation(call, deadline, safe),
         }
     }
 
@@ -67,7 +90,7 @@ impl Inner {
         lock(&self.registry).connect(from, to, policy)
     }
 
-    fn transition(&self, name: ComponentName, transition: Transition, deadline: Time) -> Outcome {
+    fn transition(&self, name: ComponentName, transition: Transition, deadline: Time, safe: bool) -> Outcome {
         let (cell, stopped) = {
             let mut registry = lock(&self.registry);
             let slot = match registry.find(name) {
@@ -77,7 +100,7 @@ impl Inner {
             let cell = registry.entry(slot).cell.clone();
             let hook = cell.kind.has_hook(transition);
             if transition == Transition::Stop || !hook {
-                if let Err(cause) = self.shift(&mut registry, slot, transition) {
+                if let Err(cause) = self.shift(&mut registry, slot, transition, safe) {
                     return Outcome::NotDone(cause);
                 }
                 if !hook && !cell.is_busy() {
@@ -89,11 +112,17 @@ impl Inner {
         if stopped && let Err(outcome) = self.await_idle(&cell, deadline) {
             return outcome;
         }
-        if cell.kind.has_hook(transition) { self.hook(&cell, transition, deadline) } else { Outcome::Done(None) }
+        if cell.kind.has_hook(transition) { self.hook(&cell, transition, deadline, safe) } else { Outcome::Done(None) }
     }
 
     /// Moves a component to another state, without its hook and without waiting.
-    pub(super) fn shift(&self, registry: &mut Registry, slot: u32, transition: Transition) -> Result<(), Cause> {
+    pub(super) fn shift(
+        &self,
+        registry: &mut Registry,
+        slot: u32,
+        transition: Transition,
+        safe: bool,
+    ) -> Result<(), Cause> {
         if transition == Transition::Start {
             registry.enlist(slot, &self.clock)?;
         }
@@ -101,10 +130,10 @@ impl Inner {
         if transition == Transition::Start && cell.state() == RunState::Stopped {
             cell.restart();
         }
-        cell.shift(transition).map_err(|why| closed(why, cell.name, transition.as_str()))?;
+        cell.shift(transition, safe).map_err(|why| closed(why, cell.name, transition.as_str()))?;
         match transition {
             Transition::Start => registry.crew_of(slot).activity.started(cell),
-            Transition::Stop => registry.crew_of(slot).activity.stopped(),
+            Transition::Stop => registry.crew_of(slot).activity.stopped(cell),
             Transition::Configure | Transition::Cleanup => {}
         }
         Ok(())
@@ -115,7 +144,7 @@ impl Inner {
     /// # Errors
     /// The outcome of the stop, when it is not simply done.
     pub(super) fn await_idle(&self, cell: &Arc<Cell>, deadline: Time) -> Result<(), Outcome> {
-        let mut sleep = FIRST_SLEEP;
+        let mut naps = Naps::default();
         let mut spins = if self.clock.is_simulated() { SPINS } else { 0 };
         while cell.is_busy() {
             if spins < SPINS {
@@ -123,15 +152,12 @@ impl Inner {
                 std::hint::spin_loop();
                 continue;
             }
-            let now = self.clock.now();
-            if now >= deadline {
+            if !naps.take(&self.clock, deadline) {
                 if self.give_up(cell, true, || true) {
                     return Err(Outcome::Unknown(Cause::Timeout));
                 }
                 break;
             }
-            self.clock.sleep_until((now + sleep).min(deadline));
-            sleep = (sleep * 2).min(LAST_SLEEP);
         }
         match cell.state() {
             RunState::Faulted => {

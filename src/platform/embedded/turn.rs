@@ -4,6 +4,7 @@
 //! A [`Turn`] says how far the worker is. Whoever waits gives a step up when its time is over: its component is then in
 //! quarantine, what the worker brings back too late is dropped, and nothing more is begun.
 
+use super::under_way::What;
 use super::wiring::check_values;
 use super::workers::Job;
 use super::{Inner, Outcome};
@@ -20,7 +21,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Steps that a worker carries out one after the other.
-struct Turn {
+pub(super) struct Turn {
     steps: Vec<Step>,
     /// `2 i`: step `i` has not begun, the one before has come to its end; `2 i + 1`: it is under way; [`OVER`]: nobody
     /// waits.
@@ -30,6 +31,8 @@ struct Turn {
     ended: Mutex<Vec<Ended>>,
     /// Whether the one that was given up was not in quarantine before.
     fresh: AtomicBool,
+    /// This step and those behind it were taken back: they do not begin.
+    taken_back: AtomicUsize,
 }
 
 /// Nothing more is begun, and what is under way comes back too late.
@@ -40,10 +43,17 @@ impl Turn {
         self.at.compare_exchange(from, to, Ordering::AcqRel, Ordering::Acquire).is_ok()
     }
 
-    /// Step `i` begins; false: nobody waits any more.
+    /// Step `i` begins; false: nobody waits any more, or it was taken back.
     fn begin(&self, i: usize, now: Time) -> bool {
         self.began.store(now.0, Ordering::Release);
-        self.move_on(2 * i, 2 * i + 1)
+        i < self.taken_back.load(Ordering::Acquire) && self.move_on(2 * i, 2 * i + 1)
+    }
+
+    /// Takes `step` back, and what comes after it, unless it has begun.
+    pub(super) fn take_back(&self, step: &Step) {
+        if let Some(i) = self.steps.iter().position(|own| own == step) {
+            self.taken_back.fetch_min(i, Ordering::AcqRel);
+        }
     }
 }
 
@@ -78,7 +88,9 @@ impl Inner {
             began: AtomicU64::new(first.0),
             ended: Mutex::default(),
             fresh: AtomicBool::new(false),
+            taken_back: AtomicUsize::new(usize::MAX),
         });
+        let _entered = self.under_way.enter(What::Turn(turn.clone()));
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
             let (inner, turn, stop) = (self.own.clone(), turn.clone(), stop.clone());
@@ -98,8 +110,11 @@ impl Inner {
                 Ok(()) | Err(RecvError::Closed) => {
                     let mut ended = std::mem::take(&mut *lock(&turn.ended));
                     if ended.is_empty() {
-                        let refused = Cause::Refused("the platform is being taken down".to_owned());
-                        ended.push(Ended { outcome: Outcome::NotDone(refused), took: None });
+                        let cause = match turn.taken_back.load(Ordering::Acquire) {
+                            0 => Cause::Cancelled,
+                            _ => Cause::Refused("the platform is being taken down".to_owned()),
+                        };
+                        ended.push(Ended { outcome: Outcome::NotDone(cause), took: None });
                     }
                     return ended;
                 }
@@ -257,7 +272,7 @@ impl Inner {
             }
             registry.is_unconnected(slot)?;
             let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
-            let mut inside = cell.enter_idle(may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
+            let mut inside = cell.enter_idle(false, may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
             let body = inside.take();
             // Nobody enters it again, whoever still knows it.
             inside.hand_over();

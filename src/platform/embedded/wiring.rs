@@ -7,6 +7,7 @@ use crate::platform::Cause;
 use crate::runtime::builder::PortEnd;
 use crate::runtime::guard;
 use crate::time::Time;
+use smallvec::SmallVec;
 
 impl Registry {
     /// The index of a port in the order of names, and its type.
@@ -44,7 +45,7 @@ impl Registry {
             other => other,
         };
         let used = &self.entry(reader).ports[in_port];
-        if used.data || (used.connections > 0 && carried == Policy::Data) {
+        if used.data || (!used.others.is_empty() && carried == Policy::Data) {
             return refused(format!("{to} is connected already"));
         }
         if self.connections.contains_key(&ByAddress((from, to))) {
@@ -56,14 +57,14 @@ impl Registry {
             return refused(format!("{to} is not there"));
         };
         let (feed, lost) = end.open(number, carried);
-        entry.ports[in_port].connections += 1;
+        entry.ports[in_port].others.push(from);
         entry.ports[in_port].data = carried == Policy::Data;
         entry.connections += 1;
         let entry = self.entry_mut(writer);
         if let Some(PortEnd::Out(end)) = &mut entry.ends.ports[out_port] {
             end.attach(number, feed);
         }
-        entry.ports[out_port].connections += 1;
+        entry.ports[out_port].others.push(to);
         entry.connections += 1;
         self.connections.insert(ByAddress((from, to)), Connection { number, policy, lost });
         if !self.watchers.is_empty() && carried == Policy::Data {
@@ -94,13 +95,13 @@ impl Registry {
         if let Some(PortEnd::Out(end)) = &mut entry.ends.ports[out_port] {
             end.detach(connection.number);
         }
-        entry.ports[out_port].connections -= 1;
+        forget(&mut entry.ports[out_port].others, to);
         entry.connections -= 1;
         let entry = self.entry_mut(reader);
         if let Some(PortEnd::In(end)) = &mut entry.ends.ports[in_port] {
             end.close(connection.number);
         }
-        entry.ports[in_port].connections -= 1;
+        forget(&mut entry.ports[in_port].others, from);
         entry.ports[in_port].data = false;
         entry.connections -= 1;
         let name = entry.crew;
@@ -125,9 +126,10 @@ impl Registry {
             .or_else(|_| refused(format!("`{}` has no property `{property}`", entry.cell.name)))
     }
 
-    pub(super) fn set_property(&mut self, slot: u32, index: usize, value: &Value) -> Result<(), Cause> {
+    /// A `safe` value is written in quarantine too: it waits for nobody.
+    pub(super) fn set_property(&mut self, slot: u32, index: usize, value: &Value, safe: bool) -> Result<(), Cause> {
         let entry = self.entry_mut(slot);
-        if entry.cell.is_quarantined() {
+        if !safe && entry.cell.is_quarantined() {
             return Err(Cause::Quarantined);
         }
         let name = entry.cell.kind.properties[index];
@@ -179,13 +181,14 @@ impl Registry {
         index: usize,
         value: Option<&Value>,
         now: Time,
+        safe: bool,
     ) -> Result<(), Cause> {
         let entry = self.entry_mut(slot);
-        if entry.cell.is_quarantined() {
+        if !safe && entry.cell.is_quarantined() {
             return Err(Cause::Quarantined);
         }
         let name = entry.cell.kind.ports[index];
-        if entry.ports[index].connections > 0 {
+        if !entry.ports[index].others.is_empty() {
             return refused(format!("{}.{name} is connected", entry.cell.name));
         }
         if let Some(value) = value
@@ -208,6 +211,13 @@ impl Registry {
             (_, None) => {}
         }
         Ok(())
+    }
+}
+
+/// What was connected last is disconnected first, as a rule: a port with thousands of readers is not searched through.
+fn forget(others: &mut SmallVec<[MemberRef; 1]>, other: MemberRef) {
+    if let Some(at) = others.iter().rposition(|o| *o == other) {
+        others.remove(at);
     }
 }
 

@@ -58,6 +58,8 @@ pub enum Fault {
     FalseNotDone,
     /// The component's code panics: it is faulted (a component being created is not there).
     Panic,
+    /// It takes as long as [`Delays`] say, and when it is given up the component takes no notice.
+    Deaf,
 }
 
 /// Which executed step a fault hits: all conditions given must hold.
@@ -131,7 +133,8 @@ pub struct Delays {
     pub base: Duration,
     /// Up to so much more, decided by the seed.
     pub jitter: Duration,
-    /// These steps instead (without jitter); the first that fits decides. A step slower than its deadline has hung.
+    /// These steps instead (without jitter); the first that fits decides. An operation that is given up
+    /// meanwhile comes to rest at once. A step slower than its deadline has hung until then.
     pub of: Vec<(StepPattern, Duration)>,
 }
 

@@ -4,7 +4,9 @@
 //! *Nothing is injected unless asked*: without [`Faults`] and [`Delays`] every step that may happen happens at once.
 //! It shares no code with `system` or `plan` (see [`world`]), so that it can judge them.
 
+mod calls;
 mod faults;
+mod steps;
 mod world;
 
 pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, StepPattern, When};
@@ -12,6 +14,7 @@ pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, StepPattern, When};
 use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
 use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Ident, RunState, Snapshot, Step, Value};
 use crate::time::{Clock, Join, RecvError, Sender, Time, TrySendError};
+use calls::Calls;
 use faults::Chance;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -54,11 +57,13 @@ struct State {
     delays: Delays,
     blocking: bool,
     reactions: Vec<Reaction>,
-    /// Components whose call has not returned, with the step that hangs.
-    quarantine: BTreeMap<ComponentName, Step>,
+    /// Components whose call has not returned.
+    quarantine: BTreeSet<ComponentName>,
     sink: Option<EventSink>,
     executed: Option<Vec<Step>>,
     timers: Option<(Sender<(Time, Due)>, Join)>,
+    /// The steps that take their time just now.
+    calls: Calls,
 }
 
 /// What happens by itself later.
@@ -90,7 +95,7 @@ impl Shared {
             Due::Raised { event, component } => self.emit(PlatformEvent::Raised { event, component, at }),
             Due::Returned(component) => {
                 // The effect of a hung step never reached the world: what the late call did is taken back by that.
-                let was_there = self.lock().quarantine.remove(&component).is_some();
+                let was_there = self.lock().quarantine.remove(&component);
                 if was_there {
                     self.emit(PlatformEvent::Returned { component, at });
                 }
@@ -162,18 +167,19 @@ impl State {
         self.delays.base + self.delays.jitter.mul_f64(self.chance.unit())
     }
 
-    /// The component in quarantine that `step` needs, if there is one. Taking a connection away needs nothing of the
-    /// component at its end.
-    fn quarantined(&self, step: &Step) -> bool {
+    /// Whether `step` needs a component that is in quarantine. Taking a connection away needs nothing of the component at its
+    /// end; what a `safe` configuration writes or calls is let in.
+    fn quarantined(&self, step: &Step, safe: bool) -> bool {
         if self.quarantine.is_empty() {
             return false;
         }
         match step {
             Step::Disconnect { .. } => false,
+            Step::Operation(_) | Step::PropertySet { .. } | Step::PortWrite { .. } if safe => false,
             Step::Connect { from, to, .. } => {
-                self.quarantine.contains_key(&from.component) || self.quarantine.contains_key(&to.component)
+                self.quarantine.contains(&from.component) || self.quarantine.contains(&to.component)
             }
-            other => self.quarantine.contains_key(&other.component()),
+            other => self.quarantine.contains(&other.component()),
         }
     }
 }
@@ -191,10 +197,11 @@ impl Simulated {
             delays: options.delays,
             blocking: options.blocking,
             reactions: options.reactions,
-            quarantine: BTreeMap::new(),
+            quarantine: BTreeSet::new(),
             sink: None,
             executed: None,
             timers: None,
+            calls: Calls::default(),
         };
         Self { shared: Arc::new(Shared { clock, catalogue, state: Mutex::new(state) }) }
     }
@@ -257,144 +264,6 @@ impl Simulated {
         }
         may
     }
-
-    fn execute(&self, step: &Step, value: Option<&Value>, deadline: Time) -> Outcome {
-        let with_value;
-        let step = match value {
-            None => step,
-            Some(value) => {
-                with_value = with(step, value);
-                &with_value
-            }
-        };
-        let now = self.shared.clock.now();
-        let (fault, delay) = {
-            let mut state = self.shared.lock();
-            if state.faults.rules.is_empty() && state.delays.is_none() && state.reactions.is_empty() {
-                state.asked += 1;
-                if state.quarantined(step) {
-                    return Outcome::NotDone(Cause::Quarantined);
-                }
-                return Self::now(&mut state, step);
-            }
-            let fault = state.fault(step);
-            if state.quarantined(step) {
-                return Outcome::NotDone(Cause::Quarantined);
-            }
-            (fault, state.delay(step))
-        };
-        let slow = (now + delay > deadline).then(|| Fault::Hang { returns: Some((now + delay).since(deadline)) });
-        match fault.or(slow) {
-            None => {
-                self.shared.clock.sleep_until(now + delay);
-                let outcome = self.let_happen(step);
-                if matches!(outcome, Outcome::Done(_)) {
-                    self.react(step);
-                }
-                outcome
-            }
-            Some(Fault::Fail) => {
-                self.shared.clock.sleep_until(now + delay);
-                Outcome::NotDone(Cause::Failed("a failure was injected".to_owned()))
-            }
-            Some(Fault::Panic) => {
-                self.shared.clock.sleep_until(now + delay);
-                self.panic(step)
-            }
-            Some(Fault::FalseDone) => {
-                self.shared.clock.sleep_until(now + delay);
-                Outcome::Done(None)
-            }
-            Some(Fault::FalseNotDone) => {
-                self.shared.clock.sleep_until(now + delay);
-                match self.let_happen(step) {
-                    Outcome::Done(_) => Outcome::NotDone(Cause::Failed("a false answer was injected".to_owned())),
-                    other => other,
-                }
-            }
-            Some(fault @ (Fault::LostAnswer | Fault::LostRequest)) => {
-                self.shared.clock.sleep_until(now + delay);
-                if fault == Fault::LostAnswer
-                    && let Outcome::Done(_) = self.let_happen(step)
-                {
-                    self.react(step);
-                }
-                self.shared.clock.sleep_until(deadline);
-                Outcome::Unknown(Cause::Timeout)
-            }
-            Some(Fault::Hang { returns }) => self.hang(step, returns, deadline),
-        }
-    }
-
-    /// [`Self::now`] with the lock held for just that: a temporary guard would live as long as a `match` on the outcome.
-    fn let_happen(&self, step: &Step) -> Outcome {
-        let mut state = self.shared.lock();
-        Self::now(&mut state, step)
-    }
-
-    fn now(state: &mut State, step: &Step) -> Outcome {
-        match state.world.check(step) {
-            Err(why) => Outcome::NotDone(Cause::Refused(why)),
-            Ok(()) => {
-                let result = state.world.apply(step);
-                if let Some(executed) = &mut state.executed {
-                    executed.push(step.clone());
-                }
-                Outcome::Done(result)
-            }
-        }
-    }
-
-    fn panic(&self, step: &Step) -> Outcome {
-        let component = step.component();
-        let reason = "a panic was injected";
-        let refused = self.shared.lock().world.check(step);
-        if let Err(why) = refused {
-            return Outcome::NotDone(Cause::Refused(why));
-        }
-        self.fault(component, reason);
-        Outcome::NotDone(Cause::Panicked(reason.to_owned()))
-    }
-
-    fn hang(&self, step: &Step, returns: Option<Duration>, deadline: Time) -> Outcome {
-        {
-            let mut state = self.shared.lock();
-            if let Err(why) = state.world.check(step) {
-                return Outcome::NotDone(Cause::Refused(why));
-            }
-            state.quarantine.insert(step.component(), step.clone());
-        }
-        if let Some(after) = returns {
-            self.shared.later(deadline + after, Due::Returned(step.component()));
-        }
-        self.shared.clock.sleep_until(deadline);
-        Outcome::Unknown(Cause::Timeout)
-    }
-
-    fn react(&self, step: &Step) {
-        let due: Vec<(Duration, EventName, ComponentName)> = {
-            let state = self.shared.lock();
-            let fitting = state.reactions.iter().filter(|reaction| reaction.on.matches(step));
-            fitting.map(|reaction| (reaction.after, reaction.raise, reaction.component)).collect()
-        };
-        for (after, event, component) in due {
-            let due = Due::Raised { event, component };
-            if after.is_zero() {
-                self.shared.happen(due);
-            } else {
-                self.shared.later(self.shared.clock.now() + after, due);
-            }
-        }
-    }
-}
-
-/// `step` with another value (property and port writes; others stay as they are).
-fn with(step: &Step, value: &Value) -> Step {
-    match step {
-        Step::PropertySet { property, .. } => Step::PropertySet { property: *property, value: value.clone() },
-        Step::PortWrite { port, .. } => Step::PortWrite { port: *port, value: Some(value.clone()) },
-        other => other.clone(),
-    }
 }
 
 impl Platform for Simulated {
@@ -412,7 +281,15 @@ impl Platform for Simulated {
     }
 
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
-        self.execute(step, None, deadline)
+        self.execute(step, None, deadline, false)
+    }
+
+    fn execute_safe(&self, step: &Step, deadline: Time) -> Outcome {
+        self.execute(step, None, deadline, true)
+    }
+
+    fn cancel(&self, step: &Step) {
+        self.shared.lock().calls.cancel(step);
     }
 
     fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
@@ -427,6 +304,10 @@ impl Platform for Simulated {
         self.see(deadline).map(|state| state.world.observe(component))
     }
 
+    fn observe_some(&self, components: &[ComponentName], deadline: Time) -> Result<Snapshot, ObserveError> {
+        self.see(deadline).map(|state| state.world.some(components))
+    }
+
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
         let fixed = |step: &Step| {
             !matches!(step, Step::Create { .. } | Step::Destroy { .. }) && self.execution(step) == Execution::Immediate
@@ -439,7 +320,7 @@ impl Platform for Simulated {
     }
 
     fn quarantined(&self) -> Vec<ComponentName> {
-        self.shared.lock().quarantine.keys().copied().collect()
+        self.shared.lock().quarantine.iter().copied().collect()
     }
 }
 
@@ -464,7 +345,7 @@ struct Resolved {
 impl Prepared for Resolved {
     fn execute(&mut self, index: usize, value: Option<&Value>, _: Time, deadline: Time) -> Outcome {
         match self.steps.get(index) {
-            Some(step) => self.platform.execute(step, value, deadline),
+            Some(step) => self.platform.execute(step, value, deadline, false),
             None => Outcome::NotDone(Cause::Refused(format!("there is no step {index}"))),
         }
     }

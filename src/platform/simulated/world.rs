@@ -30,6 +30,8 @@ pub(super) struct World {
     connections: BTreeMap<(MemberRef, MemberRef), Policy>,
     /// In-port → the out-ports connected to it.
     incoming: BTreeMap<MemberRef, Vec<MemberRef>>,
+    /// Out-port → the in-ports connected to it.
+    outgoing: BTreeMap<MemberRef, Vec<MemberRef>>,
     written: BTreeMap<MemberRef, Value>,
 }
 
@@ -43,6 +45,7 @@ impl World {
             components: BTreeMap::new(),
             connections: BTreeMap::new(),
             incoming: BTreeMap::new(),
+            outgoing: BTreeMap::new(),
             written: BTreeMap::new(),
         }
     }
@@ -216,17 +219,22 @@ impl World {
                 for port in it.ty.ports.keys() {
                     self.written.remove(&component.member(*port));
                     self.incoming.remove(&component.member(*port));
+                    self.outgoing.remove(&component.member(*port));
                 }
             }
             Step::Connect { from, to, policy } => {
                 self.connections.insert((*from, *to), *policy);
                 self.incoming.entry(*to).or_default().push(*from);
+                self.outgoing.entry(*from).or_default().push(*to);
                 self.count_link(*from, *to, 1);
             }
             Step::Disconnect { from, to } => {
                 self.connections.remove(&(*from, *to));
                 if let Some(others) = self.incoming.get_mut(to) {
                     others.retain(|other| other != from);
+                }
+                if let Some(others) = self.outgoing.get_mut(from) {
+                    others.retain(|other| other != to);
                 }
                 self.count_link(*from, *to, -1);
             }
@@ -269,6 +277,24 @@ impl World {
             properties: it.properties.clone(),
             activity: it.activity,
         })
+    }
+
+    /// Those of these components that exist, with what begins or ends at them and what was written to them.
+    pub fn some(&self, names: &[ComponentName]) -> Snapshot {
+        let mut seen = Snapshot::default();
+        for name in names {
+            let (Some(component), Some(it)) = (self.observe(*name), self.components.get(name)) else { continue };
+            seen.components.insert(*name, component);
+            for port in it.ty.ports.keys().map(|port| name.member(*port)) {
+                let from = self.incoming.get(&port).into_iter().flatten().map(|from| (*from, port));
+                let to = self.outgoing.get(&port).into_iter().flatten().map(|to| (port, *to));
+                for ends in from.chain(to) {
+                    seen.connections.extend(self.connections.get(&ends).map(|policy| (ends, *policy)));
+                }
+                seen.ports.extend(self.written.get(&port).map(|value| (port, value.clone())));
+            }
+        }
+        seen
     }
 
     pub fn snapshot(&self) -> Snapshot {

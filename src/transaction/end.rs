@@ -1,0 +1,285 @@
+//! How a transaction ends: what was done is compared with what is there, and what is left is named.
+
+use super::{Can, Phase, Transaction};
+use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
+use crate::plan::footprint::Footprint;
+use crate::plan::undo::Item;
+use crate::stack::{FrameId, Inverse, Reason, Residual};
+use crate::system::{System, Undo, View as _, diff, step, touch};
+use rustc_hash::FxHashSet;
+use std::sync::Arc;
+
+/// What came of a transaction.
+#[derive(Debug, Clone)]
+pub struct End {
+    /// What came of each part, in order.
+    pub parts: Vec<PartEnd>,
+}
+
+/// What came of a part.
+#[derive(Debug, Clone)]
+pub enum PartEnd {
+    /// It was done.
+    Done,
+    /// The system is as before it.
+    Failed(Reason),
+    /// It was given up, and the system is as before it.
+    Cancelled,
+    /// Neither done nor taken back.
+    Broken(Box<BrokenPart>),
+    /// It had not begun when one before it failed: to be taken up anew.
+    Anew,
+}
+
+/// What is left of a part that is neither done nor taken back.
+#[derive(Debug, Clone)]
+pub struct BrokenPart {
+    /// What is left, in words and steps.
+    pub residual: Arc<Residual>,
+    /// The partial frame: what takes back what was done.
+    pub frame: Option<crate::stack::Frame>,
+    /// The frame that it takes the place of, where that was being undone.
+    pub instead: Option<FrameId>,
+    /// The components of which not all is known, as the model has them.
+    pub expected: Snapshot,
+}
+
+impl Transaction {
+    /// Everything was tried: it is done, or, best effort, what could not be done is named.
+    pub(super) fn end_forward(&mut self, live: &System, can: &Can<'_>) {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        if forward.failures.is_empty() && forward.unsettled.is_empty() {
+            let parts = self.planned.parts.iter().map(|_| PartEnd::Done).collect();
+            return self.over(parts);
+        }
+        let unsettled = forward.unsettled.iter().map(|i| forward.list[*i as usize].step.clone()).collect();
+        self.unsettled = unsettled;
+        let residual = Residual {
+            unsettled: self.unsettled.clone(),
+            quarantined: self.hung(can),
+            ..Residual::of(self.reason())
+        };
+        let own = self.own();
+        let broken = self.broken(0, residual, live.snapshot_some(&own));
+        self.over(vec![broken]);
+    }
+
+    fn over(&mut self, parts: Vec<PartEnd>) {
+        self.end = Some(super::End { parts });
+        self.phase = Phase::Over;
+    }
+
+    fn hung(&self, can: &Can<'_>) -> Vec<ComponentName> {
+        let own = self.own();
+        can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()
+    }
+
+    /// Why it did not simply succeed.
+    fn reason(&self) -> Reason {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let part = self.failed_part();
+        let first = forward.failures.iter().find(|(i, _)| self.part_of(*i) == part).or(forward.failures.first());
+        match (first, forward.unsettled.first(), &self.stopped_by) {
+            (_, _, Some(reason @ (Reason::GivenUp | Reason::Interrupted(_)))) => reason.clone(),
+            (Some((_, reason)), ..) => reason.clone(),
+            (None, Some(i), _) => {
+                Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout }
+            }
+            (None, None, Some(reason)) => reason.clone(),
+            (None, None, None) => Reason::Ended,
+        }
+    }
+
+    /// Steps of the forward list that were done, belong to `part` or a later one, and were not taken back.
+    fn remaining(&self, part: usize) -> Vec<u32> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let left = |i: &u32| {
+            let needs = !matches!(self.undo_of(*i), Undo::Nothing);
+            needs && !self.taken_back.contains(i) && self.part_of(*i) >= part
+        };
+        forward.done.iter().copied().filter(left).collect()
+    }
+
+    /// Whether a difference may be mended by itself.
+    fn mends(&self, part: usize) -> bool {
+        let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
+        !held && self.withheld.is_none() && !self.taken_down
+    }
+
+    /// The system as it should be now, from the model: without the faults that this brought about, and, where nothing keeps
+    /// it from that, without what could not be taken back. Tells whether the latter.
+    fn wanted(&self, part: usize, live: &System) -> (System, bool) {
+        let mut wanted = live.clone();
+        let forward = self.forward.as_ref().expect("it was carried out");
+        for (component, state) in forward.faulted.iter().chain(&self.faulted) {
+            if wanted.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
+                wanted.set_state(*component, *state);
+            }
+        }
+        let remaining = self.remaining(part);
+        let plain = |i: &u32| {
+            let steps = self.undo_of(*i).steps();
+            !steps.is_empty() && steps.iter().all(|step| !matches!(step, Step::Operation(_)))
+        };
+        let whole = self.mends(part) && remaining.iter().all(plain);
+        if whole {
+            for i in remaining.iter().rev() {
+                for back in self.undo_of(*i).steps() {
+                    let _ = step::apply(back, &mut wanted);
+                }
+            }
+        }
+        (wanted, whole)
+    }
+
+    /// Compares what was seen of its components with what should be; mends the difference once; names what remains.
+    pub(super) fn compare(&mut self, seen: Option<Snapshot>, live: &mut System, can: &Can<'_>) {
+        let part = self.failed_part();
+        let own = self.own();
+        let (wanted, whole) = match self.target.take() {
+            Some(target) => (*target, true),
+            None => self.wanted(part, live),
+        };
+        let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
+        let observed = adopted == Some(true);
+        if observed && self.phase == Phase::Looking && self.mends(part) {
+            let asked = self.asked_back
+                || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
+            let steps = diff(live, &wanted);
+            let steps: Vec<Step> = steps
+                .into_iter()
+                .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
+                .collect();
+            if !steps.is_empty() && (asked || !steps.iter().any(|step| step::moves(step, live))) {
+                return self.mend(steps, wanted);
+            }
+        }
+        self.judge(part, &wanted, whole, observed, live, can);
+    }
+
+    /// Everything is being taken down: nobody is asked, and the model is what is known.
+    pub(super) fn compare_blind(&mut self, live: &mut System) {
+        let nothing = |_: &Step| crate::model::Execution::Blocking;
+        let can = Can { execution: &nothing, room: false, quarantined: &[] };
+        let wanted = live.clone();
+        self.judge(0, &wanted, false, true, live, &can);
+    }
+
+    /// Names the end. `whole`: `wanted` has nothing of what was done.
+    fn judge(&mut self, part: usize, wanted: &System, whole: bool, observed: bool, live: &System, can: &Can<'_>) {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let mut unsettled: Vec<Step> =
+            forward.unsettled.iter().map(|i| forward.list[*i as usize].step.clone()).collect();
+        unsettled.append(&mut self.unsettled);
+        let difference = diff(wanted, live);
+        let mut faulted: Vec<ComponentName> = Vec::new();
+        let own = self.own();
+        for node in own.iter().filter_map(|name| live.component(*name)) {
+            let was = wanted.component(node.name).map(|node| node.state);
+            if node.state == RunState::Faulted && was != Some(RunState::Faulted) {
+                faulted.push(node.name);
+            }
+        }
+        // Where the way back to before is not known to be gone, what remains is told as a difference.
+        let remaining = if whole { Vec::new() } else { self.remaining(part) };
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let residual = Residual {
+            left: remaining.iter().map(|i| forward.list[*i as usize].step.clone()).collect(),
+            withheld: self.withheld.clone(),
+            difference,
+            unsettled: unsettled.clone(),
+            irreversible: (remaining.iter())
+                .filter(|i| matches!(self.undo_of(**i), Undo::Irreversible(_)))
+                .map(|i| forward.list[*i as usize].step.clone())
+                .collect(),
+            faulted,
+            quarantined: self.hung(can),
+            // Nobody can be asked: what every answer said without a doubt is believed.
+            observed: observed || !(self.doubted || !unsettled.is_empty()),
+            ..Residual::of(self.reason())
+        };
+        self.unsettled = unsettled;
+        let clean = residual.is_settled() && remaining.is_empty();
+        let missing = self.missing(part);
+        let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
+        for (at, _) in self.planned.parts.iter().enumerate() {
+            parts.push(if at < part {
+                if missing.contains(&at) { self.broken(at, Residual::of(self.reason()), Snapshot::default()) } else { PartEnd::Done }
+            } else if at == part {
+                match (clean, self.given_up) {
+                    (true, Some(_)) if matches!(self.stopped_by, Some(Reason::GivenUp)) => PartEnd::Cancelled,
+                    (true, _) => PartEnd::Failed(self.reason()),
+                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own)),
+                }
+            } else if self.interrupted || self.taken_down {
+                PartEnd::Failed(self.reason())
+            } else {
+                PartEnd::Anew
+            });
+        }
+        self.over(parts);
+    }
+
+    /// Parts before `part` of which a step is neither done nor finished.
+    fn missing(&self, part: usize) -> FxHashSet<usize> {
+        if part == 0 || self.planned.of.is_empty() {
+            return FxHashSet::default();
+        }
+        // What the finishing script left out had nothing to do; only what it could not do is missing.
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
+        done.extend(self.finished.iter().copied());
+        let calls = |place: &u32| matches!(self.whole()[*place as usize].step, Step::Operation(_));
+        let places = (0..self.whole().len() as u32).filter(|place| !done.contains(place)).filter(calls);
+        places.map(|place| self.planned.part_of(Some(place))).filter(|at| *at < part).collect()
+    }
+
+    /// A part that is neither done nor taken back.
+    fn broken(&self, part: usize, residual: Residual, expected: Snapshot) -> PartEnd {
+        let planned = &self.planned.parts[part];
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let undone = planned.pushes.is_none();
+        let items: Vec<Item> = if undone {
+            // What is still to be undone of the frame.
+            let done: FxHashSet<u32> = (forward.done.iter())
+                .filter(|i| !self.taken_back.contains(*i))
+                .filter_map(|i| self.planned.place(*i as usize))
+                .collect();
+            let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));
+            open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
+        } else {
+            let left = self.remaining(part).into_iter().filter(|i| self.part_of(*i) == part).rev();
+            left.flat_map(|i| {
+                let of = &forward.list[i as usize];
+                self.undo_of(i).steps().iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
+            })
+            .collect()
+        };
+        let components: FxHashSet<ComponentName> =
+            items.iter().flat_map(|item| touch::components(&item.step)).chain(residual.components()).collect();
+        let slots: FxHashSet<_> = items.iter().filter_map(|item| touch::absolute(&item.step)).collect();
+        let irreversible = residual.irreversible.first().cloned();
+        let frame = planned.frame.as_deref().map(|frame| {
+            let about = |component: &ComponentName| components.contains(component);
+            let touches = (frame.footprint.touches.iter())
+                .filter(|touch| {
+                    let (a, b) = touch.slot.components();
+                    about(&a) || about(&b)
+                })
+                .copied()
+                .collect();
+            crate::stack::Frame {
+                inverse: Inverse::List(items),
+                footprint: Footprint { touches },
+                saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
+                floor: irreversible.map(|step| format!("`{step}` cannot be undone")),
+                acts: Vec::new(),
+                partial: true,
+                ..frame.clone()
+            }
+        });
+        let instead = if undone { frame.as_ref().map(|frame| frame.id) } else { None };
+        let residual = Arc::new(residual);
+        PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected }))
+    }
+}

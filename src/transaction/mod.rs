@@ -1,0 +1,522 @@
+//! One transaction: a plan carried out whole, or taken back, or what remains is named (design §6).
+//!
+//! A pure machine without thread, clock or platform. [`Transaction::poll`] says what is to be done next: steps to begin,
+//! calls to cancel, components to read back; [`Transaction::on`] hears what came of it. The model of the system lies with
+//! whoever drives the machine and changes only here, with each step that was done. The configurator carries messages
+//! between a machine and the platform; a test can drive one through every outcome at every step.
+//!
+//! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `back`: the way back.
+//! `end`: what comes of each part.
+//!
+//! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
+//! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
+
+mod back;
+mod end;
+mod order;
+mod run;
+mod settle;
+
+pub use back::Touched;
+pub use end::{BrokenPart, End, PartEnd};
+
+use crate::model::{Cause, ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
+use crate::plan::PlannedStep;
+use crate::stack::{Planned, Reason};
+use crate::system::System;
+use crate::time::Time;
+use back::{WayBack, chain};
+use run::Run;
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
+use std::time::Duration;
+
+/// How a transaction is carried out.
+#[derive(Debug, Clone, Copy)]
+pub struct Spec {
+    /// No step of it begins later.
+    pub until: Time,
+    /// What that time is, from its beginning, for words.
+    pub timeout: Duration,
+    /// How long one step may take.
+    pub patience: Duration,
+    /// Every step is tried, past failures, and none is taken back: a safe configuration.
+    pub best_effort: bool,
+    /// Somebody asked for what a way back would do: it may move.
+    pub asked_back: bool,
+}
+
+/// What whoever drives it can do now.
+pub struct Can<'a> {
+    /// How a step is carried out on the platform.
+    pub execution: &'a dyn Fn(&Step) -> Execution,
+    /// Whether there is room for a call that takes time.
+    pub room: bool,
+    /// Components whose call has not returned.
+    pub quarantined: &'a [ComponentName],
+}
+
+/// What is to be done next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Poll {
+    /// These steps begin now, by their numbers in the list in hand ([`Transaction::step`]).
+    Begin(SmallVec<[u32; 1]>),
+    /// The call that is out for this step is given up: it is told so.
+    Cancel(u32),
+    /// These components are read back.
+    Read(Vec<ComponentName>),
+    /// Nothing, until something comes.
+    Wait,
+    /// It is over: [`Transaction::end`].
+    Over,
+}
+
+/// What happened.
+#[derive(Debug, Clone)]
+pub enum Input {
+    /// A step that was begun is back.
+    Ended {
+        /// Its number.
+        step: u32,
+        /// How.
+        outcome: Outcome,
+    },
+    /// A step that was to begin did not.
+    NotBegun(u32),
+    /// What was read; none: nobody answered.
+    Seen(Option<Snapshot>),
+    /// A part of it is given up, by who asked for it: what was done is taken back, also what moves.
+    GiveUp {
+        /// The part.
+        part: usize,
+    },
+    /// A safe configuration goes first. Nothing further begins, and nothing is taken back before [`Input::Release`].
+    Interrupt(ConfigId),
+    /// The safe configuration has been applied, and touched this.
+    Release(Touched),
+    /// Everything is taken down: nothing further begins, and nothing is taken back.
+    TakenDown,
+    /// Nothing further begins, and what was done is taken back as after a failure.
+    Stop,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    Forward,
+    /// Nothing further begins; what is out comes in.
+    Stopping,
+    Back,
+    /// The components are compared with the model.
+    Looking,
+    /// What was found different is mended, once.
+    Mending,
+    LookingAgain,
+    Over,
+}
+
+/// A transaction under way.
+#[derive(Debug)]
+pub struct Transaction {
+    planned: Planned,
+    spec: Spec,
+    phase: Phase,
+    forward: Option<Run>,
+    /// The way back in hand, or what is mended.
+    back: Option<(Run, WayBack)>,
+    /// How often the way back was begun.
+    attempts: u32,
+    /// Steps of the forward list that were taken back, and of those with several steps back how many are done.
+    taken_back: FxHashSet<u32>,
+    partly: FxHashMap<u32, usize>,
+    /// Places of the whole that were finished on the way back.
+    finished: FxHashSet<u32>,
+    withheld: Option<Step>,
+    /// Steps of unknown outcome, of ways back too.
+    unsettled: Vec<Step>,
+    faulted: Vec<(ComponentName, crate::model::RunState)>,
+    doubted: bool,
+    touched: Touched,
+    /// Why it ends early, if not because of a step.
+    stopped_by: Option<Reason>,
+    given_up: Option<usize>,
+    asked_back: bool,
+    interrupted: bool,
+    held: bool,
+    taken_down: bool,
+    reading: bool,
+    seen: Option<Option<Snapshot>>,
+    cancels: Vec<u32>,
+    /// What the components are compared with.
+    target: Option<Box<System>>,
+    end: Option<End>,
+}
+
+impl Transaction {
+    /// A transaction that has not begun.
+    pub fn new(mut planned: Planned, spec: Spec) -> Self {
+        let mut forward = Run::new(std::mem::take(&mut planned.steps), spec.until);
+        forward.tries_all = spec.best_effort;
+        Self {
+            planned,
+            spec,
+            phase: Phase::Forward,
+            forward: Some(forward),
+            back: None,
+            attempts: 0,
+            taken_back: FxHashSet::default(),
+            partly: FxHashMap::default(),
+            finished: FxHashSet::default(),
+            withheld: None,
+            unsettled: Vec::new(),
+            faulted: Vec::new(),
+            doubted: false,
+            touched: Touched::default(),
+            stopped_by: None,
+            given_up: None,
+            asked_back: spec.asked_back,
+            interrupted: false,
+            held: false,
+            taken_down: false,
+            reading: false,
+            seen: None,
+            cancels: Vec::new(),
+            target: None,
+            end: None,
+        }
+    }
+
+    /// Goes on where the first `done` steps were done already (the model has them) and the next has ended so.
+    pub fn resume(&mut self, done: u32, outcome: Outcome, live: &mut System) {
+        let forward = self.forward.as_mut().expect("it has not begun");
+        (0..done).for_each(|i| forward.was_done(i));
+        if (done as usize) < forward.list.len() {
+            forward.is_out(done, live);
+            self.on(Input::Ended { step: done, outcome }, live);
+        }
+    }
+
+    /// What it carries out; its steps are those of [`Self::step`] now.
+    pub fn planned(&self) -> &Planned {
+        &self.planned
+    }
+
+    /// How it is carried out.
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// All steps, one operation after the other.
+    fn whole(&self) -> &[PlannedStep] {
+        if self.planned.of.is_empty() { self.forward.as_ref().map_or(&[], |run| &run.list) } else { &self.planned.whole }
+    }
+
+    fn in_hand(&self) -> &Run {
+        self.back.as_ref().map(|(run, _)| run).or(self.forward.as_ref()).expect("a list is in hand")
+    }
+
+    fn in_hand_mut(&mut self) -> &mut Run {
+        match &mut self.back {
+            Some((run, _)) => run,
+            None => self.forward.as_mut().expect("a list is in hand"),
+        }
+    }
+
+    /// A step of the list in hand.
+    pub fn step(&self, number: u32) -> &PlannedStep {
+        &self.in_hand().list[number as usize]
+    }
+
+    /// Whether the list in hand takes something back.
+    pub fn is_going_back(&self) -> bool {
+        self.back.is_some()
+    }
+
+    /// The part that a step of the list in hand belongs to.
+    pub fn part_of_step(&self, number: u32) -> usize {
+        match &self.back {
+            None => self.part_of(number),
+            Some((_, way)) => {
+                let taken = way.takes_back.get(number as usize).copied().flatten().map(|i| self.part_of(i));
+                let finished = way.finishes.get(number as usize).copied().flatten();
+                taken.or(finished.map(|place| self.planned.part_of(Some(place)))).unwrap_or(self.planned.parts.len() - 1)
+            }
+        }
+    }
+
+    /// How long a step may take that begins now.
+    pub fn deadline(&self, now: Time) -> Time {
+        let deadline = now + self.spec.patience;
+        if self.back.is_some() { deadline } else { deadline.min(self.spec.until) }
+    }
+
+    /// Steps of the forward list that were done so far, in order, with what takes each back: what a safe configuration that
+    /// comes now is planned around.
+    pub fn done_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &crate::system::Undo)> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let open = forward.done.iter().copied().filter(|i| !self.taken_back.contains(i));
+        open.map(|i| (&forward.list[i as usize], self.undo_of(i)))
+    }
+
+    /// What failed so far, and what nobody knows of.
+    pub fn failures(&self) -> Vec<Reason> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let unknown = |i: &u32| Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout };
+        forward.failures.iter().map(|(_, reason)| reason.clone()).chain(forward.unsettled.iter().map(unknown)).collect()
+    }
+
+    /// The components that it is about.
+    pub fn components(&self) -> Vec<ComponentName> {
+        self.own()
+    }
+
+    /// What came of it, once it is over.
+    pub fn end(self) -> End {
+        self.end.expect("it is over")
+    }
+
+    /// What happened.
+    pub fn on(&mut self, input: Input, live: &mut System) {
+        match input {
+            Input::Ended { step, outcome } => {
+                self.doubted |= matches!(outcome, Outcome::Unknown(_));
+                self.in_hand_mut().ended(step, outcome, live);
+            }
+            Input::NotBegun(step) => self.in_hand_mut().not_begun(step),
+            Input::Seen(seen) => self.seen = Some(seen),
+            Input::GiveUp { part } => {
+                // Once it is on its way back, that goes on.
+                if self.phase == Phase::Forward {
+                    self.stopped_by.get_or_insert(Reason::GivenUp);
+                    self.given_up = Some(part);
+                    self.asked_back = true;
+                    self.cancel();
+                }
+            }
+            Input::Interrupt(by) => {
+                self.stopped_by.get_or_insert(Reason::Interrupted(by));
+                self.interrupted = true;
+                self.asked_back = false;
+                self.held = true;
+                self.cancel();
+                let run = self.in_hand_mut();
+                run.late_from_now = true;
+            }
+            Input::Release(touched) => {
+                self.held = false;
+                self.touched.join(touched);
+            }
+            Input::Stop => {
+                if self.phase == Phase::Forward {
+                    self.stopped_by.get_or_insert(Reason::TakenDown);
+                    self.cancel();
+                }
+            }
+            Input::TakenDown => {
+                self.stopped_by.get_or_insert(Reason::TakenDown);
+                self.taken_down = true;
+                self.held = false;
+                self.cancel();
+            }
+        }
+    }
+
+    /// Calls that are out are told that they are given up.
+    fn cancel(&mut self) {
+        let run = self.in_hand();
+        let calls = run.outstanding().filter(|i| matches!(run.list[*i as usize].step, Step::Operation(_)));
+        let calls: Vec<u32> = calls.collect();
+        self.cancels.extend(calls);
+    }
+
+    /// What is to be done next.
+    pub fn poll(&mut self, live: &mut System, now: Time, can: &Can<'_>) -> Poll {
+        loop {
+            if let Some(step) = self.cancels.pop() {
+                return Poll::Cancel(step);
+            }
+            if let Some(poll) = self.settle(live) {
+                return poll;
+            }
+            match self.phase {
+                Phase::Forward | Phase::Back | Phase::Mending => {
+                    let stopped = self.is_stopped();
+                    let timeout = self.spec.timeout;
+                    let run = self.in_hand_mut();
+                    if !stopped && !run.stops() {
+                        let begun = run.begin(live, now, can.execution, can.room, timeout);
+                        if !begun.is_empty() {
+                            return Poll::Begin(begun);
+                        }
+                        if !run.stops() && !run.is_over() {
+                            return Poll::Wait;
+                        }
+                    }
+                    self.carried_out(live, can);
+                }
+                Phase::Stopping => {
+                    let run = self.in_hand();
+                    if self.held || run.out > 0 {
+                        return Poll::Wait;
+                    }
+                    self.turn_back(live);
+                }
+                Phase::Looking | Phase::LookingAgain => {
+                    if self.held {
+                        return Poll::Wait;
+                    }
+                    if !self.reading {
+                        self.reading = true;
+                        return Poll::Read(self.own());
+                    }
+                    let Some(seen) = self.seen.take() else { return Poll::Wait };
+                    self.reading = false;
+                    self.compare(seen, live, can);
+                }
+                Phase::Over => return Poll::Over,
+            }
+        }
+    }
+
+    /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
+    fn settle(&mut self, live: &mut System) -> Option<Poll> {
+        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over) {
+            return None;
+        }
+        if self.reading {
+            let seen = self.seen.take()?;
+            self.reading = false;
+            self.in_hand_mut().settle_by(seen.as_ref(), live);
+            return None;
+        }
+        if !self.in_hand_mut().settle_blind(live) {
+            return None;
+        }
+        self.reading = true;
+        let run = self.in_hand();
+        let of = |i: u32| crate::system::touch::components(&run.list[i as usize].step);
+        let mut components: Vec<ComponentName> = run.unread.iter().flat_map(|(i, _)| of(*i)).collect();
+        components.sort_unstable();
+        components.dedup();
+        Some(Poll::Read(components))
+    }
+
+    /// Whether nothing further of the list in hand is to begin.
+    fn is_stopped(&self) -> bool {
+        match self.phase {
+            Phase::Forward => self.stopped_by.is_some(),
+            _ => self.held || self.taken_down,
+        }
+    }
+
+    /// The list in hand is over, or stops.
+    fn carried_out(&mut self, live: &mut System, can: &Can<'_>) {
+        match self.phase {
+            Phase::Forward => {
+                let forward = self.forward.as_ref().expect("it was carried out");
+                if forward.is_over() && (self.spec.best_effort || !forward.stops() && back::whole(forward)) {
+                    self.end_forward(live, can);
+                } else {
+                    self.phase = Phase::Stopping;
+                }
+            }
+            Phase::Back => {
+                // What is out comes in first.
+                self.phase = Phase::Stopping;
+            }
+            Phase::Mending => {
+                if self.in_hand().out > 0 {
+                    self.phase = Phase::Stopping;
+                    return;
+                }
+                self.back = None;
+                self.phase = Phase::LookingAgain;
+            }
+            _ => {}
+        }
+    }
+
+    /// Nothing is out any more: the way back begins, goes on, or is over.
+    fn turn_back(&mut self, live: &mut System) {
+        if self.target.is_some() {
+            self.back = None;
+            self.phase = Phase::LookingAgain;
+            return;
+        }
+        let mut failed = self.back.is_none();
+        if let Some((run, way)) = self.back.take() {
+            failed = self.took_back(&run, &way);
+        }
+        let part = self.failed_part();
+        let way = self.way_back(part, live);
+        self.withheld.clone_from(&way.withheld);
+        self.taken_back.extend(way.superseded.iter().copied());
+        let again = self.interrupted || self.attempts < 2;
+        if way.list.is_empty() || !(failed && again) || self.attempts > 8 {
+            if self.taken_down {
+                self.compare_blind(live);
+            } else {
+                self.phase = Phase::Looking;
+            }
+            return;
+        }
+        self.attempts += 1;
+        let mut run = Run::new(way.list.clone(), Time::NEVER);
+        run.late_from_now = false;
+        self.back = Some((run, way));
+        self.phase = Phase::Back;
+    }
+
+    /// Books what a way back has done. Answers whether something of it is left to be tried again.
+    fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
+        for i in &run.done {
+            if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
+                let done = self.partly.entry(*taken).or_default();
+                *done += 1;
+                if *done >= way.takes_back.iter().filter(|t| **t == Some(*taken)).count() {
+                    self.taken_back.insert(*taken);
+                }
+            }
+            if let Some(Some(place)) = way.finishes.get(*i as usize) {
+                self.finished.insert(*place);
+            }
+        }
+        self.unsettled.extend(run.unsettled.iter().map(|i| run.list[*i as usize].step.clone()));
+        self.faulted.extend(run.faulted.iter().copied());
+        self.doubted |= !run.failures.is_empty();
+        let hopeless = |reason: &Reason| {
+            matches!(reason, Reason::Step { cause: Cause::Timeout | Cause::Quarantined | Cause::Panicked(_), .. })
+        };
+        !back::whole(run) && run.unsettled.is_empty() && !run.failures.iter().any(|(_, reason)| hopeless(reason))
+    }
+
+    /// The part from which on everything is taken back.
+    fn failed_part(&self) -> usize {
+        if self.interrupted || self.taken_down {
+            return 0;
+        }
+        if let Some(part) = self.given_up {
+            return part;
+        }
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());
+        failures.map(|i| self.part_of(i)).min().unwrap_or(0)
+    }
+
+    /// The components it is about.
+    fn own(&self) -> Vec<ComponentName> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let mut own: Vec<ComponentName> =
+            forward.list.iter().flat_map(|planned| crate::system::touch::components(&planned.step)).collect();
+        own.sort_unstable();
+        own.dedup();
+        own
+    }
+
+    /// Mends the difference between what is there and what should be.
+    fn mend(&mut self, steps: Vec<Step>, target: System) {
+        self.target = Some(Box::new(target));
+        let list = chain(steps);
+        self.back = Some((Run::new(list, Time::NEVER), WayBack::default()));
+        self.phase = Phase::Mending;
+    }
+}
