@@ -492,11 +492,6 @@ impl<'a> Product<'a> {
         state.is_at_rest() && self.all_in(state, |member| member.down)
     }
 
-    /// Whether all of them are up.
-    pub fn is_up(&self, state: &State) -> bool {
-        state.is_at_rest() && self.all_in(state, |member| member.up)
-    }
-
     /// Whether all of them have come to *down* and asked for nothing since.
     pub(super) fn all_down(&self, state: &State) -> bool {
         (0..self.members.len()).all(|number| state.down & (1 << number.min(63)) != 0)

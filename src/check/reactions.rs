@@ -7,9 +7,9 @@ use super::coordinator::ask_of;
 use crate::model::statechart::FunctionId;
 use crate::model::{Ask, Deployment, EventName};
 use crate::stack::Scope;
-use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View, When};
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View};
 use crate::time::Time;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use std::rc::Rc;
 
 /// A request that was made.
@@ -56,18 +56,12 @@ pub struct Reactions<'a> {
     offers: FxHashMap<NodeId, Rc<Vec<EventId>>>,
     outside: Vec<EventId>,
     down: Option<NodeId>,
-    /// Names that states raise because of their state-scoped configurations.
-    scoped: FxHashSet<(EventName, NodeId)>,
 }
 
 impl<'a> Reactions<'a> {
     /// An empty table. `outside` are the events that can come from components and operators; `down` the state that means
     /// down.
     pub fn new(deployment: &'a Deployment, chart: &'a Chart, outside: &[EventName], down: Option<NodeId>) -> Self {
-        let scoped = chart.raises().iter().filter(|site| site.scoped).filter_map(|site| match site.when {
-            When::Entry(state) | When::Exit(state) => Some((site.name, state)),
-            When::Effect(_) => None,
-        });
         Self {
             deployment,
             chart,
@@ -76,7 +70,6 @@ impl<'a> Reactions<'a> {
             offers: FxHashMap::default(),
             outside: outside.iter().map(|e| chart.event(*e)).collect(),
             down,
-            scoped: scoped.collect(),
         }
     }
 
@@ -84,10 +77,8 @@ impl<'a> Reactions<'a> {
         let is_down = from.is_some_and(|leaf| self.down.is_some_and(|down| self.chart.is_inside(leaf, down)));
         Watch {
             deployment: self.deployment,
-            scoped: &self.scoped,
             down: self.down,
             is_down,
-            at: None,
             taken: false,
             batch: Vec::new(),
             handed: Vec::new(),
@@ -166,11 +157,8 @@ pub fn triggers(chart: &Chart, leaf: NodeId) -> (Vec<EventId>, bool) {
 /// Writes down what is raised and left.
 struct Watch<'a> {
     deployment: &'a Deployment,
-    scoped: &'a FxHashSet<(EventName, NodeId)>,
     down: Option<NodeId>,
     is_down: bool,
-    /// The state that was entered or left last: what it raises comes next.
-    at: Option<NodeId>,
     taken: bool,
     batch: Vec<Asked>,
     handed: Vec<Handed>,
@@ -186,12 +174,7 @@ impl Watch<'_> {
 }
 
 impl Hook for Watch<'_> {
-    fn entered(&mut self, _: &Chart, state: NodeId) {
-        self.at = Some(state);
-    }
-
     fn exited(&mut self, _: &Chart, state: NodeId) {
-        self.at = Some(state);
         let earlier = self.handed.iter_mut().flat_map(|handed| match handed {
             Handed::Batch(asked) => asked.as_mut_slice(),
             Handed::Down => &mut [],
@@ -235,8 +218,7 @@ impl Hook for Watch<'_> {
     fn raised(&mut self, _: &Chart, raised: Raised) {
         match ask_of(self.deployment, raised.name) {
             Some(ask) => {
-                let of = self.at.filter(|state| self.scoped.contains(&(raised.name, *state)));
-                let scope = of.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
+                let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
                 self.batch.push(Asked { ask, owner: Some(raised.owner), scope });
             }
             None => self.emitted.push(raised.name),

@@ -9,7 +9,7 @@
 
 use super::alike::{FrameBook, FrameNumber, hash_system, same_system};
 use crate::limits;
-use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, OnFailure};
+use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
@@ -189,11 +189,6 @@ impl<'a> Worlds<'a> {
             Known::Exact(_) => None,
             Known::Top(top) => Some(*top),
         }
-    }
-
-    /// How many worlds there are.
-    pub fn len(&self) -> usize {
-        self.worlds.len()
     }
 
     /// Whether a safe configuration is in force.
@@ -547,10 +542,5 @@ impl<'a> Worlds<'a> {
         let one_name =
             a.requester == b.requester && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
         !one_name && !self.frames.share(a, b)
-    }
-
-    /// Whether what a failure of `id` leaves is never taken back by itself.
-    pub fn holds_on_failure(&self, id: ConfigId) -> bool {
-        self.configurations.get(&id).is_some_and(|c| c.on_failure == OnFailure::Hold)
     }
 }

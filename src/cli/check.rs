@@ -4,23 +4,28 @@ use super::exit::Exit;
 use super::input::Input;
 use super::output::Style;
 use super::{Answer, Context, Run};
-use crate::check::{self, Explored};
+use crate::check::{self, Explored, Report, TraceStep, Verdict};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TOGETHER, CHECK_TRANSITIONS, CHECK_WAITING};
-use crate::model::{Finding, Severity, finding};
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS, CHECK_WAITING};
+use crate::model::{Finding, Severity};
 use serde_json::json;
 
 /// Check everything that can be known before a deployment runs: names, types, units, limits, configurations, and the
 /// coordinator through every order of events and answers.
 ///
-/// Exit status: 0 nothing refuses it (warnings do not); 1 findings; 2 a file is missing or does not parse.
+/// What it comes to is *sound* (everything was followed, nothing found but notes), *sound as far as followed* (a bound was
+/// hit, and which), *has warnings* or *refused*. Exit status: 0 nothing refuses it; 1 it is refused (with `--strict`: it is
+/// not *sound*); 2 a file is missing or does not parse.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     input: Input,
-    /// Print JSON: `ok`, `findings`, `explored`, `trace`.
+    /// Print JSON: `ok`, `verdict`, `findings` (each with its `trace`), `explored`.
     #[arg(long)]
     json: bool,
+    /// Exit with 1 for everything but *sound*.
+    #[arg(long)]
+    strict: bool,
 }
 
 impl Run for Args {
@@ -28,7 +33,14 @@ impl Run for Args {
         let read = match self.input.read(context) {
             Ok(read) => read,
             Err(failure) if self.json => {
-                print_json(context, false, &failure.findings, &failure.sources, Explored::default(), &[]);
+                let report = Report {
+                    checked: None,
+                    traces: Vec::new(),
+                    findings: failure.findings,
+                    explored: Explored::default(),
+                    verdict: Verdict::Refused,
+                };
+                print_json(context, &report, &failure.sources);
                 return Ok(failure.exit);
             }
             Err(failure) => {
@@ -38,26 +50,36 @@ impl Run for Args {
                 return Ok(exit);
             }
         };
-        let report = check::run(read.deployment.clone(), &read.catalogue);
-        let findings: Vec<Finding> = report.findings.into_iter().chain(read.findings).collect();
-        let ok = !finding::has_errors(&findings);
-        let exit = if ok { Exit::Done } else { Exit::No };
+        let mut report = check::run(read.deployment.clone(), &read.catalogue);
+        report.verdict = report.verdict.with(&read.findings);
+        report.findings.extend(read.findings);
+        report.traces.resize(report.findings.len(), Vec::new());
+        let no = match report.verdict {
+            Verdict::Refused => true,
+            Verdict::Sound => false,
+            Verdict::Followed { .. } | Verdict::Warnings => self.strict,
+        };
+        let exit = if no { Exit::No } else { Exit::Done };
         if self.json {
-            print_json(context, ok, &findings, &read.sources, report.explored, &report.trace);
+            print_json(context, &report, &read.sources);
             return Ok(exit);
         }
         let out = &context.out;
-        out.findings(&findings, &read.sources);
-        if !report.trace.is_empty() {
-            out.error("the way to the first of these that has one:\n");
-            for line in &report.trace {
+        out.findings(&report.findings, &read.sources);
+        if let Some((number, trace)) = first_trace(&report) {
+            out.error(format!("the way to `{}`, the first of these that has one:\n", report.findings[number].code));
+            for line in trace {
                 out.error(format!("  {line}\n"));
             }
             out.error("\n");
         }
-        count(context, &findings);
-        let verdict = if ok { out.paint(Style::Good, "sound") } else { out.paint(Style::Bad, "refused") };
-        let name = out.paint(Style::Bold, read.deployment.name);
+        count(context, &report.findings);
+        let style = match report.verdict {
+            Verdict::Sound | Verdict::Followed { .. } => Style::Good,
+            Verdict::Warnings => Style::Care,
+            Verdict::Refused => Style::Bad,
+        };
+        let (verdict, name) = (out.paint(style, report.verdict.text()), out.paint(Style::Bold, read.deployment.name));
         let explored = report.explored;
         let reach = match (explored.states, explored.complete) {
             (0, _) => String::new(),
@@ -67,6 +89,9 @@ impl Run for Args {
             }
         };
         out.line(format!("{name}: {verdict}{reach}"));
+        if let Verdict::Followed { left } = &report.verdict {
+            left.iter().for_each(|left| out.line(format!("  {left}")));
+        }
         for line in bounds(&explored) {
             out.line(out.paint(Style::Dim, format!("  {line}")));
         }
@@ -74,18 +99,31 @@ impl Run for Args {
     }
 }
 
-fn print_json(
-    context: &Context,
-    ok: bool,
-    findings: &[Finding],
-    sources: &SourceMap,
-    explored: Explored,
-    trace: &[String],
-) {
+/// The first way there is, with the number of its finding.
+fn first_trace(report: &Report) -> Option<(usize, &[TraceStep])> {
+    let traces = report.traces.iter().enumerate();
+    traces.filter(|(_, trace)| !trace.is_empty()).map(|(number, trace)| (number, trace.as_slice())).next()
+}
+
+fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
+    let mut findings = to_json(&report.findings, sources);
+    if let Some(findings) = findings.as_array_mut() {
+        for (finding, trace) in findings.iter_mut().zip(&report.traces) {
+            finding["trace"] = json!(trace);
+        }
+    }
+    let left = match &report.verdict {
+        Verdict::Followed { left } => left.as_slice(),
+        _ => &[],
+    };
+    let trace: Vec<String> =
+        first_trace(report).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
     context.out.json(&json!({
-        "ok": ok,
-        "findings": to_json(findings, sources),
-        "explored": explored,
+        "ok": report.verdict != Verdict::Refused,
+        "verdict": report.verdict.word(),
+        "left": left,
+        "findings": findings,
+        "explored": report.explored,
         "trace": trace,
     }));
 }
@@ -97,17 +135,9 @@ fn bounds(explored: &Explored) -> Vec<String> {
         return lines;
     }
     lines.push(format!(
-        "at most {CHECK_WAITING} requests wait at once, and {CHECK_FRAMES} frames of one configuration are in force \
-         ({CHECK_LEFT} where undoing failed)"
+        "at most {CHECK_WAITING} batches of one coordinator wait at once, and {CHECK_FRAMES} frames of one configuration \
+         are in force ({CHECK_LEFT} where undoing failed)"
     ));
-    match explored.together {
-        Some(true) => lines.push("the coordinators were followed one by one and together".to_owned()),
-        Some(false) => lines.push(format!(
-            "the coordinators were followed one by one: only up to {CHECK_TOGETHER} without functions are followed \
-             together, and within the budget"
-        )),
-        None => {}
-    }
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
         lines.push(format!(

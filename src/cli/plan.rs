@@ -186,7 +186,7 @@ pub fn driven(read: &Read, until: Until) -> Result<Vec<Planned>, Findings> {
     for happening in drive.happenings {
         match happening {
             Happening::Event { event, .. } => events.push(event),
-            Happening::Applied { asks, steps, result, state } => {
+            Happening::Applied { asks, steps, result, state, .. } => {
                 planned.push(Planned { asks, events: std::mem::take(&mut events), state: Some(state), steps, result });
             }
         }
