@@ -265,12 +265,12 @@ pub const DOO_BUSY: Duration = Duration::from_millis(1);
 /// that steps its machine a hundred times a second.
 pub const DOO_IDLE: Duration = Duration::from_millis(10);
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
-/// a tenth of a second of work.
-pub const CHECK_TRANSITIONS: usize = 100_000;
+/// half a second of work.
+pub const CHECK_TRANSITIONS: usize = 400_000;
 
 /// Batches of one coordinator that `check` lets be unanswered at once: while so many are, it follows no event from outside
-/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with two of them.
-pub const CHECK_WAITING: usize = 2;
+/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with three of them.
+pub const CHECK_WAITING: usize = 3;
 
 /// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
 /// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.

@@ -57,6 +57,8 @@ impl Product<'_> {
         state.desk.requests_mut().for_each(gone);
         state.safe.iter_mut().for_each(gone);
         state.due.iter_mut().for_each(|(request, _)| gone(request));
+        state.due.retain(|(request, _)| request.tag.0 != 0);
+        state.telling.iter_mut().for_each(|(request, _)| gone(request));
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         if let Some(batch) = &mut state.flight {
             batch.requests.iter_mut().for_each(gone);
@@ -100,7 +102,7 @@ impl Product<'_> {
         states
     }
 
-    fn is_safe(&self, id: ConfigId) -> bool {
+    pub(super) fn is_safe(&self, id: ConfigId) -> bool {
         self.worlds.configuration(id).is_some_and(|c| c.safe)
     }
 
@@ -110,7 +112,7 @@ impl Product<'_> {
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         for (request, verdict, _) in &arrival.told {
             self.owed(&mut state, request);
-            state.due.push((*request, *verdict));
+            self.due(&mut state, *request, *verdict);
         }
         if !arrival.safe.is_empty() {
             for turn in state.desk.under_way() {
@@ -149,8 +151,19 @@ impl Product<'_> {
         }
         // It stands behind in its batch and has not begun.
         state.desk.answered(number, place);
-        state.due.push((requests[place], Verdict::Cancelled));
-        state.due.push((undo, Verdict::Undone));
+        self.due(state, requests[place], Verdict::Cancelled);
+        self.due(state, undo, Verdict::Undone);
+    }
+
+    /// An answer is on its way, if anybody waits for it.
+    fn due(&self, state: &mut State, request: Request, verdict: Verdict) {
+        let listens = |number: usize| {
+            let event = self.members[number].chart.event(verdict.event(request.ask));
+            request.tag.0 != 0 && event != EventId::OTHER
+        };
+        if self.member(request.requester).is_some_and(listens) {
+            state.due.push((request, verdict));
+        }
     }
 
     /// A request is taken up: who asks is not down any more.
@@ -225,14 +238,13 @@ impl Product<'_> {
     /// Gives answers, one after the other; each is heard before the next comes.
     pub(super) fn tell(&mut self, mut state: State, answers: Answers, failed: Failed, nexts: &mut Nexts) {
         self.begin(&mut state);
-        // Those that are still to be heard lie with the state: one may be left by hearing those before.
-        let before = state.due.len();
-        state.due.extend(answers.iter().copied());
+        // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
+        state.telling.extend(answers.iter().copied());
         let mut states = vec![state];
         for _ in 0..answers.len() {
             let mut heard = Vec::with_capacity(states.len());
             for mut state in states {
-                let (request, verdict) = state.due.remove(before.min(state.due.len() - 1));
+                let (request, verdict) = state.telling.remove(0);
                 let owner = self.member(request.requester).filter(|_| request.tag.0 != 0);
                 match owner {
                     Some(number) => {

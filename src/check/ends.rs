@@ -161,7 +161,10 @@ impl Product<'_> {
             given.extend(comes.parts.iter().map(|part| (part.place, Some(requests[part.place].ask.failed()))));
             given.sort_by_key(|(place, _)| *place);
             let went = comes.parts.first().map_or(&comes.done, |part| part.failed.as_ref().unwrap_or(&part.before));
-            self.ended(state, number, &requests, given.clone(), went, Failed::Nothing, nexts);
+            // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
+            let undo = comes.parts.iter().any(|part| part.undo);
+            let class = if undo { Failed::Undo } else { Failed::Nothing };
+            self.ended(state, number, &requests, given.clone(), went, class, nexts);
             if let Some(part) = comes.parts.iter().find(|part| part.failed.is_some()) {
                 let broken = |(place, verdict): (usize, Option<Verdict>)| {
                     (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
@@ -227,9 +230,6 @@ impl Product<'_> {
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
             next.unconfirmed.clear();
             self.tell(next, Answers::from_iter([(*request, Verdict::Broken)]), Failed::Broken, nexts);
-        }
-        if request.requester == Requester::Operator {
-            nexts.all[from..].iter_mut().for_each(|next| next.by_hand = true);
         }
     }
 }

@@ -7,8 +7,9 @@ use super::Explored;
 use super::product::{Failed, Move, Next, Product, State, Trouble};
 use super::trace::{Answered, Happened, Place, TraceStep};
 use super::world::Top;
+use crate::stack::Requester;
 use crate::limits;
-use crate::model::{Ask, ConfigId};
+use crate::model::{Ask, ConfigId, Verdict};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
@@ -22,8 +23,8 @@ pub struct Edge {
     pub from: u32,
     /// To where.
     pub to: u32,
-    /// Its place among the moves from there.
-    pub place: u32,
+    /// Its place among the moves from there; none: so many rounds of a circle.
+    pub place: Option<u32>,
     /// What failed in it.
     pub failed: Failed,
     /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
@@ -67,6 +68,8 @@ pub struct Graph<'p, 'a> {
     pub ends: FxHashSet<u32>,
     /// What was cut off, and of what class it was.
     pub bounds: FxHashMap<Bound, Failed>,
+    /// Edges that push a frame which nobody ever undoes: of which configuration, and by whom.
+    pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
     depth: Vec<u32>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
@@ -88,6 +91,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         deep: Vec::new(),
         ends: FxHashSet::default(),
         bounds: FxHashMap::default(),
+        pushes: FxHashMap::default(),
         depth: Vec::new(),
         index: FxHashMap::default(),
         open: BinaryHeap::new(),
@@ -96,6 +100,8 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     match graph.product.start() {
         Some(start) => {
             graph.reach(start, Failed::Nothing, 0);
+            graph.run();
+            graph.go_round();
             graph.run();
         }
         None => graph.cut(Bound::Entered, Failed::Nothing),
@@ -164,7 +170,7 @@ impl Graph<'_, '_> {
         }
         self.troubles.extend(nexts.troubles.into_iter().map(|trouble| (at, trouble)));
         for (place, next) in nexts.all.into_iter().enumerate() {
-            let place = u32::try_from(place).unwrap_or(NOWHERE);
+            let place = u32::try_from(place).ok();
             if let Some(deep) = next.deep.0 {
                 self.deep.push((at, deep));
                 self.ends.insert(at);
@@ -176,12 +182,64 @@ impl Graph<'_, '_> {
                 self.ends.insert(at);
                 continue;
             }
+            for (request, verdict) in &next.answers {
+                if let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict)
+                    && !self.product.worlds.counts(id, request.requester)
+                {
+                    let edge = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
+                    let pushes = self.pushes.entry((id, request.requester)).or_default();
+                    if pushes.len() < limits::CHECK_CIRCLE {
+                        pushes.push(edge);
+                    }
+                }
+            }
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let (state, class) = self.abstracted(next);
             let to = self.reach(state, so_far.max(class), depth);
             self.edges.push(Edge { from: at, to, place, failed: class, quiet });
         }
+    }
+
+    /// Frames that nobody ever undoes pile up where a circle pushes one each time round, until the oldest frames are
+    /// squashed: what comes of that is followed too, for one circle of each configuration.
+    fn go_round(&mut self) {
+        let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
+        pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
+        for ((id, by), edges) in pushes {
+            let circle = edges.into_iter().find(|edge| {
+                let Edge { from, to, failed, .. } = self.edges[*edge as usize];
+                failed == Failed::Nothing && self.failed[to as usize] == Failed::Nothing && self.leads(to, from)
+            });
+            let Some(Edge { to: at, .. }) = circle.map(|edge| self.edges[edge as usize]) else { continue };
+            let mut state = self.states[at as usize].clone();
+            let world = self.product.worlds.piled_up(state.world, id, by);
+            if world == state.world {
+                continue;
+            }
+            state.world = world;
+            state.unconfirmed.clear();
+            let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
+            let to = self.reach(state, failed, depth);
+            self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false });
+        }
+    }
+
+    /// Whether a way without a failure leads from one state to another.
+    fn leads(&mut self, from: u32, to: u32) -> bool {
+        let mut out: FxHashMap<u32, SmallVec<[u32; 4]>> = FxHashMap::default();
+        for edge in self.edges.iter().filter(|edge| edge.failed == Failed::Nothing) {
+            out.entry(edge.from).or_default().push(edge.to);
+        }
+        let mut seen: FxHashSet<u32> = FxHashSet::from_iter([from]);
+        let mut open = vec![from];
+        while let Some(at) = open.pop() {
+            if at == to {
+                return true;
+            }
+            open.extend(out.get(&at).into_iter().flatten().copied().filter(|next| seen.insert(*next)));
+        }
+        false
     }
 
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
@@ -194,6 +252,9 @@ impl Graph<'_, '_> {
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
         state.world = self.product.worlds.topped(top, std::iter::empty());
         state.unconfirmed.clear();
+        // What it interrupts may be over before, or not have begun: all the same where nothing is known.
+        state.safe.retain(|request| request.requester != Requester::Operator);
+        state.flight = None;
         (state, failed.max(Failed::Undo))
     }
 
@@ -213,9 +274,14 @@ impl Graph<'_, '_> {
         let mut steps = vec![TraceStep { what: Happened::Start, states: self.places(&self.states[0]) }];
         for edge in edges {
             let from = self.states[edge.from as usize].clone();
-            if let Some(next) = self.product.nexts(&from).all.into_iter().nth(edge.place as usize) {
-                let what = self.product.told(&next);
-                steps.push(TraceStep { what, states: self.places(&self.states[edge.to as usize]) });
+            let states = self.places(&self.states[edge.to as usize]);
+            let Some(place) = edge.place else {
+                let times = self.product.deployment.limits.stack;
+                steps.push(TraceStep { what: Happened::Rounds { times }, states });
+                continue;
+            };
+            if let Some(next) = self.product.nexts(&from).all.into_iter().nth(place as usize) {
+                steps.push(TraceStep { what: self.product.told(&next), states });
             }
         }
         steps

@@ -69,6 +69,8 @@ pub struct State {
     pub safe: SmallVec<[Request; 1]>,
     /// Answers on their way.
     pub due: SmallVec<[(Request, Verdict); 1]>,
+    /// Answers that are being given; none in a state between moves.
+    pub telling: SmallVec<[(Request, Verdict); 2]>,
     /// Events on their way to a coordinator, those of one in order.
     pub inbox: SmallVec<[(u8, EventId); 2]>,
     /// Frames that wait for their confirmation.
@@ -144,7 +146,7 @@ pub struct Next {
     /// A configuration of which there are more frames than are followed, and more than are followed behind undoings that
     /// failed.
     pub deep: (Option<ConfigId>, Option<ConfigId>),
-    /// A safe configuration was applied by an operator.
+    /// An operator asks for a safe configuration.
     pub by_hand: bool,
 }
 
@@ -240,6 +242,7 @@ impl<'a> Product<'a> {
             stopped: SmallVec::new(),
             safe: SmallVec::new(),
             due: SmallVec::new(),
+            telling: SmallVec::new(),
             inbox: SmallVec::new(),
             unconfirmed: SmallVec::new(),
             lost: SmallVec::new(),
@@ -273,15 +276,12 @@ impl<'a> Product<'a> {
         if let Some(request) = state.safe.first().copied() {
             self.safe_ends(state, &request, &mut nexts);
         }
-        let numbers: SmallVec<[u32; 4]> = state.desk.under_way().iter().map(|turn| turn.number).collect();
+        // What was interrupted goes back when the safe configuration is there, and what came later ends later.
+        let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
+        let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
         for number in numbers {
-            let stop = state.stopped.iter().any(|(of, _)| *of == number);
-            match stop {
-                // What was interrupted goes back when the safe configuration is there.
-                true if state.safe.is_empty() || !self.is_interrupted(state, number) => {
-                    self.stopped_ends(state, number, &mut nexts);
-                }
-                true => {}
+            match state.stopped.iter().any(|(of, _)| *of == number) {
+                true => self.stopped_ends(state, number, &mut nexts),
                 false => self.ends(state, number, &mut nexts),
             }
         }
@@ -296,10 +296,6 @@ impl<'a> Product<'a> {
             self.from_outside(state, &mut nexts);
         }
         nexts
-    }
-
-    fn is_interrupted(&self, state: &State, number: u32) -> bool {
-        state.stopped.iter().any(|(of, stop)| *of == number && *stop == Stop::Interrupted)
     }
 
     /// A coordinator hears an event.
@@ -450,8 +446,10 @@ impl<'a> Product<'a> {
         }
         for ask in asks {
             let request = Request::new(RequestId(0), ask, Requester::Operator);
+            let by_hand = matches!(ask, Ask::Apply(id) if self.is_safe(id));
             for next in self.arrive(state.clone(), Batch::one(request)) {
-                nexts.all.push(Next::plain(Move::Operator(ask), self.settle(next), Failed::Nothing));
+                let next = Next::plain(Move::Operator(ask), self.settle(next), Failed::Nothing);
+                nexts.all.push(Next { by_hand, ..next });
             }
         }
     }

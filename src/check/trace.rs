@@ -69,6 +69,11 @@ pub enum Happened {
         /// The request.
         request: String,
     },
+    /// The same again, back to here, so many times: frames pile up and are squashed.
+    Rounds {
+        /// How many times.
+        times: usize,
+    },
     /// Coordinators that have nothing to do with these are down as well: what was in force is forgotten.
     Down,
 }
@@ -103,6 +108,7 @@ impl fmt::Display for TraceStep {
             Happened::Confirmed { configuration } => write!(f, "`{configuration}` is confirmed")?,
             Happened::Lost { configuration } => write!(f, "{configuration}.lost")?,
             Happened::Operator { request } => write!(f, "operator: {request}")?,
+            Happened::Rounds { times } => write!(f, "the same {times} times")?,
             Happened::Down => f.write_str("the others are down")?,
         }
         f.write_str(" → ")?;

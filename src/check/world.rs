@@ -411,6 +411,25 @@ impl<'a> Worlds<'a> {
         }
     }
 
+    /// Whether a frame of this configuration by this requester counts.
+    pub fn counts(&self, id: ConfigId, by: Requester) -> bool {
+        let named = self.undone.ids.as_ref().is_none_or(|ids| ids.contains(&id));
+        named || self.undone.bare.contains(&by) || by == Requester::Operator
+    }
+
+    /// The world in which `by` has applied a configuration that nobody undoes over and over, until its older frames are
+    /// squashed. The same: that makes no difference to anybody.
+    pub fn piled_up(&mut self, id: WorldId, configuration: ConfigId, by: Requester) -> WorldId {
+        let Some(world) = self.get(id) else { return id };
+        let Some(frame) = world.stack.newest_of(configuration, Some(by)).cloned() else { return id };
+        let mut world = world.clone();
+        // Those above the newest of the others as well, so that all of these have got into it.
+        for _ in 0..2 * self.deployment.limits.stack {
+            world.stack.push(Frame { scope: None, ..(*frame).clone() });
+        }
+        self.intern(world)
+    }
+
     /// Configurations that were asked for in some world.
     pub fn asked(&self) -> &FxHashSet<ConfigId> {
         &self.asked

@@ -71,7 +71,7 @@ pub struct Planned {
 impl Planned {
     /// All steps, one operation after the other.
     pub fn whole(&self) -> &[PlannedStep] {
-        if self.of.is_empty() { &self.steps } else { &self.whole }
+        if self.whole.is_empty() { &self.steps } else { &self.whole }
     }
 
     /// The place of a step in [`Self::whole`]; none: it is there for no one of them alone.

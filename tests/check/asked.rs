@@ -1,0 +1,130 @@
+//! Who asks besides the coordinators, what piles up, and what has no end.
+
+use crate::support::Small;
+
+/// After many switches that nobody undoes the oldest frames are squashed, and one of them is asked to be undone.
+#[test]
+fn an_undo_of_what_was_squashed_is_found() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
+        one = Configuration { property_set(\"a.gain\", 2.0) }, two = Configuration { property_set(\"a.gain\", 3.0) },
+        all = Configuration { destroy(\"a\") },";
+    let states = "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
+        first = state { entry = \"one\" }, second = state { entry = \"two\" }, undoing = state { entry = \"keep.undo\" },
+        leaving = state { entry = \"all\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"keeping\", events = { \"base.ok\" } },
+        trans { src = \"keeping\", tgt = \"up\", events = { \"keep.ok\" } },
+        trans { src = \"up\", tgt = \"first\", events = { \"e_one\" } },
+        trans { src = \"first\", tgt = \"second\", events = { \"one.ok\" } },
+        trans { src = \"second\", tgt = \"up\", events = { \"two.ok\" } },
+        trans { src = \"up\", tgt = \"undoing\", events = { \"e_undo\" } },
+        trans { src = \"undoing\", tgt = \"leaving\", events = { \"keep.undone\", \"keep.undo.failed\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },"
+        .to_owned()
+        + &["building", "keeping", "up", "first", "second"]
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
+            .join(" ");
+    let said = Small::new(configurations, &states, "").check();
+    let refused = said.refused("keep.undo");
+    assert!(
+        refused.iter().any(|(severity, message)| *severity == "error" && message.contains("squashed")),
+        "{:#}",
+        said.0
+    );
+}
+
+/// It asks, undoes and asks again, and nothing ever fails or waits.
+#[test]
+fn a_circle_of_answers_has_no_end() {
+    let round = |wait: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{ entry = \"one\" }}, back = state {{ entry = \"one.undo\" }}, rest = state {{}},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"building\", tgt = \"up\", events = {{ \"base.ok\" }} }},
+             trans {{ src = \"up\", tgt = \"back\", events = {{ \"one.ok\" }} }},
+             trans {{ src = \"back\", tgt = \"rest\", events = {{ \"one.undone\" }} }},
+             trans {{ src = \"rest\", tgt = \"up\", events = {{ \"{wait}\" }} }},
+             trans {{ src = \"rest\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"base.undo\" }},
+             trans {{ src = \"back\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"base.undo\" }},
+             trans {{ src = \"up\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = {{ \"one.undo\", \"base.undo\" }} }},
+             trans {{ src = \"building\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"base.undo\" }},"
+        )
+    };
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") }, one = Configuration { property_set(\"a.gain\", 2.0) },";
+    let endless = Small::new(configurations, &round("e_done"), "").check();
+    let found = endless.of("coord::endless");
+    assert_eq!(found.len(), 1, "{:#}", endless.0);
+    assert!(!found[0]["trace"].as_array().unwrap().is_empty());
+    for wait in ["e_after(1.0)", "e_go"] {
+        let waits = Small::new(configurations, &round(wait), "").check();
+        assert!(waits.of("coord::endless").is_empty(), "{wait}: {:#}", waits.0);
+    }
+}
+
+/// What an operator may apply at any time lies above what the coordinator undoes.
+#[test]
+fn an_operators_requests_in_between_are_followed() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") }, run = Configuration { post_conf_state = { \"a:running\" } },
+        service = Configuration { post_conf_state = { \"a:running\" } }, soft = Configuration { property_set(\"a.gain\", 0.5) },";
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { config = \"run\" }, ready = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"ready\", events = { \"base.ok\" } },
+        trans { src = \"ready\", tgt = \"up\", events = { \"e_run\" } },
+        trans { src = \"up\", tgt = \"ready\", events = { \"e_stop\" } },
+        trans { src = \"ready\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = \"base.undo\" },
+        trans { src = \"building\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = \"base.undo\" },";
+    let alone = Small::new(configurations, states, "").check();
+    assert!(alone.of("coord::refused_by_other").is_empty(), "{:#}", alone.0);
+    let operated = Small::new(configurations, states, "operator: [service]\n").check();
+    let found = operated.of("coord::refused_by_other");
+    let run = found.iter().find(|f| f["message"].as_str().unwrap().starts_with("`run.undo` of `small` is refused"));
+    let run = run.unwrap_or_else(|| panic!("{:#}", operated.0));
+    assert!(run["message"].as_str().unwrap().contains("an operator"), "{run:#}");
+    let asked = run["trace"].as_array().unwrap().iter().any(|step| step["request"] == "apply service");
+    assert!(asked, "{run:#}");
+    // What shares nothing with what is undone then is in nobody's way.
+    let soft = Small::new(configurations, states, "operator: [soft]\n").check();
+    let found = soft.of("coord::refused_by_other");
+    assert!(!found.iter().any(|f| f["message"].as_str().unwrap().starts_with("`run.undo`")), "{:#}", soft.0);
+}
+
+/// A floor holds back what shares a component with it, and nothing else.
+#[test]
+fn a_floor_of_one_coordinator_is_none_for_another() {
+    let own = |name: &str, component: &str| {
+        format!(
+            "idle = state {{}}, up = state {{ entry = \"{name}\" }}, more = state {{ entry = \"{name}_more\" }}, leaving = state {{ entry = \"{name}_gone\" }},
+             back = state {{ entry = \"{component}_set.undo\" }}, set = state {{ entry = \"{component}_set\" }},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"up\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"up\", tgt = \"more\", events = {{ \"e_{name}\" }} }},
+             trans {{ src = \"up\", tgt = \"set\", events = {{ \"e_{name}_set\" }} }},
+             trans {{ src = \"set\", tgt = \"back\", events = {{ \"e_{name}_back\" }} }},
+             trans {{ src = \"up\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"more\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"set\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"back\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"leaving\", tgt = \"idle\", events = {{ \"{name}_gone.ok\" }} }},"
+        )
+    };
+    let of = |name: &str, component: &str| {
+        format!(
+            "{name} = Configuration {{ create(\"{component}\", \"Drive\") }}, {name}_gone = Configuration {{ destroy(\"{component}\") }},
+             {name}_more = Configuration {{ irreversible = true, operation_call(\"{component}.weld\") }},
+             {component}_set = Configuration {{ post_conf_state = {{ \"{component}:stopped\" }} }},"
+        )
+    };
+    let said = Small::several(
+        &format!("{}{}", of("arm", "a"), of("hand", "h")),
+        &[("arm", &own("arm", "a")), ("hand", &own("hand", "h"))],
+        "",
+    )
+    .check();
+    for request in ["a_set.undo", "h_set.undo"] {
+        assert!(said.refused(request).iter().all(|(severity, _)| *severity == "info"), "{request}: {:#}", said.0);
+    }
+    assert!(said.of("coord::refused_by_other").is_empty(), "{:#}", said.0);
+}

@@ -1,0 +1,118 @@
+//! What is demanded: of safety events, of what is lost, of what is confirmed, of what broke; and advice that is true.
+
+use crate::support::Small;
+
+const STATES: &str = "idle = state {}, building = state { entry = \"base\" }, up = state {}, gone = state {}, leaving = state { entry = \"base.undo\" },
+    failed = state {},
+    trans { src = \"initial\", tgt = \"idle\" },
+    trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+    trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+    trans { src = \"building\", tgt = \"failed\", events = { \"base.failed\", \"base.broken\" } },
+    trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+    trans { src = \"building\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+    trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+    trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+    trans { src = \"leaving\", tgt = \"failed\", events = { \"base.undo.failed\", \"base.undo.broken\" } },";
+
+#[test]
+fn a_safety_event_leads_to_a_safe_configuration_wherever_an_actuator_exists() {
+    let configurations = "base = Configuration { create(\"arm\", \"Arm\"), create(\"a\", \"Drive\") },
+        stop = Configuration { safe = true, property_set(\"a.gain\", 0.0) },";
+    let stopped = "stopped = state { entry = \"stop\" }, trans { src = \"stopped\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"stop.undo\" },";
+    let hears = |from: &[&str]| {
+        from.iter().map(|state| format!("trans {{ src = \"{state}\", tgt = \"stopped\", events = {{ \"e_estop\" }} }},")).collect::<String>()
+    };
+    let keys = "safety: [e_estop]\n";
+    let some = Small::new(configurations, &format!("{STATES}{stopped}{}", hears(&["building", "up"])), keys).check();
+    let found = some.of("coord::safety_unheard");
+    assert_eq!(found.len(), 1, "{:#}", some.0);
+    assert_eq!(found[0]["severity"], "error");
+    assert!(found[0]["message"].as_str().unwrap().contains("root.leaving"), "{:#}", found[0]);
+    assert!(found[0]["trace"].as_array().unwrap().len() > 2, "{:#}", found[0]);
+    // Where the components are gone, or a safe configuration is in force already, nothing is demanded.
+    let all = hears(&["building", "up", "leaving", "failed"]);
+    let heard = Small::new(configurations, &format!("{STATES}{stopped}{all}"), keys).check();
+    assert!(heard.of("coord::safety_unheard").is_empty(), "{:#}", heard.0);
+    // Without an actuator it is nobody's business.
+    let harmless = configurations.replace("create(\"arm\", \"Arm\"), ", "");
+    let none = Small::new(&harmless, &format!("{STATES}{stopped}{}", hears(&["up"])), keys).check();
+    assert!(none.of("coord::safety_unheard").is_empty(), "{:#}", none.0);
+    // Heard, but answered by something else: on the way to the safe configuration an event from outside is needed.
+    let detour = format!("{STATES}{stopped}{all}").replace(
+        "trans { src = \"up\", tgt = \"stopped\", events = { \"e_estop\" } }",
+        "trans { src = \"up\", tgt = \"gone\", events = { \"e_estop\" } }, trans { src = \"gone\", tgt = \"stopped\", events = { \"e_sure\", \"e_estop\" } }",
+    );
+    let late = Small::new(configurations, &detour, keys).check();
+    let found = late.of("coord::safety_unheard");
+    assert!(found.len() == 1 && found[0]["message"].as_str().unwrap().contains("root.up"), "{:#}", late.0);
+}
+
+#[test]
+fn what_is_lost_is_heard_wherever_it_may_be_in_force() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" }, holds = { running = \"a\" } },";
+    let demo = |more: &str| Small::new(configurations, &format!("{STATES}{more}"), "").check();
+    let silent = demo("");
+    let found = silent.of("coord::lost_unheard");
+    assert_eq!(found.len(), 1, "{:#}", silent.0);
+    assert!(found[0]["message"].as_str().unwrap().contains("base.lost"), "{:#}", found[0]);
+    let everywhere: String = ["up", "building", "leaving", "failed"]
+        .iter()
+        .map(|state| format!("trans {{ src = \"{state}\", tgt = \"failed\", events = {{ \"base.lost\" }} }},"))
+        .collect();
+    let heard = demo(&everywhere);
+    assert!(heard.of("coord::lost_unheard").is_empty(), "{:#}", heard.0);
+}
+
+/// A frame that is not confirmed is taken back, and what is asked for then does not fit any more.
+#[test]
+fn what_is_reverted_is_followed() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },
+        try = Configuration { create(\"b\", \"Drive\"), confirm = { event = \"e_fine\", within = 1.0 } },
+        use = Configuration { property_set(\"b.gain\", 2.0) },";
+    let states = format!(
+        "{STATES} trying = state {{ entry = \"try\" }}, using = state {{ entry = \"use\" }},
+         trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_try\" }} }},
+         trans {{ src = \"trying\", tgt = \"using\", events = {{ \"try.reverted\" }} }},
+         trans {{ src = \"trying\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+         trans {{ src = \"using\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},"
+    );
+    let said = Small::new(configurations, &states, "").check();
+    let refused = said.refused("use");
+    assert!(refused.iter().any(|(_, message)| message.contains("there is no component `b`")), "{:#}", said.0);
+}
+
+/// After something broke, a safety event must be heard still.
+#[test]
+fn after_broken_safety_events_are_heard() {
+    let configurations = "base = Configuration { create(\"arm\", \"Arm\") }, stop = Configuration { safe = true, post_conf_state = { \"arm:stopped\" } },";
+    let more = "stopped = state { entry = \"stop\" }, trans { src = \"stopped\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"stop.undo\" },
+        trans { src = \"building\", tgt = \"stopped\", events = { \"e_estop\" } }, trans { src = \"up\", tgt = \"stopped\", events = { \"e_estop\" } },
+        trans { src = \"leaving\", tgt = \"stopped\", events = { \"e_estop\" } },";
+    // In `failed` after `base.failed` there is no arm; after `base.broken` there may be one.
+    let broken = STATES.replace("trans { src = \"leaving\", tgt = \"failed\", events = { \"base.undo.failed\", \"base.undo.broken\" } },", "");
+    let said = Small::new(configurations, &format!("{broken}{more}"), "safety: [e_estop]\n").check();
+    let found = said.of("coord::safety_unheard");
+    assert_eq!(found.len(), 1, "{:#}", said.0);
+    assert!(found[0]["message"].as_str().unwrap().contains("root.failed"), "{:#}", found[0]);
+    assert_eq!(found[0]["severity"], "warning");
+    assert!(crate::support::Said::answers(found[0]).contains(&"base.broken".to_owned()), "{:#}", found[0]);
+}
+
+/// With `up`, `leaving` and `failed`, the second visit of `leaving` asks for no undo: that is what is wrong.
+#[test]
+fn advice_names_what_never_comes() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },";
+    let states = "idle = state {}, up = state { entry = \"base\" }, leaving = state {}, failed = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"base.undo\" },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+        trans { src = \"leaving\", tgt = \"failed\", events = { \"base.undo.failed\", \"base.undo.broken\" } },
+        trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let said = Small::new(configurations, states, "").check();
+    let stuck = said.of("coord::stuck");
+    assert_eq!(stuck.len(), 1, "{:#}", said.0);
+    let message = stuck[0]["message"].as_str().unwrap();
+    assert!(message.contains("never comes") && message.contains("`base.undone`"), "{message}");
+    assert!(stuck[0]["help"].as_str().unwrap().contains("on the entry"), "{:#}", stuck[0]);
+}

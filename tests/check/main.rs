@@ -1,0 +1,12 @@
+//! What `check` follows and what it says of it: whole deployments in, the report out.
+
+#[path = "../cli/demo.rs"]
+#[allow(dead_code)]
+mod demo;
+
+mod asked;
+mod beside;
+mod demands;
+mod product;
+mod support;
+mod verdicts;

@@ -1,0 +1,214 @@
+//! What a batch comes to, and which worlds are one: `check` follows what a running deployment does.
+
+use crate::support::{Said, Small};
+
+const BASE: &str = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:stopped\" } },";
+
+/// The undo and the push of one step: the push fails, and the undo stands.
+#[test]
+fn a_push_that_fails_leaves_the_undo_of_its_batch_in_force() {
+    let states = |then: &str| {
+        format!(
+            "idle = state {{}}, up = state {{ config = \"one\" }}, other = state {{ config = \"two\" }}, after = state {{ entry = \"{then}\" }},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"up\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"up\", tgt = \"other\", events = {{ \"e_other\" }} }},
+             trans {{ src = \"other\", tgt = \"after\", events = {{ \"two.failed\" }} }},
+             trans {{ src = \"after\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = {{ \"again.undo\" }} }},
+             trans {{ src = \"other\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"up\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},"
+        )
+    };
+    let configurations = "one = Configuration { create(\"a\", \"Drive\") }, two = Configuration { create(\"b\", \"Drive\") },
+        again = Configuration { create(\"a\", \"Drive\") }, uses = Configuration { property_set(\"a.gain\", 2.0) },";
+    let made = Small::new(configurations, &states("again"), "").check();
+    assert!(made.refused("again").iter().all(|(severity, _)| *severity == "info"), "{:#}", made.0);
+    let used = Small::new(configurations, &states("uses"), "").check();
+    let refused = used.refused("uses");
+    assert!(refused.iter().any(|(severity, _)| *severity == "warning"), "it was undone: {:#}", used.0);
+}
+
+/// A safe configuration goes first: the undo raised with it meets its frame.
+#[test]
+fn a_safe_configuration_is_no_part_of_its_batch() {
+    let configurations = format!(
+        "{BASE} run = Configuration {{ post_conf_state = {{ \"a:running\" }} }},
+         stop = Configuration {{ safe = true, post_conf_state = {{ \"a:stopped\" }} }},"
+    );
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"run\" },
+        stopping = state { entry = { \"run.undo\", \"stop\" } },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"stopping\", events = { \"e_stop\" } },
+        trans { src = \"stopping\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = { \"stop.undo\", \"run.undo\", \"base.undo\" } },
+        trans { src = \"building\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = \"base.undo\" },
+        trans { src = \"up\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = { \"run.undo\", \"base.undo\" } },";
+    let said = Small::new(&configurations, states, "").check();
+    let refused = said.refused("run.undo");
+    assert!(
+        refused.iter().any(|(severity, message)| *severity == "error" && message.contains("before `stop`")),
+        "{:#}",
+        said.0
+    );
+}
+
+/// Answers of one batch come undos first, whatever the order in which they were raised.
+#[test]
+fn answers_come_undos_first() {
+    let configurations = format!("{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
+        two = Configuration {{ property_set(\"a.mode\", 1) }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},");
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"one\" },
+        both = state { entry = { \"two\", \"one.undo\" } }, undone = state {}, pushed = state { entry = \"wrong\" },
+        leaving = state { entry = { \"two.undo\", \"one.undo\", \"base.undo\" } },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"both\", events = { \"e_both\" } },
+        trans { src = \"both\", tgt = \"undone\", events = { \"one.undone\", \"one.undo.failed\", \"one.undo.broken\" } },
+        trans { src = \"both\", tgt = \"pushed\", events = { \"two.ok\" } },
+        trans { src = \"pushed\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"undone\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },";
+    let said = Small::new(&configurations, states, "").check();
+    assert!(said.refused("wrong").is_empty(), "`pushed` is never reached: {:#}", said.0);
+}
+
+/// What is raised in two steps to rest is two batches: the push is tried though the undo before it failed.
+#[test]
+fn two_steps_to_rest_are_two_batches() {
+    let configurations = format!("{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
+        two = Configuration {{ create(\"b\", \"Drive\") }}, again = Configuration {{ create(\"b\", \"Drive\") }},");
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"one\" },
+        first = state { entry = \"one.undo\" }, second = state { entry = \"two\" }, waits = state {}, tried = state { entry = \"again\" },
+        leaving = state { entry = { \"again.undo\", \"two.undo\", \"one.undo\", \"base.undo\" } },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"first\", events = { \"e_both\" } },
+        trans { src = \"first\", tgt = \"second\", events = { \"e_done\" } },
+        trans { src = \"second\", tgt = \"waits\", events = { \"one.undo.failed\" } },
+        trans { src = \"waits\", tgt = \"tried\", events = { \"e_again\" } },
+        trans { src = \"second\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"waits\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"tried\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },";
+    let said = Small::new(&configurations, states, "").check();
+    let refused = said.refused("again");
+    assert!(!refused.is_empty(), "`two` is applied though `one.undo` failed: {:#}", said.0);
+}
+
+/// Two ways to one place; afterwards the same is asked for. `then` is refused only where it was the second way.
+fn two_ways(configurations: &str, ways: [&str; 2], then: &str) -> Said {
+    let states = format!(
+        "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{}},
+         left = state {{ entry = {{ {} }} }}, right = state {{ entry = {{ {} }} }}, both = state {{}}, then = state {{ entry = {{ {then} }} }},
+         leaving = state {{ entry = \"all\" }},
+         trans {{ src = \"initial\", tgt = \"idle\" }},
+         trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
+         trans {{ src = \"building\", tgt = \"up\", events = {{ \"base.ok\" }} }},
+         trans {{ src = \"up\", tgt = \"left\", events = {{ \"e_left\" }} }},
+         trans {{ src = \"up\", tgt = \"right\", events = {{ \"e_right\" }} }},
+         trans {{ src = \"left\", tgt = \"both\", events = {{ \"e_both\" }} }},
+         trans {{ src = \"right\", tgt = \"both\", events = {{ \"e_both\" }} }},
+         trans {{ src = \"both\", tgt = \"then\", events = {{ \"e_then\" }} }},",
+        ways[0], ways[1]
+    ) + &["building", "up", "left", "right", "both", "then"]
+        .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
+        .join(" ")
+        + "trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },";
+    let all = "all = Configuration { destroy(\"a\"), destroy(\"b\"), destroy(\"c\") },";
+    let base = "base = Configuration { create(\"a\", \"Drive\"), create(\"b\", \"Drive\"), create(\"c\", \"Drive\") },";
+    Small::new(&format!("{base} {all} {configurations}"), &states, "").check()
+}
+
+#[test]
+fn a_connections_policy_tells_worlds_apart() {
+    let configurations = "data = Configuration { connect(\"a.out\", \"b.in\", \"data\") },
+        buffer = Configuration { connect(\"a.out\", \"b.in\", { buffer = 4 }) },
+        more = Configuration { connect(\"c.out\", \"b.in\", { buffer = 4 }) },";
+    for ways in [["\"data\"", "\"buffer\""], ["\"buffer\"", "\"data\""]] {
+        let said = two_ways(configurations, ways, "\"more\"");
+        assert!(said.refused("more").iter().any(|(severity, _)| *severity == "error"), "{ways:?}: {:#}", said.0);
+    }
+}
+
+#[test]
+fn a_frames_inverse_tells_worlds_apart() {
+    // Undone, `run` leads to where it was applied from: unconfigured or stopped.
+    let configurations = "stop = Configuration { post_conf_state = { \"a:stopped\" } },
+        run = Configuration { post_conf_state = { \"a:running\" } },
+        back = Configuration { property_set(\"a.address\", 3) },";
+    for ways in [["\"run\"", "\"stop\", \"run\""], ["\"stop\", \"run\"", "\"run\""]] {
+        let said = two_ways(configurations, ways, "\"run.undo\", \"back\"");
+        assert!(said.refused("back").iter().any(|(severity, _)| *severity == "error"), "{ways:?}: {:#}", said.0);
+    }
+}
+
+/// A value that is there already needs no step, and what needs no step cannot fail.
+#[test]
+fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
+    let states = |first: &str, second: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{}},
+             left = state {{ entry = \"{first}\" }}, right = state {{ entry = \"{second}\" }}, both = state {{}}, then = state {{ entry = \"five\" }},
+             failed = state {{ entry = \"wrong\" }}, leaving = state {{ entry = \"all\" }},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"building\", tgt = \"up\", events = {{ \"base.ok\" }} }},
+             trans {{ src = \"up\", tgt = \"left\", events = {{ \"e_left\" }} }},
+             trans {{ src = \"up\", tgt = \"right\", events = {{ \"e_right\" }} }},
+             trans {{ src = \"left\", tgt = \"both\", events = {{ \"{first}.ok\" }} }},
+             trans {{ src = \"right\", tgt = \"both\", events = {{ \"{second}.ok\" }} }},
+             trans {{ src = \"both\", tgt = \"then\", events = {{ \"e_then\" }} }},
+             trans {{ src = \"then\", tgt = \"failed\", events = {{ \"five.failed\" }} }},"
+        ) + &["building", "up", "left", "right", "both", "then", "failed"]
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
+            .join(" ")
+            + "trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },"
+    };
+    let configurations = format!("{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},
+        five = Configuration {{ property_set(\"a.gain\", 5.0) }}, set5 = Configuration {{ property_set(\"a.gain\", 5.0) }},
+        set2 = Configuration {{ property_set(\"a.gain\", 2.0) }},");
+    for (first, second) in [("set5", "set2"), ("set2", "set5")] {
+        let said = Small::new(&configurations, &states(first, second), "").check();
+        assert!(!said.refused("wrong").is_empty(), "{first}: {:#}", said.0);
+    }
+}
+
+/// A state that is met first behind an undo that fails, and later without any failure.
+#[test]
+fn a_state_is_judged_by_its_best_way() {
+    let configurations = format!("{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},");
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, undoing = state { entry = \"base.undo\" },
+        one = state {}, two = state {}, three = state {}, both = state {}, then = state { entry = \"wrong\" },
+        leaving = state { entry = \"all\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"undoing\", events = { \"e_undo\" } },
+        trans { src = \"undoing\", tgt = \"both\", events = { \"base.undo.failed\" } },
+        trans { src = \"undoing\", tgt = \"idle\", events = { \"base.undone\", \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"one\", events = { \"e_one\" } },
+        trans { src = \"one\", tgt = \"two\", events = { \"e_two\" } },
+        trans { src = \"two\", tgt = \"three\", events = { \"e_three\" } },
+        trans { src = \"three\", tgt = \"both\", events = { \"e_both\" } },
+        trans { src = \"both\", tgt = \"then\", events = { \"e_then\" } },
+        trans { src = \"building\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"one\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"two\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"three\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"both\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"then\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },";
+    let said = Small::new(&configurations, states, "").check();
+    let refused = said.of("coord::request_refused").into_iter();
+    let wrong: Vec<_> = refused.filter(|f| f["message"].as_str().unwrap().starts_with("`wrong`")).collect();
+    assert!(wrong.iter().any(|f| f["severity"] == "error"), "{:#}", said.0);
+    // And its way is the best one, too.
+    let answers = Said::answers(wrong[0]);
+    assert_eq!(answers, ["base.ok"], "{:#}", said.0);
+}

@@ -1,0 +1,84 @@
+//! What a check comes to, and with which exit status.
+
+use crate::demo::{Demo, at_home};
+use crate::support::Small;
+
+const UP_AND_DOWN: &str = "idle = state {}, up = state { entry = \"base\" }, leaving = state { entry = \"base.undo\" },
+    trans { src = \"initial\", tgt = \"idle\" },
+    trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+    trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\", \"base.failed\", \"base.broken\" } },
+    trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+    trans { src = \"leaving\", tgt = \"leaving\", events = { \"e_shutdown\", \"base.undo.failed\", \"base.undo.broken\" } },";
+
+const CONFIGURATIONS: &str = "base = Configuration { create(\"a\", \"Drive\") },";
+
+fn verdict(small: &Small) -> (String, i32, i32, String) {
+    let json = small.demo.run(&["check", "small.yaml", "--json"]);
+    let strict = small.demo.run(&["check", "small.yaml", "--strict"]);
+    let verdict = json.json()["verdict"].as_str().unwrap().to_owned();
+    (verdict, json.code, strict.code, strict.out)
+}
+
+#[test]
+fn sound_is_said_only_of_what_is_sound() {
+    let sound = Small::new(CONFIGURATIONS, &UP_AND_DOWN.replace("\"e_shutdown\", \"base.undo.failed\"", "\"base.undo.failed\""), "");
+    let (word, code, strict, text) = verdict(&sound);
+    assert_eq!((word.as_str(), code, strict), ("sound", 0, 0), "{text}");
+    assert!(text.starts_with("small: sound;"), "{text}");
+    // A warning.
+    let warned = Small::new(CONFIGURATIONS, &UP_AND_DOWN.replace(", \"base.failed\", \"base.broken\"", ""), "");
+    let (word, code, strict, text) = verdict(&warned);
+    assert_eq!((word.as_str(), code, strict), ("warnings", 0, 1), "{text}");
+    assert!(text.contains("has warnings") && !text.contains("sound"), "{text}");
+    // An error.
+    let refused = Small::new(&format!("{CONFIGURATIONS} base2 = Configuration {{ destroy(\"nobody\") }},"), UP_AND_DOWN, "");
+    let (word, code, strict, _) = verdict(&refused);
+    assert_eq!((word.as_str(), code, strict), ("refused", 1, 1));
+}
+
+/// Each event makes it ask for more than is answered meanwhile.
+#[test]
+fn a_bound_that_cuts_something_off_is_told() {
+    let states = UP_AND_DOWN.replace("idle = state {},", "idle = state {}, more = state { entry = \"set\" },")
+        + "trans { src = \"up\", tgt = \"more\", events = { \"e_more\" } }, trans { src = \"more\", tgt = \"more\", events = { \"e_more\", \"set.failed\", \"set.broken\" } },
+           trans { src = \"more\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let configurations = format!("{CONFIGURATIONS} set = Configuration {{ group = \"g\", property_set(\"a.gain\", 2.0) }},");
+    let small = Small::new(&configurations, &states, "");
+    let json = small.demo.run(&["check", "small.yaml", "--json"]).json();
+    assert_eq!(json["explored"]["complete"], false, "{json:#}");
+    let left: Vec<&str> = json["left"].as_array().unwrap().iter().map(|left| left.as_str().unwrap()).collect();
+    assert_ne!(json["verdict"], "sound", "{json:#}");
+    if json["verdict"] == "followed" {
+        assert!(left.iter().any(|left| left.contains("wait at once")), "{left:?}");
+        let text = small.demo.run(&["check", "small.yaml"]).out;
+        assert!(text.contains("sound as far as followed") && text.contains("wait at once"), "{text}");
+        assert_eq!(small.demo.run(&["check", "small.yaml", "--strict"]).code, 1);
+    }
+}
+
+/// Every finding that is met on a way has one, from the start.
+#[test]
+fn each_finding_has_its_own_way() {
+    let demo = Demo::new();
+    demo.replace("coordinator.lua", "config = \"slow\"", "entry = { \"slow\", \"create_all\" }");
+    let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    let mut ways = Vec::new();
+    for finding in json["findings"].as_array().unwrap() {
+        let trace = finding["trace"].as_array().unwrap();
+        if finding["code"] == "coord::request_refused" {
+            assert_eq!(trace[0]["what"], "start", "{finding:#}");
+            assert!(trace.len() > 3 && trace.iter().all(|step| !step["states"].as_array().unwrap().is_empty()));
+            ways.push(trace.clone());
+        }
+    }
+    assert!(!ways.is_empty(), "{json:#}");
+}
+
+#[test]
+fn the_shipped_deployments_are_not_refused_and_warn_of_nothing() {
+    for file in ["hello", "generic_arm", "youbot_arm", "youbot_arm_scoped"] {
+        let json = at_home(&["check", &format!("deployments/{file}.yaml"), "--json"]).json();
+        assert!(["sound", "followed"].contains(&json["verdict"].as_str().unwrap()), "{file}: {json:#}");
+        assert_eq!(json["explored"]["unfollowed"], 0, "{file}: {}", json["explored"]);
+    }
+}
