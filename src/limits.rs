@@ -264,13 +264,20 @@ pub const DOO_BUSY: Duration = Duration::from_millis(1);
 /// How long a coordinator pauses before it resumes a `doo` that is content to wait, or asks `getevents` again: as a host
 /// that steps its machine a hundred times a second.
 pub const DOO_IDLE: Duration = Duration::from_millis(10);
+
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
 /// half a second of work.
 pub const CHECK_TRANSITIONS: usize = 400_000;
 
 /// Batches of one coordinator that `check` lets be unanswered at once: while so many are, it follows no event from outside
-/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with three of them.
-pub const CHECK_WAITING: usize = 3;
+/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with two of them.
+pub const CHECK_WAITING: usize = 2;
+
+/// The same where following is easy.
+pub const CHECK_WAITING_MOST: usize = 6;
+
+/// Transitions up to which following counts as easy: then it is done anew with more batches that wait, if there are any.
+pub const CHECK_EASY: usize = 10_000;
 
 /// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
 /// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.

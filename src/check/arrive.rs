@@ -112,6 +112,7 @@ impl Product<'_> {
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         for (request, verdict, _) in &arrival.told {
             self.owed(&mut state, request);
+            state.stayed |= *verdict == Verdict::UndoFailed;
             self.due(&mut state, *request, *verdict);
         }
         if !arrival.safe.is_empty() {
@@ -259,14 +260,7 @@ impl Product<'_> {
         for mut state in states {
             self.begin(&mut state);
             let state = self.settle(state);
-            nexts.all.push(Next {
-                by: Move::Answer,
-                answers: answers.clone(),
-                state,
-                failed,
-                deep: (None, None),
-                by_hand: false,
-            });
+            nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
         }
     }
 }

@@ -20,9 +20,11 @@ use std::collections::VecDeque;
 pub enum Happening {
     /// An event comes from outside, or time passes.
     Event {
+        /// The coordinator that hears it.
+        coordinator: Ident,
         /// The event.
         event: String,
-        /// The state the coordinator is in then; of several, where each of them is.
+        /// The state the coordinator is in then.
         state: String,
     },
     /// Requests made together are carried out.
@@ -35,7 +37,7 @@ pub enum Happening {
         steps: Vec<PlannedStep>,
         /// The system after it.
         result: Snapshot,
-        /// The state the coordinator is in then; of several, where each of them is.
+        /// The state the coordinator is in then.
         state: String,
     },
 }
@@ -49,7 +51,9 @@ pub struct Drive {
     pub several: bool,
     /// Whether it arrives.
     pub reached: bool,
-    /// The state it ends in; of several coordinators, where each of them is.
+    /// The coordinator that does not arrive; when all do, the last.
+    pub coordinator: Ident,
+    /// The state it ends in.
     pub state: String,
     /// The system it ends with.
     pub system: Snapshot,
@@ -256,10 +260,16 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     };
     let reached = end.reached && (until == Until::Up || fall.is_some());
     let world = product.worlds.get(end.end().world)?;
+    let goal: Goal = if until == Until::Up { |member| member.up } else { |member| member.down };
+    let mut last = product.members.iter().zip(&end.end().leaves).collect::<Vec<_>>().into_iter();
+    let inside = |(member, leaf): &(&Member<'_>, &NodeId)| goal(member).is_some_and(|goal| member.chart.is_inside(**leaf, goal));
+    let ends = last.clone().find(|one| !inside(one)).or_else(|| last.next_back());
+    let (member, leaf) = ends?;
     Some(Drive {
         several: charts.len() > 1,
         reached,
-        state: product.place(end.end()),
+        coordinator: member.name,
+        state: member.chart.fqn(*leaf).to_string(),
         system: world.system.snapshot(),
         frames: world.stack.frames().iter().map(|f| f.configuration).collect(),
         refused: end.refused.clone().map(|(request, findings)| (request.ask, findings)),
@@ -272,7 +282,12 @@ fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
     let mut happenings = Vec::new();
     let mut before = &way.from;
     for next in &way.moves {
-        let state = product.place(&next.state);
+        let state = |number: usize| product.members[number].chart.fqn(next.state.leaves[number]).to_string();
+        let of = |number: usize, event: String| Happening::Event {
+            coordinator: product.members[number].name,
+            event,
+            state: state(number),
+        };
         match next.by {
             Move::Answer => {
                 let requests: Vec<Request> = next.answers.iter().map(|(request, _)| *request).collect();
@@ -285,17 +300,19 @@ fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
                         asks: requests.iter().map(|request| request.ask).collect(),
                         steps: product.worlds.steps(before.world, &requests),
                         result: world.system.snapshot(),
-                        state,
+                        state: state(member),
                     });
                 }
             }
-            Move::Event(at) => {
-                let event = product.outside[usize::from(at)].to_string();
-                happenings.push(Happening::Event { event, state });
+            // Several take it when they come to it: each is told of then.
+            Move::Event(at) if next.state.inbox.is_empty() => {
+                let moved = (0..product.members.len()).filter(|n| before.leaves[*n] != next.state.leaves[*n]);
+                let number = moved.into_iter().next().unwrap_or(0);
+                happenings.push(of(number, product.outside[usize::from(at)].to_string()));
             }
-            Move::Time(number, event) => {
-                let event = product.members[usize::from(number)].chart.event_text(event);
-                happenings.push(Happening::Event { event, state });
+            Move::Time(number, event) | Move::Taken(number, event) => {
+                let number = usize::from(number);
+                happenings.push(of(number, product.members[number].chart.event_text(event)));
             }
             _ => {}
         }

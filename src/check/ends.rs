@@ -105,7 +105,8 @@ impl Product<'_> {
             self.applied(&mut next, &request, verdict, went);
             answers.push((request, verdict));
             let fits = |undo: &Request| matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b);
-            if let Some(at) = given_up.iter().position(fits) {
+            // It may have been given up more than once.
+            while let Some(at) = given_up.iter().position(fits) {
                 let undo = given_up.remove(at);
                 match verdict {
                     // It was through before it could be given up: the undo is a request like others.
@@ -116,7 +117,8 @@ impl Product<'_> {
             }
         }
         // What gives up a request that is taken up anew goes on doing so.
-        next.stopped.extend(given_up.into_iter().map(|undo| (number, Stop::GivenUp(undo))));
+        let goes_on = next.desk.under_way().iter().any(|turn| turn.number == number);
+        next.stopped.extend(given_up.into_iter().filter(|_| goes_on).map(|undo| (number, Stop::GivenUp(undo))));
         for undo in late {
             next = self.take_in(next, Batch::one(undo));
         }

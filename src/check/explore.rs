@@ -6,8 +6,8 @@
 use super::Explored;
 use super::product::{Failed, Move, Next, Product, State, Trouble};
 use super::trace::{Answered, Happened, Place, TraceStep};
-use super::world::Top;
-use crate::stack::Requester;
+use super::world::{EMPTY, Top};
+use crate::stack::{Request, Requester};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -177,6 +177,10 @@ impl Graph<'_, '_> {
                 self.cut(Bound::Frames, so_far);
                 continue;
             }
+            // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
+            if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
+                continue;
+            }
             // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
             if next.deep.1.is_some() && so_far >= Failed::Undo {
                 self.ends.insert(at);
@@ -206,40 +210,87 @@ impl Graph<'_, '_> {
     fn go_round(&mut self) {
         let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
-        for ((id, by), edges) in pushes {
-            let circle = edges.into_iter().find(|edge| {
-                let Edge { from, to, failed, .. } = self.edges[*edge as usize];
-                failed == Failed::Nothing && self.failed[to as usize] == Failed::Nothing && self.leads(to, from)
-            });
-            let Some(Edge { to: at, .. }) = circle.map(|edge| self.edges[edge as usize]) else { continue };
-            let mut state = self.states[at as usize].clone();
-            let world = self.product.worlds.piled_up(state.world, id, by);
-            if world == state.world {
-                continue;
+        let mut out: FxHashMap<u32, SmallVec<[u32; 4]>> = FxHashMap::default();
+        for (number, edge) in (0u32..).zip(&self.edges) {
+            // Where nothing is left, frames are forgotten: they do not pile up.
+            let left = self.states[edge.to as usize].world != EMPTY;
+            if edge.failed == Failed::Nothing && edge.place.is_some() && left {
+                out.entry(edge.from).or_default().push(number);
             }
-            state.world = world;
-            state.unconfirmed.clear();
-            let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
-            let to = self.reach(state, failed, depth);
-            self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false });
+        }
+        for (_, edges) in pushes {
+            let mut circles = edges.into_iter().filter_map(|edge| self.circle(edge, &out));
+            if let Some(circle) = circles.next() {
+                drop(circles);
+                self.round_and_round(&circle);
+            }
         }
     }
 
-    /// Whether a way without a failure leads from one state to another.
-    fn leads(&mut self, from: u32, to: u32) -> bool {
-        let mut out: FxHashMap<u32, SmallVec<[u32; 4]>> = FxHashMap::default();
-        for edge in self.edges.iter().filter(|edge| edge.failed == Failed::Nothing) {
-            out.entry(edge.from).or_default().push(edge.to);
+    /// The edges of a circle without a failure that ends with this one.
+    fn circle(&self, edge: u32, out: &FxHashMap<u32, SmallVec<[u32; 4]>>) -> Option<Vec<u32>> {
+        let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
+        if failed != Failed::Nothing || self.failed[start as usize] != Failed::Nothing {
+            return None;
         }
-        let mut seen: FxHashSet<u32> = FxHashSet::from_iter([from]);
-        let mut open = vec![from];
-        while let Some(at) = open.pop() {
-            if at == to {
-                return true;
+        let mut by: FxHashMap<u32, u32> = FxHashMap::default();
+        let mut queue: VecDeque<u32> = VecDeque::from([start]);
+        while let Some(at) = queue.pop_front() {
+            if at == goal {
+                let mut circle = vec![edge];
+                let mut at = goal;
+                while at != start {
+                    let number = by[&at];
+                    circle.push(number);
+                    at = self.edges[number as usize].from;
+                }
+                circle.reverse();
+                return Some(circle);
             }
-            open.extend(out.get(&at).into_iter().flatten().copied().filter(|next| seen.insert(*next)));
+            for number in out.get(&at).into_iter().flatten() {
+                let to = self.edges[*number as usize].to;
+                if to != start && !by.contains_key(&to) {
+                    by.insert(to, *number);
+                    queue.push_back(to);
+                }
+            }
         }
-        false
+        None
+    }
+
+    /// Goes round a circle until the oldest frames are squashed, or something on it is refused; what it leads to is followed.
+    fn round_and_round(&mut self, circle: &[u32]) {
+        let Some(first) = circle.first().map(|edge| self.edges[*edge as usize]) else { return };
+        let Some(mut world) = self.product.worlds.get(self.states[first.from as usize].world).cloned() else { return };
+        let mut requests: Vec<(u32, Vec<Request>)> = Vec::new();
+        for number in circle {
+            let edge = self.edges[*number as usize];
+            let from = self.states[edge.from as usize].clone();
+            let next = self.product.nexts(&from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
+            let answered = next.into_iter().flat_map(|next| next.answers);
+            let done = answered.filter(|(_, verdict)| verdict.is_success()).map(|(request, _)| request).collect();
+            requests.push((edge.from, done));
+        }
+        let limit = self.product.deployment.limits.stack;
+        let mut at = first.from;
+        'round: for _ in 0..limit + 2 {
+            for (from, requests) in &requests {
+                if !self.product.worlds.carry_out(&mut world, requests) {
+                    at = *from;
+                    break 'round;
+                }
+            }
+        }
+        let mut state = self.states[at as usize].clone();
+        let world = self.product.worlds.met(world);
+        if world == state.world {
+            return;
+        }
+        state.world = world;
+        state.unconfirmed.clear();
+        let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
+        let to = self.reach(state, failed, depth);
+        self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false });
     }
 
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but

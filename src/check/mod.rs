@@ -28,6 +28,7 @@ mod verdict;
 mod ways;
 mod world;
 
+use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{Catalogue, Code, ConfigId, Deployment, Findings};
 use crate::statechart::Chart;
@@ -166,15 +167,24 @@ fn follow(
     let mut found = ways::ways(&mut product);
     let mut asked = product.worlds.asked().clone();
     for numbers in beside::groups(deployment, charts) {
-        let mut product = Product::new(deployment, views, charts, &numbers, catalogue);
-        let mut graph = explore::explore(&mut product);
-        found.extend(graph.judge());
-        let verified = !graph.bounds.contains_key(&Bound::Budget) && !graph.bounds.contains_key(&Bound::Entered);
-        let shared = beside::shared(deployment, charts, &numbers, verified);
-        found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-        left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed)));
-        explored = explored.and(graph.explored());
-        asked.extend(product.worlds.asked());
+        for most_waiting in limits::CHECK_WAITING..=limits::CHECK_WAITING_MOST {
+            let mut product = Product::new(deployment, views, charts, &numbers, catalogue);
+            product.most_waiting = most_waiting;
+            let mut graph = explore::explore(&mut product);
+            // Anew with more of them where they are few: often there never are more at once.
+            let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
+            if easy && graph.bounds.contains_key(&Bound::Waiting) {
+                continue;
+            }
+            found.extend(graph.judge());
+            let verified = !graph.bounds.contains_key(&Bound::Budget) && !graph.bounds.contains_key(&Bound::Entered);
+            let shared = beside::shared(deployment, charts, &numbers, verified);
+            found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
+            left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting)));
+            explored = explored.and(graph.explored());
+            asked.extend(product.worlds.asked());
+            break;
+        }
     }
     // Said once, of what none of them asks for.
     let unasked = unasked(deployment, &product, &asked);

@@ -71,6 +71,8 @@ pub struct State {
     pub due: SmallVec<[(Request, Verdict); 1]>,
     /// Answers that are being given; none in a state between moves.
     pub telling: SmallVec<[(Request, Verdict); 2]>,
+    /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
+    pub stayed: bool,
     /// Events on their way to a coordinator, those of one in order.
     pub inbox: SmallVec<[(u8, EventId); 2]>,
     /// Frames that wait for their confirmation.
@@ -186,6 +188,8 @@ pub struct Product<'a> {
     pub others: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
+    /// Batches of one coordinator that may be unanswered when the next event comes.
+    pub most_waiting: usize,
     /// Configurations that stand for something.
     holds: Vec<ConfigId>,
 }
@@ -222,6 +226,7 @@ impl<'a> Product<'a> {
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
+            most_waiting: limits::CHECK_WAITING,
             holds,
         };
         for (place, number) in numbers.iter().enumerate() {
@@ -243,6 +248,7 @@ impl<'a> Product<'a> {
             safe: SmallVec::new(),
             due: SmallVec::new(),
             telling: SmallVec::new(),
+            stayed: false,
             inbox: SmallVec::new(),
             unconfirmed: SmallVec::new(),
             lost: SmallVec::new(),
@@ -301,14 +307,8 @@ impl<'a> Product<'a> {
     /// A coordinator hears an event.
     fn hear(&mut self, state: State, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
         for state in self.react(state, number, event) {
-            nexts.all.push(Next {
-                by,
-                answers: Answers::new(),
-                state: self.settle(state),
-                failed: Failed::Nothing,
-                deep: (None, None),
-                by_hand: false,
-            });
+            let next = Next::plain(by, self.settle(state), Failed::Nothing);
+            nexts.all.push(next);
         }
     }
 
@@ -316,7 +316,7 @@ impl<'a> Product<'a> {
     fn from_outside(&mut self, state: &State, nexts: &mut Nexts) {
         let mut heard: BTreeSet<usize> = BTreeSet::new();
         let busy: SmallVec<[bool; 4]> =
-            self.members.iter().map(|member| state.outstanding(member.by) >= limits::CHECK_WAITING).collect();
+            self.members.iter().map(|member| state.outstanding(member.by) >= self.most_waiting).collect();
         for number in 0..self.members.len() {
             for event in self.members[number].offers(state.leaves[number]).iter() {
                 let name = self.members[number].name_of(*event);
@@ -393,7 +393,7 @@ impl<'a> Product<'a> {
                     next.inbox.clear();
                     let from = nexts.all.len();
                     self.hear(next, usize::from(only), event, by, nexts);
-                    nexts.all[from..].iter_mut().for_each(|next| next.failed = Failed::Apply);
+                    nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Apply));
                 }
                 _ => nexts.all.push(Next::plain(by, next, Failed::Apply)),
             }
@@ -517,7 +517,13 @@ impl<'a> Product<'a> {
 impl Next {
     /// A state that comes without an answer.
     pub(super) fn plain(by: Move, state: State, failed: Failed) -> Self {
-        Self { by, answers: Answers::new(), state, failed, deep: (None, None), by_hand: false }
+        Self::answered(by, Answers::new(), state, failed)
+    }
+
+    /// A state that comes with answers.
+    pub(super) fn answered(by: Move, answers: Answers, mut state: State, failed: Failed) -> Self {
+        let failed = if std::mem::take(&mut state.stayed) { failed.max(Failed::Undo) } else { failed };
+        Self { by, answers, state, failed, deep: (None, None), by_hand: false }
     }
 }
 

@@ -69,13 +69,12 @@ impl Verdict {
 }
 
 impl Bound {
-    /// What a bound left out; `failed` is what had to fail before, at least.
-    pub(super) fn told(self, failed: Failed) -> String {
+    /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
+    pub(super) fn told(self, failed: Failed, most_waiting: usize) -> String {
         let what = match self {
             Self::Budget => format!("the budget of {} transitions was used up", limits::CHECK_TRANSITIONS),
             Self::Waiting => format!(
-                "more than {} batches of one coordinator that wait at once were not followed",
-                limits::CHECK_WAITING
+                "more than {most_waiting} batches of one coordinator that wait at once were not followed"
             ),
             Self::Piled => format!("more than {} requests that wait were not followed", limits::CHECK_PILED),
             Self::Frames => {

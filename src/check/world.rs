@@ -417,16 +417,32 @@ impl<'a> Worlds<'a> {
         named || self.undone.bare.contains(&by) || by == Requester::Operator
     }
 
-    /// The world in which `by` has applied a configuration that nobody undoes over and over, until its older frames are
-    /// squashed. The same: that makes no difference to anybody.
-    pub fn piled_up(&mut self, id: WorldId, configuration: ConfigId, by: Requester) -> WorldId {
-        let Some(world) = self.get(id) else { return id };
-        let Some(frame) = world.stack.newest_of(configuration, Some(by)).cloned() else { return id };
-        let mut world = world.clone();
-        // Those above the newest of the others as well, so that all of these have got into it.
-        for _ in 0..2 * self.deployment.limits.stack {
-            world.stack.push(Frame { scope: None, ..(*frame).clone() });
+    /// Carries out requests that are answered together in a world of the caller's own. False: one is refused.
+    pub fn carry_out(&self, world: &mut World, requests: &[Request]) -> bool {
+        let rules =
+            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
+        let mut rest = requests;
+        while !rest.is_empty() {
+            let group = take_up(world, rest, &rules);
+            if group.told.iter().any(|told| told.reason.is_some()) {
+                return false;
+            }
+            if let Some(planned) = &group.planned {
+                planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+                world.stack.apply(planned.parts.iter().map(|part| &part.edits), &[]);
+            }
+            rest = &rest[group.takes.max(1).min(rest.len())..];
         }
+        true
+    }
+
+    /// Whether frames have been squashed.
+    pub fn is_piled_up(&self, id: WorldId) -> bool {
+        self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
+    }
+
+    /// The number of a world of the caller's own.
+    pub fn met(&mut self, world: World) -> WorldId {
         self.intern(world)
     }
 
