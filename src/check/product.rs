@@ -94,13 +94,22 @@ impl State {
         let under_way = self.desk.under_way().iter().filter(|turn| of(&turn.batch)).count();
         let due = usize::from(self.due.iter().any(|(request, _)| request.requester == by));
         let safe = self.safe.iter().filter(|request| request.requester == by).count();
-        under_way + due + safe + self.desk.waiting().filter(|batch| of(batch)).count()
+        let given_up = self.undos().filter(|undo| undo.requester == by).count();
+        under_way + due + safe + given_up + self.desk.waiting().filter(|batch| of(batch)).count()
+    }
+
+    /// Undos that give something up.
+    fn undos(&self) -> impl Iterator<Item = &Request> {
+        self.stopped.iter().filter_map(|(_, stop)| match stop {
+            Stop::GivenUp(undo) => Some(undo),
+            Stop::Interrupted => None,
+        })
     }
 
     /// How many requests are not answered.
     pub fn waiting(&self) -> usize {
         let under_way: usize = self.desk.under_way().iter().map(|turn| turn.batch.requests.len()).sum();
-        self.desk.len() + under_way + self.safe.len() + self.due.len()
+        self.desk.len() + under_way + self.safe.len() + self.due.len() + self.undos().count()
     }
 
     /// Whether nothing waits to be answered or heard.
