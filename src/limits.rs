@@ -279,6 +279,10 @@ pub const CHECK_WAITING_MOST: usize = 6;
 /// Transitions up to which following counts as easy: then it is done anew with more batches that wait, if there are any.
 pub const CHECK_EASY: usize = 10_000;
 
+/// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
+/// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
+pub const CHECK_LEAN: usize = 5_000;
+
 /// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
 /// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.
 pub const CHECK_PILED: usize = 32;

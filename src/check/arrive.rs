@@ -89,7 +89,7 @@ impl Product<'_> {
     pub(super) fn arrive(&mut self, state: State, batch: Batch) -> Vec<State> {
         let stops = self.stopped_by(&state, &batch);
         let mut states = Vec::with_capacity(1);
-        if !stops.is_empty() && state.flight.is_none() {
+        if self.races && !stops.is_empty() && state.flight.is_none() {
             states.push(State { flight: Some(Box::new(batch.clone())), ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
             if batch.requests.iter().any(is_safe) {

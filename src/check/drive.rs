@@ -262,7 +262,8 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     let world = product.worlds.get(end.end().world)?;
     let goal: Goal = if until == Until::Up { |member| member.up } else { |member| member.down };
     let mut last = product.members.iter().zip(&end.end().leaves).collect::<Vec<_>>().into_iter();
-    let inside = |(member, leaf): &(&Member<'_>, &NodeId)| goal(member).is_some_and(|goal| member.chart.is_inside(**leaf, goal));
+    let inside =
+        |(member, leaf): &(&Member<'_>, &NodeId)| goal(member).is_some_and(|goal| member.chart.is_inside(**leaf, goal));
     let ends = last.clone().find(|one| !inside(one)).or_else(|| last.next_back());
     let (member, leaf) = ends?;
     Some(Drive {

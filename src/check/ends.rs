@@ -57,8 +57,8 @@ impl Product<'_> {
     /// Nothing is known: each request may end in any way, one after the other.
     fn ends_somehow(&mut self, state: &State, number: u32, top: Top, requests: &[Request], nexts: &mut Nexts) {
         let ask = requests[0].ask;
-        for (verdict, done) in [(ask.done(), true), (ask.failed(), false), (ask.broken(), false)] {
-            let went = Went::to(self.worlds.answered(top, &requests[0], done));
+        for verdict in [ask.done(), ask.failed(), ask.broken()] {
+            let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
             let given = Given::from_iter([(0, Some(verdict))]);
             self.ended(state, number, requests, given, &went, Failed::Nothing, nexts);
         }
@@ -151,8 +151,16 @@ impl Product<'_> {
             });
             let verdict = if given_up.is_some() { Verdict::Cancelled } else { requests[0].ask.failed() };
             for verdict in [verdict, requests[0].ask.broken()] {
-                let went = Went::to(self.worlds.answered(top, &requests[0], false));
-                self.ended(state, number, &requests, Given::from_iter([(0, Some(verdict))]), &went, Failed::Nothing, nexts);
+                let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
+                self.ended(
+                    state,
+                    number,
+                    &requests,
+                    Given::from_iter([(0, Some(verdict))]),
+                    &went,
+                    Failed::Nothing,
+                    nexts,
+                );
             }
             return;
         }
@@ -206,7 +214,7 @@ impl Product<'_> {
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
-                next.world = self.worlds.answered(top, request, true);
+                next.world = self.worlds.answered(top, request, verdict);
                 self.tell(next, Answers::from_iter([(*request, verdict)]), Failed::Nothing, nexts);
             }
             return;

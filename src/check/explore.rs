@@ -4,12 +4,12 @@
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::Explored;
-use super::product::{Failed, Move, Next, Product, State, Trouble};
+use super::product::{Failed, Move, Next, Nexts, Product, State, Trouble};
 use super::trace::{Answered, Happened, Place, TraceStep};
 use super::world::{EMPTY, Top};
-use crate::stack::{Request, Requester};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
+use crate::stack::{Request, Requester};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
@@ -38,6 +38,8 @@ pub enum Bound {
     Budget,
     /// [`limits::CHECK_WAITING`].
     Waiting,
+    /// [`limits::CHECK_LEAN`].
+    Lean,
     /// [`limits::CHECK_PILED`].
     Piled,
     /// [`limits::CHECK_FRAMES`].
@@ -70,6 +72,8 @@ pub struct Graph<'p, 'a> {
     pub bounds: FxHashMap<Bound, Failed>,
     /// Edges that push a frame which nobody ever undoes: of which configuration, and by whom.
     pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
+    /// Behind undoings that failed only one batch at a time is followed, and no races.
+    lean: Option<bool>,
     depth: Vec<u32>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
@@ -92,6 +96,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         ends: FxHashSet::default(),
         bounds: FxHashMap::default(),
         pushes: FxHashMap::default(),
+        lean: None,
         depth: Vec::new(),
         index: FxHashMap::default(),
         open: BinaryHeap::new(),
@@ -164,8 +169,15 @@ impl Graph<'_, '_> {
             return;
         }
         let depth = self.depth[at as usize] + 1;
-        let nexts = self.product.nexts(&state);
-        if nexts.cut {
+        if so_far >= Failed::Undo && self.lean.is_none() {
+            let lean = self.edges.len() > limits::CHECK_LEAN;
+            self.lean = Some(lean);
+            if lean {
+                self.cut(Bound::Lean, so_far);
+            }
+        }
+        let nexts = self.nexts(at);
+        if nexts.cut && !self.is_lean(at) {
             self.cut(Bound::Waiting, so_far);
         }
         self.troubles.extend(nexts.troubles.into_iter().map(|trouble| (at, trouble)));
@@ -179,6 +191,7 @@ impl Graph<'_, '_> {
             }
             // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
             if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
+                self.ends.insert(at);
                 continue;
             }
             // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
@@ -203,6 +216,24 @@ impl Graph<'_, '_> {
             let to = self.reach(state, so_far.max(class), depth);
             self.edges.push(Edge { from: at, to, place, failed: class, quiet });
         }
+    }
+
+    fn is_lean(&self, at: u32) -> bool {
+        self.lean == Some(true) && self.failed[at as usize] >= Failed::Undo
+    }
+
+    /// What follows from a state: always the same.
+    fn nexts(&mut self, at: u32) -> Nexts {
+        let state = self.states[at as usize].clone();
+        if !self.is_lean(at) {
+            return self.product.nexts(&state);
+        }
+        let most = std::mem::replace(&mut self.product.most_waiting, 1);
+        self.product.races = false;
+        let nexts = self.product.nexts(&state);
+        self.product.most_waiting = most;
+        self.product.races = true;
+        nexts
     }
 
     /// Frames that nobody ever undoes pile up where a circle pushes one each time round, until the oldest frames are
@@ -265,8 +296,7 @@ impl Graph<'_, '_> {
         let mut requests: Vec<(u32, Vec<Request>)> = Vec::new();
         for number in circle {
             let edge = self.edges[*number as usize];
-            let from = self.states[edge.from as usize].clone();
-            let next = self.product.nexts(&from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
+            let next = self.nexts(edge.from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
             let answered = next.into_iter().flat_map(|next| next.answers);
             let done = answered.filter(|(_, verdict)| verdict.is_success()).map(|(request, _)| request).collect();
             requests.push((edge.from, done));
@@ -324,14 +354,13 @@ impl Graph<'_, '_> {
         edges.reverse();
         let mut steps = vec![TraceStep { what: Happened::Start, states: self.places(&self.states[0]) }];
         for edge in edges {
-            let from = self.states[edge.from as usize].clone();
             let states = self.places(&self.states[edge.to as usize]);
             let Some(place) = edge.place else {
                 let times = self.product.deployment.limits.stack;
                 steps.push(TraceStep { what: Happened::Rounds { times }, states });
                 continue;
             };
-            if let Some(next) = self.product.nexts(&from).all.into_iter().nth(place as usize) {
+            if let Some(next) = self.nexts(edge.from).all.into_iter().nth(place as usize) {
                 steps.push(TraceStep { what: self.product.told(&next), states });
             }
         }

@@ -91,8 +91,11 @@ impl Graph<'_, '_> {
             let severity = if shared { class.min(Severity::Warning) } else { class };
             Finding::new(severity, COORD_REQUEST_REFUSED, message)
         } else {
-            let message =
-                format!("`{ask}` of `{}` is refused because of the frames of {}: {why}", member.name, others.join(" and "));
+            let message = format!(
+                "`{ask}` of `{}` is refused because of the frames of {}: {why}",
+                member.name,
+                others.join(" and ")
+            );
             Finding::new(class.min(Severity::Warning), COORD_REFUSED_BY_OTHER, message)
         };
         if let Some(site) = self.site(number, request) {

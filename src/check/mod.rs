@@ -36,14 +36,14 @@ pub use drive::{Drive, Happening, Until, drive};
 use explore::Bound;
 use judge::Traced;
 use product::Product;
-pub use trace::{Answered, Happened, Place, TraceStep};
-pub use verdict::Verdict;
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::ops::Deref;
 use std::sync::Arc;
+pub use trace::{Answered, Happened, Place, TraceStep};
+pub use verdict::Verdict;
 
 /// Something in which `check` found nothing that refuses it.
 #[derive(Debug, Clone, PartialEq)]

@@ -114,7 +114,10 @@ impl State {
 
     /// Whether nothing waits to be answered or heard.
     pub fn is_at_rest(&self) -> bool {
-        self.desk.is_empty() && self.safe.is_empty() && self.due.is_empty() && self.inbox.is_empty()
+        self.desk.is_empty()
+            && self.safe.is_empty()
+            && self.due.is_empty()
+            && self.inbox.is_empty()
             && self.flight.is_none()
     }
 }
@@ -197,6 +200,8 @@ pub struct Product<'a> {
     pub others: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
+    /// Whether it is followed what comes where a batch under way may not have begun, or be over already, when it is stopped.
+    pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
     /// Configurations that stand for something.
@@ -235,6 +240,7 @@ impl<'a> Product<'a> {
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
+            races: true,
             most_waiting: limits::CHECK_WAITING,
             holds,
         };
@@ -338,9 +344,8 @@ impl<'a> Product<'a> {
         }
         for at in heard {
             let name = self.outside[at];
-            let takes = |(number, member): (usize, &mut Member<'_>)| {
-                busy[number] && member.takes(state.leaves[number], name)
-            };
+            let takes =
+                |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
             if self.members.iter_mut().enumerate().any(takes) {
                 nexts.cut = true;
                 continue;

@@ -73,9 +73,12 @@ impl Bound {
     pub(super) fn told(self, failed: Failed, most_waiting: usize) -> String {
         let what = match self {
             Self::Budget => format!("the budget of {} transitions was used up", limits::CHECK_TRANSITIONS),
-            Self::Waiting => format!(
-                "more than {most_waiting} batches of one coordinator that wait at once were not followed"
-            ),
+            Self::Waiting => {
+                format!("more than {most_waiting} batches of one coordinator that wait at once were not followed")
+            }
+            Self::Lean => {
+                return "behind an undo that failed, only one batch of a coordinator at a time was followed".to_owned();
+            }
             Self::Piled => format!("more than {} requests that wait were not followed", limits::CHECK_PILED),
             Self::Frames => {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)

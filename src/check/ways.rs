@@ -50,7 +50,8 @@ fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
         if number == 0 {
             steps.push(TraceStep { what: Happened::Start, states: product.places(&way.from) });
         }
-        let told = way.moves.iter().map(|next| TraceStep { what: product.told(next), states: product.places(&next.state) });
+        let told =
+            way.moves.iter().map(|next| TraceStep { what: product.told(next), states: product.places(&next.state) });
         steps.extend(told);
     }
     steps
@@ -87,7 +88,11 @@ fn stops(
         }
     };
     let help = way.refused.as_ref().and_then(|(_, reasons)| reasons.first()).and_then(|reason| reason.help.clone());
-    let several = if product.members.len() > 1 { "one of them wait for that no other emits" } else { "the coordinator wait for at its end" };
+    let several = if product.members.len() > 1 {
+        "one of them wait for that no other emits"
+    } else {
+        "the coordinator wait for at its end"
+    };
     let help = help.unwrap_or_else(|| format!("look at the trace: which event does {several}?"));
     finding.help(help).at(deployment.key_origin(key)).path(key)
 }

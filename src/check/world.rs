@@ -9,7 +9,7 @@
 
 use super::alike::{FrameBook, FrameNumber, hash_system, same_system};
 use crate::limits;
-use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
+use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, Verdict};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
@@ -69,7 +69,9 @@ impl Undone {
         let named = |ids: &FxHashSet<ConfigId>| {
             ids.contains(&frame.configuration) || frame.parts.iter().any(|part| ids.contains(&part.configuration))
         };
-        self.ids.as_ref().is_none_or(named) || self.bare.contains(&frame.requester) || frame.requester == Requester::Operator
+        self.ids.as_ref().is_none_or(named)
+            || self.bare.contains(&frame.requester)
+            || frame.requester == Requester::Operator
     }
 }
 
@@ -105,7 +107,7 @@ pub struct PartOf {
 #[derive(Debug, Clone)]
 pub struct Comes {
     /// Told without being carried out: place and verdict.
-    pub told: SmallVec<[(usize, Option<crate::model::Verdict>); 2]>,
+    pub told: SmallVec<[(usize, Option<Verdict>); 2]>,
     /// Those that are told because they are refused.
     pub refused: Vec<(usize, Rc<Findings>)>,
     /// What is carried out; empty: nothing.
@@ -322,12 +324,8 @@ impl<'a> Worlds<'a> {
         self.asked.insert(configuration);
         let planned = self.get(id).map(|world| {
             let configuration = &self.configurations[&configuration];
-            let op = Op::Push {
-                configuration,
-                requester: request.requester,
-                at: Time::default(),
-                scope: request.scope,
-            };
+            let op =
+                Op::Push { configuration, requester: request.requester, at: Time::default(), scope: request.scope };
             transaction(&world.system, &world.stack, &[op], &self.context)
         });
         let comes = match planned {
@@ -382,14 +380,17 @@ impl<'a> Worlds<'a> {
     }
 
     /// The unknown world after a request was answered.
-    pub fn answered(&mut self, top: Top, request: &Request, done: bool) -> WorldId {
+    pub fn answered(&mut self, top: Top, request: &Request, verdict: Verdict) -> WorldId {
+        let done = verdict.is_success();
         let is_safe = |id: ConfigId| self.configurations.get(&id).is_some_and(|c| c.safe);
         let safe = match request.ask {
-            Ask::Apply(id) => top.safe || is_safe(id),
+            Ask::Apply(id) => top.safe || is_safe(id) && verdict != request.ask.failed(),
             Ask::UndoOf(id) => top.safe && !(done && is_safe(id)),
             _ => top.safe && !done,
         };
-        self.topped(Top { safe, ..top }, std::iter::once(request.ask))
+        // Failed, it is as before, whatever that is.
+        let failed = verdict == request.ask.failed() || verdict == Verdict::Cancelled;
+        self.topped(Top { safe, ..top }, (!failed).then_some(request.ask).into_iter())
     }
 
     fn creates_actuator(&self, id: ConfigId) -> bool {
@@ -574,8 +575,8 @@ impl<'a> Worlds<'a> {
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
     /// one name.
     fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
-        let one_name =
-            a.requester == b.requester && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
+        let one_name = a.requester == b.requester
+            && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
         !one_name && !self.frames.share(a, b)
     }
 }

@@ -140,14 +140,14 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     if has_errors(&wrong) {
         return Err(wrong);
     }
-    let context = crate::plan::Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
+    let context =
+        crate::plan::Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
     let mut system = System::new(Arc::new(read.catalogue.clone()));
     let mut stack = Stack::new(deployment.limits.stack);
     let mut planned = Vec::new();
     for id in ids {
         let Some(configuration) = deployment.configuration(id) else { continue };
-        let request =
-            Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
+        let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
         let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| {
             let mut findings = refusal.findings;
             if let Some(first) = findings.first_mut().filter(|_| names.is_empty()) {

@@ -172,7 +172,9 @@ impl Engine {
         }
         let mut faulted: Vec<ComponentName> = Vec::new();
         for node in components.iter().filter_map(|name| self.world.system.component(*name)) {
-            if node.state == RunState::Faulted && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted) {
+            if node.state == RunState::Faulted
+                && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted)
+            {
                 faulted.push(node.name);
             }
         }
@@ -211,7 +213,10 @@ impl Engine {
         self.note_quarantine();
         let mut at = 0;
         while at < self.world.broken.len() {
-            if self.world.broken[at].mendable && self.world.broken[at].residual.unsettled.is_empty() && self.repair(at, false).is_ok() {
+            if self.world.broken[at].mendable
+                && self.world.broken[at].residual.unsettled.is_empty()
+                && self.repair(at, false).is_ok()
+            {
                 if let Some(progress) = &self.progress {
                     progress(&Progress::Recovered);
                 }

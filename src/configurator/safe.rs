@@ -100,7 +100,12 @@ impl Engine {
     }
 
     /// A safe configuration planned as a frame on a system, if it can be.
-    fn plan_safe(&self, configuration: &Configuration, request: Request, system: &System) -> (Option<Frame>, Option<Planned>) {
+    fn plan_safe(
+        &self,
+        configuration: &Configuration,
+        request: Request,
+        system: &System,
+    ) -> (Option<Frame>, Option<Planned>) {
         let Request { requester, scope, .. } = request;
         let op = Op::Push { configuration, requester, at: self.clock.now(), scope };
         match transaction(system, &self.world.stack, &[op], &self.context) {

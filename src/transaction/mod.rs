@@ -207,7 +207,11 @@ impl Transaction {
 
     /// All steps, one operation after the other.
     fn whole(&self) -> &[PlannedStep] {
-        if self.planned.of.is_empty() { self.forward.as_ref().map_or(&[], |run| &run.list) } else { &self.planned.whole }
+        if self.planned.of.is_empty() {
+            self.forward.as_ref().map_or(&[], |run| &run.list)
+        } else {
+            &self.planned.whole
+        }
     }
 
     fn in_hand(&self) -> &Run {
@@ -238,7 +242,9 @@ impl Transaction {
             Some((_, way)) => {
                 let taken = way.takes_back.get(number as usize).copied().flatten().map(|i| self.part_of(i));
                 let finished = way.finishes.get(number as usize).copied().flatten();
-                taken.or(finished.map(|place| self.planned.part_of(Some(place)))).unwrap_or(self.planned.parts.len() - 1)
+                taken
+                    .or(finished.map(|place| self.planned.part_of(Some(place))))
+                    .unwrap_or(self.planned.parts.len() - 1)
             }
         }
     }
@@ -379,7 +385,8 @@ impl Transaction {
 
     /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
     fn settle(&mut self, live: &mut System) -> Option<Poll> {
-        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over) {
+        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
+        {
             return None;
         }
         if self.reading {

@@ -5,7 +5,8 @@ use crate::support::Small;
 /// After many switches that nobody undoes the oldest frames are squashed, and one of them is asked to be undone.
 #[test]
 fn an_undo_of_what_was_squashed_is_found() {
-    let configurations = "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
         one = Configuration { property_set(\"a.gain\", 2.0) }, two = Configuration { property_set(\"a.gain\", 3.0) },
         all = Configuration { destroy(\"a\") },";
     let states = "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
@@ -52,7 +53,8 @@ fn a_circle_of_answers_has_no_end() {
              trans {{ src = \"building\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"base.undo\" }},"
         )
     };
-    let configurations = "base = Configuration { create(\"a\", \"Drive\") }, one = Configuration { property_set(\"a.gain\", 2.0) },";
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, one = Configuration { property_set(\"a.gain\", 2.0) },";
     let endless = Small::new(configurations, &round("e_done"), "").check();
     let found = endless.of("coord::endless");
     assert_eq!(found.len(), 1, "{:#}", endless.0);
@@ -68,7 +70,8 @@ fn a_circle_of_answers_has_no_end() {
 fn an_operators_requests_in_between_are_followed() {
     let configurations = "base = Configuration { create(\"a\", \"Drive\") }, run = Configuration { post_conf_state = { \"a:running\" } },
         service = Configuration { post_conf_state = { \"a:running\" } }, soft = Configuration { property_set(\"a.gain\", 0.5) },";
-    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { config = \"run\" }, ready = state {},
+    let states =
+        "idle = state {}, building = state { entry = \"base\" }, up = state { config = \"run\" }, ready = state {},
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
         trans { src = \"building\", tgt = \"ready\", events = { \"base.ok\" } },
@@ -94,19 +97,19 @@ fn an_operators_requests_in_between_are_followed() {
 /// A floor holds back what shares a component with it, and nothing else.
 #[test]
 fn a_floor_of_one_coordinator_is_none_for_another() {
-    let own = |name: &str, component: &str| {
+    let own = |name: &str, component: &str, other: &str| {
         format!(
-            "idle = state {{}}, up = state {{ entry = \"{name}\" }}, more = state {{ entry = \"{name}_more\" }}, leaving = state {{ entry = \"{name}_gone\" }},
-             back = state {{ entry = \"{component}_set.undo\" }}, set = state {{ entry = \"{component}_set\" }},
+            "idle = state {{}}, making = state {{ entry = \"{name}\" }}, up = state {{ entry = \"e_of_{name}\" }}, more = state {{ entry = \"{name}_more\" }},
+             set = state {{ entry = \"{component}_set\" }}, back = state {{ entry = \"{component}_set.undo\" }}, leaving = state {{ entry = \"{name}_gone\" }},
              trans {{ src = \"initial\", tgt = \"idle\" }},
-             trans {{ src = \"idle\", tgt = \"up\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"idle\", tgt = \"making\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"making\", tgt = \"up\", events = {{ \"{name}.ok\" }} }},
              trans {{ src = \"up\", tgt = \"more\", events = {{ \"e_{name}\" }} }},
+             trans {{ src = \"more\", tgt = \"up\", events = {{ \"{name}_more.ok\", \"e_of_{other}\" }} }},
              trans {{ src = \"up\", tgt = \"set\", events = {{ \"e_{name}_set\" }} }},
-             trans {{ src = \"set\", tgt = \"back\", events = {{ \"e_{name}_back\" }} }},
+             trans {{ src = \"set\", tgt = \"back\", events = {{ \"{component}_set.ok\" }} }},
+             trans {{ src = \"back\", tgt = \"up\", events = {{ \"{component}_set.undone\" }} }},
              trans {{ src = \"up\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
-             trans {{ src = \"more\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
-             trans {{ src = \"set\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
-             trans {{ src = \"back\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
              trans {{ src = \"leaving\", tgt = \"idle\", events = {{ \"{name}_gone.ok\" }} }},"
         )
     };
@@ -119,8 +122,8 @@ fn a_floor_of_one_coordinator_is_none_for_another() {
     };
     let said = Small::several(
         &format!("{}{}", of("arm", "a"), of("hand", "h")),
-        &[("arm", &own("arm", "a")), ("hand", &own("hand", "h"))],
-        "",
+        &[("arm", &own("arm", "a", "hand")), ("hand", &own("hand", "h", "arm"))],
+        "emits: [e_of_arm, e_of_hand]\n",
     )
     .check();
     for request in ["a_set.undo", "h_set.undo"] {

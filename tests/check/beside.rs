@@ -82,7 +82,9 @@ fn all_coordinators_are_driven_together() {
         &[("arm", &holder("arm", "")), ("gripper", &holder("gripper", ""))],
         "",
     );
-    for (way, requests) in [("--bringup", ["arm_base", "gripper_base"]), ("--shutdown", ["arm_base.undo", "gripper_base.undo"])] {
+    for (way, requests) in
+        [("--bringup", ["arm_base", "gripper_base"]), ("--shutdown", ["arm_base.undo", "gripper_base.undo"])]
+    {
         let json = small.demo.run(&["plan", "small.yaml", way, "--json"]).json();
         let asked = json.to_string();
         for request in requests {

@@ -20,7 +20,9 @@ fn a_safety_event_leads_to_a_safe_configuration_wherever_an_actuator_exists() {
         stop = Configuration { safe = true, property_set(\"a.gain\", 0.0) },";
     let stopped = "stopped = state { entry = \"stop\" }, trans { src = \"stopped\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"stop.undo\" },";
     let hears = |from: &[&str]| {
-        from.iter().map(|state| format!("trans {{ src = \"{state}\", tgt = \"stopped\", events = {{ \"e_estop\" }} }},")).collect::<String>()
+        from.iter()
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"stopped\", events = {{ \"e_estop\" }} }},"))
+            .collect::<String>()
     };
     let keys = "safety: [e_estop]\n";
     let some = Small::new(configurations, &format!("{STATES}{stopped}{}", hears(&["building", "up"])), keys).check();
@@ -49,7 +51,7 @@ fn a_safety_event_leads_to_a_safe_configuration_wherever_an_actuator_exists() {
 
 #[test]
 fn what_is_lost_is_heard_wherever_it_may_be_in_force() {
-    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" }, holds = { running = \"a\" } },";
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" }, holds = in_state(\"a\", \"running\") },";
     let demo = |more: &str| Small::new(configurations, &format!("{STATES}{more}"), "").check();
     let silent = demo("");
     let found = silent.of("coord::lost_unheard");
@@ -89,7 +91,10 @@ fn after_broken_safety_events_are_heard() {
         trans { src = \"building\", tgt = \"stopped\", events = { \"e_estop\" } }, trans { src = \"up\", tgt = \"stopped\", events = { \"e_estop\" } },
         trans { src = \"leaving\", tgt = \"stopped\", events = { \"e_estop\" } },";
     // In `failed` after `base.failed` there is no arm; after `base.broken` there may be one.
-    let broken = STATES.replace("trans { src = \"leaving\", tgt = \"failed\", events = { \"base.undo.failed\", \"base.undo.broken\" } },", "");
+    let broken = STATES.replace(
+        "trans { src = \"leaving\", tgt = \"failed\", events = { \"base.undo.failed\", \"base.undo.broken\" } },",
+        "",
+    );
     let said = Small::new(configurations, &format!("{broken}{more}"), "safety: [e_estop]\n").check();
     let found = said.of("coord::safety_unheard");
     assert_eq!(found.len(), 1, "{:#}", said.0);

@@ -19,7 +19,8 @@ fn a_push_that_fails_leaves_the_undo_of_its_batch_in_force() {
              trans {{ src = \"up\", tgt = \"idle\", events = {{ \"e_shutdown\" }} }},"
         )
     };
-    let configurations = "one = Configuration { create(\"a\", \"Drive\") }, two = Configuration { create(\"b\", \"Drive\") },
+    let configurations =
+        "one = Configuration { create(\"a\", \"Drive\") }, two = Configuration { create(\"b\", \"Drive\") },
         again = Configuration { create(\"a\", \"Drive\") }, uses = Configuration { property_set(\"a.gain\", 2.0) },";
     let made = Small::new(configurations, &states("again"), "").check();
     assert!(made.refused("again").iter().all(|(severity, _)| *severity == "info"), "{:#}", made.0);
@@ -56,8 +57,10 @@ fn a_safe_configuration_is_no_part_of_its_batch() {
 /// Answers of one batch come undos first, whatever the order in which they were raised.
 #[test]
 fn answers_come_undos_first() {
-    let configurations = format!("{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
-        two = Configuration {{ property_set(\"a.mode\", 1) }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},");
+    let configurations = format!(
+        "{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
+        two = Configuration {{ property_set(\"a.mode\", 1) }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},"
+    );
     let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"one\" },
         both = state { entry = { \"two\", \"one.undo\" } }, undone = state {}, pushed = state { entry = \"wrong\" },
         leaving = state { entry = { \"two.undo\", \"one.undo\", \"base.undo\" } },
@@ -78,16 +81,18 @@ fn answers_come_undos_first() {
 /// What is raised in two steps to rest is two batches: the push is tried though the undo before it failed.
 #[test]
 fn two_steps_to_rest_are_two_batches() {
-    let configurations = format!("{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
-        two = Configuration {{ create(\"b\", \"Drive\") }}, again = Configuration {{ create(\"b\", \"Drive\") }},");
+    let configurations = format!(
+        "{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }},
+        two = Configuration {{ create(\"b\", \"Drive\") }}, again = Configuration {{ create(\"b\", \"Drive\") }},"
+    );
     let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"one\" },
-        first = state { entry = \"one.undo\" }, second = state { entry = \"two\" }, waits = state {}, tried = state { entry = \"again\" },
+        first = state {}, second = state {}, waits = state {}, tried = state { entry = \"again\" },
         leaving = state { entry = { \"again.undo\", \"two.undo\", \"one.undo\", \"base.undo\" } },
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
         trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
-        trans { src = \"up\", tgt = \"first\", events = { \"e_both\" } },
-        trans { src = \"first\", tgt = \"second\", events = { \"e_done\" } },
+        trans { src = \"up\", tgt = \"first\", events = { \"e_both\" }, effect = \"one.undo\" },
+        trans { src = \"first\", tgt = \"second\", events = { \"e_done\" }, effect = \"two\" },
         trans { src = \"second\", tgt = \"waits\", events = { \"one.undo.failed\" } },
         trans { src = \"waits\", tgt = \"tried\", events = { \"e_again\" } },
         trans { src = \"second\", tgt = \"leaving\", events = { \"e_shutdown\" } },
@@ -104,7 +109,7 @@ fn two_steps_to_rest_are_two_batches() {
 fn two_ways(configurations: &str, ways: [&str; 2], then: &str) -> Said {
     let states = format!(
         "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{}},
-         left = state {{ entry = {{ {} }} }}, right = state {{ entry = {{ {} }} }}, both = state {{}}, then = state {{ entry = {{ {then} }} }},
+         left = state {{ entry = {{ {} }} }}, right = state {{ entry = {{ {} }} }}, both = state {{}}, next = state {{ entry = {{ {then} }} }},
          leaving = state {{ entry = \"all\" }},
          trans {{ src = \"initial\", tgt = \"idle\" }},
          trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
@@ -113,9 +118,9 @@ fn two_ways(configurations: &str, ways: [&str; 2], then: &str) -> Said {
          trans {{ src = \"up\", tgt = \"right\", events = {{ \"e_right\" }} }},
          trans {{ src = \"left\", tgt = \"both\", events = {{ \"e_both\" }} }},
          trans {{ src = \"right\", tgt = \"both\", events = {{ \"e_both\" }} }},
-         trans {{ src = \"both\", tgt = \"then\", events = {{ \"e_then\" }} }},",
+         trans {{ src = \"both\", tgt = \"next\", events = {{ \"e_then\" }} }},",
         ways[0], ways[1]
-    ) + &["building", "up", "left", "right", "both", "then"]
+    ) + &["building", "up", "left", "right", "both", "next"]
         .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
         .join(" ")
         + "trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },";
@@ -153,7 +158,7 @@ fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
     let states = |first: &str, second: &str| {
         format!(
             "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{}},
-             left = state {{ entry = \"{first}\" }}, right = state {{ entry = \"{second}\" }}, both = state {{}}, then = state {{ entry = \"five\" }},
+             left = state {{ entry = \"{first}\" }}, right = state {{ entry = \"{second}\" }}, both = state {{}}, next = state {{ entry = \"five\" }},
              failed = state {{ entry = \"wrong\" }}, leaving = state {{ entry = \"all\" }},
              trans {{ src = \"initial\", tgt = \"idle\" }},
              trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
@@ -162,9 +167,9 @@ fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
              trans {{ src = \"up\", tgt = \"right\", events = {{ \"e_right\" }} }},
              trans {{ src = \"left\", tgt = \"both\", events = {{ \"{first}.ok\" }} }},
              trans {{ src = \"right\", tgt = \"both\", events = {{ \"{second}.ok\" }} }},
-             trans {{ src = \"both\", tgt = \"then\", events = {{ \"e_then\" }} }},
-             trans {{ src = \"then\", tgt = \"failed\", events = {{ \"five.failed\" }} }},"
-        ) + &["building", "up", "left", "right", "both", "then", "failed"]
+             trans {{ src = \"both\", tgt = \"next\", events = {{ \"e_then\" }} }},
+             trans {{ src = \"next\", tgt = \"failed\", events = {{ \"five.failed\" }} }},"
+        ) + &["building", "up", "left", "right", "both", "next", "failed"]
             .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
             .join(" ")
             + "trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },"
@@ -181,9 +186,11 @@ fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
 /// A state that is met first behind an undo that fails, and later without any failure.
 #[test]
 fn a_state_is_judged_by_its_best_way() {
-    let configurations = format!("{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},");
+    let configurations = format!(
+        "{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},"
+    );
     let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, undoing = state { entry = \"base.undo\" },
-        one = state {}, two = state {}, three = state {}, both = state {}, then = state { entry = \"wrong\" },
+        one = state {}, two = state {}, three = state {}, both = state {}, next = state { entry = \"wrong\" },
         leaving = state { entry = \"all\" },
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
@@ -195,14 +202,14 @@ fn a_state_is_judged_by_its_best_way() {
         trans { src = \"one\", tgt = \"two\", events = { \"e_two\" } },
         trans { src = \"two\", tgt = \"three\", events = { \"e_three\" } },
         trans { src = \"three\", tgt = \"both\", events = { \"e_both\" } },
-        trans { src = \"both\", tgt = \"then\", events = { \"e_then\" } },
+        trans { src = \"both\", tgt = \"next\", events = { \"e_then\" } },
         trans { src = \"building\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"one\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"two\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"three\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"both\", tgt = \"leaving\", events = { \"e_shutdown\" } },
-        trans { src = \"then\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"next\", tgt = \"leaving\", events = { \"e_shutdown\" } },
         trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },";
     let said = Small::new(&configurations, states, "").check();
     let refused = said.of("coord::request_refused").into_iter();

@@ -21,7 +21,11 @@ fn verdict(small: &Small) -> (String, i32, i32, String) {
 
 #[test]
 fn sound_is_said_only_of_what_is_sound() {
-    let sound = Small::new(CONFIGURATIONS, &UP_AND_DOWN.replace("\"e_shutdown\", \"base.undo.failed\"", "\"base.undo.failed\""), "");
+    let sound = Small::new(
+        CONFIGURATIONS,
+        &UP_AND_DOWN.replace("\"e_shutdown\", \"base.undo.failed\"", "\"base.undo.failed\""),
+        "",
+    );
     let (word, code, strict, text) = verdict(&sound);
     assert_eq!((word.as_str(), code, strict), ("sound", 0, 0), "{text}");
     assert!(text.starts_with("small: sound;"), "{text}");
@@ -31,7 +35,8 @@ fn sound_is_said_only_of_what_is_sound() {
     assert_eq!((word.as_str(), code, strict), ("warnings", 0, 1), "{text}");
     assert!(text.contains("has warnings") && !text.contains("sound"), "{text}");
     // An error.
-    let refused = Small::new(&format!("{CONFIGURATIONS} base2 = Configuration {{ destroy(\"nobody\") }},"), UP_AND_DOWN, "");
+    let refused =
+        Small::new(&format!("{CONFIGURATIONS} base2 = Configuration {{ destroy(\"nobody\") }},"), UP_AND_DOWN, "");
     let (word, code, strict, _) = verdict(&refused);
     assert_eq!((word.as_str(), code, strict), ("refused", 1, 1));
 }
@@ -42,7 +47,8 @@ fn a_bound_that_cuts_something_off_is_told() {
     let states = UP_AND_DOWN.replace("idle = state {},", "idle = state {}, more = state { entry = \"set\" },")
         + "trans { src = \"up\", tgt = \"more\", events = { \"e_more\" } }, trans { src = \"more\", tgt = \"more\", events = { \"e_more\", \"set.failed\", \"set.broken\" } },
            trans { src = \"more\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
-    let configurations = format!("{CONFIGURATIONS} set = Configuration {{ group = \"g\", property_set(\"a.gain\", 2.0) }},");
+    let configurations =
+        format!("{CONFIGURATIONS} set = Configuration {{ group = \"g\", property_set(\"a.gain\", 2.0) }},");
     let small = Small::new(&configurations, &states, "");
     let json = small.demo.run(&["check", "small.yaml", "--json"]).json();
     assert_eq!(json["explored"]["complete"], false, "{json:#}");
