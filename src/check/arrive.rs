@@ -60,9 +60,7 @@ impl Product<'_> {
         state.due.retain(|(request, _)| request.tag.0 != 0);
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
-        if let Some(batch) = &mut state.flight {
-            batch.requests.iter_mut().for_each(gone);
-        }
+        state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
         for (_, stop) in &mut state.stopped {
             if let Stop::GivenUp(undo) = stop {
                 gone(undo);
@@ -86,11 +84,15 @@ impl Product<'_> {
     }
 
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
-    pub(super) fn arrive(&mut self, state: State, batch: Batch) -> Vec<State> {
+    pub(super) fn arrive(&mut self, mut state: State, batch: Batch) -> Vec<State> {
+        if !state.flight.is_empty() {
+            state.flight.push(batch);
+            return vec![state];
+        }
         let stops = self.stopped_by(&state, &batch);
         let mut states = Vec::with_capacity(1);
-        if self.races && !stops.is_empty() && state.flight.is_none() {
-            states.push(State { flight: Some(Box::new(batch.clone())), ..state.clone() });
+        if self.races && !stops.is_empty() {
+            states.push(State { flight: vec![batch.clone()], ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
             if batch.requests.iter().any(is_safe) {
                 let mut waits = state.clone();

@@ -122,8 +122,8 @@ impl Product<'_> {
         for undo in late {
             next = self.take_in(next, Batch::one(undo));
         }
-        if let Some(batch) = next.flight.take() {
-            next = self.take_in(next, *batch);
+        for batch in std::mem::take(&mut next.flight) {
+            next = self.take_in(next, batch);
         }
         self.tell(next, answers, failed, nexts);
     }

@@ -335,7 +335,7 @@ impl Graph<'_, '_> {
         state.unconfirmed.clear();
         // What it interrupts may be over before, or not have begun: all the same where nothing is known.
         state.safe.retain(|request| request.requester != Requester::Operator);
-        state.flight = None;
+        state.flight.clear();
         (state, failed.max(Failed::Undo))
     }
 

@@ -60,7 +60,9 @@ impl Graph<'_, '_> {
             let trace = self.trace(at);
             let finding = self.refused(at, &request, &reasons);
             // The reasons are findings of their own, each at its place.
-            let own = finding.code == COORD_REQUEST_REFUSED && self.failed[at as usize] == Failed::Nothing;
+            let number = self.product.member(request.requester);
+            let made = number.is_some_and(|n| self.maker(n, &self.states[at as usize], request.ask).is_some());
+            let own = finding.code == COORD_REQUEST_REFUSED && self.failed[at as usize] == Failed::Nothing && !made;
             let severity = finding.severity;
             found.push((finding, trace.clone()));
             for reason in reasons.iter().filter(|reason| own && reason.origin.is_some()) {
@@ -282,7 +284,10 @@ impl Graph<'_, '_> {
             named.dedup();
             named.truncate(6);
             let leaf = self.states[at as usize].leaves[0];
-            let finding = Finding::warning(
+            let behind_undo = self.failed[at as usize] >= Failed::Undo;
+            let severity = if behind_undo { Severity::Info } else { Severity::Warning };
+            let finding = Finding::new(
+                severity,
                 COORD_ENDLESS,
                 format!("answers go round for ever, with nothing failing and no time passing: {}", named.join(", ")),
             )
@@ -359,9 +364,6 @@ impl Graph<'_, '_> {
             (!left.is_empty()).then_some((at, left))
         });
         let Some((at, left)) = first else { return };
-        if self.product.others {
-            return;
-        }
         let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
         let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
         let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))

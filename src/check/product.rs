@@ -83,19 +83,21 @@ pub struct State {
     pub down: u64,
     /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.
     pub stopping: bool,
-    /// A batch on its way that would stop what is under way; what it would stop ends before.
-    pub flight: Option<Box<Batch>>,
+    /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
+    pub flight: Vec<Batch>,
 }
 
 impl State {
-    /// Batches of a requester that are not answered.
+    /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.
     pub fn outstanding(&self, by: Requester) -> usize {
-        let of = |batch: &Batch| batch.requests.first().is_some_and(|request| request.requester == by);
-        let under_way = self.desk.under_way().iter().filter(|turn| of(&turn.batch)).count();
+        let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);
+        let under_way = self.desk.under_way().iter().map(|turn| &turn.batch);
+        let (downs, batches): (Vec<&Batch>, Vec<&Batch>) =
+            under_way.chain(self.desk.waiting()).filter(first).partition(|batch| batch.requests[0].why == Why::Down);
         let due = usize::from(self.due.iter().any(|(request, _)| request.requester == by));
         let safe = self.safe.iter().filter(|request| request.requester == by).count();
         let given_up = self.undos().filter(|undo| undo.requester == by).count();
-        under_way + due + safe + given_up + self.desk.waiting().filter(|batch| of(batch)).count()
+        batches.len() + downs.len().saturating_sub(1) + due + safe + given_up
     }
 
     /// Undos that give something up.
@@ -118,7 +120,7 @@ impl State {
             && self.safe.is_empty()
             && self.due.is_empty()
             && self.inbox.is_empty()
-            && self.flight.is_none()
+            && self.flight.is_empty()
     }
 }
 
@@ -269,7 +271,7 @@ impl<'a> Product<'a> {
             lost: SmallVec::new(),
             down: 0,
             stopping: false,
-            flight: None,
+            flight: Vec::new(),
         };
         let mut states = vec![state];
         for (by, reaction) in entered.iter().enumerate() {
@@ -282,7 +284,7 @@ impl<'a> Product<'a> {
     /// All that follows from a state.
     pub fn nexts(&mut self, state: &State) -> Nexts {
         let mut nexts = Nexts::default();
-        if let Some(batch) = &state.flight {
+        if let Some(batch) = state.flight.first() {
             // It comes once one of those that it would stop is over.
             for number in self.stopped_by(state, batch) {
                 self.ends(state, number, &mut nexts);

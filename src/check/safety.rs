@@ -20,7 +20,7 @@ impl Graph<'_, '_> {
             let mut places: Vec<String> = Vec::new();
             for at in &order {
                 let state = &self.states[*at as usize];
-                let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_none());
+                let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_empty());
                 if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
                     continue;
                 }

@@ -28,11 +28,12 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     if !rises {
         found.push((stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"), up));
     }
-    let (Some(fall), Some(down)) = (fall, down) else { return found };
-    if !falls {
-        found.push((stops(product, &fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"), down));
-    } else if let Some(finding) = leftovers(product, fall.end()) {
-        found.push((finding, down));
+    if let (Some(fall), Some(down)) = (fall, down) {
+        if !falls {
+            found.push((stops(product, &fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"), down));
+        } else if let Some(finding) = leftovers(product, fall.end()) {
+            found.push((finding, down));
+        }
     }
     for (finding, _) in &mut found {
         // What functions decide is not known here.

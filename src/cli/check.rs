@@ -6,7 +6,7 @@ use super::output::Style;
 use super::{Answer, Context, Run};
 use crate::check::{self, Explored, Report, TraceStep, Verdict};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS, CHECK_WAITING};
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS};
 use crate::model::{Finding, Severity};
 use serde_json::json;
 
@@ -135,8 +135,7 @@ fn bounds(explored: &Explored) -> Vec<String> {
         return lines;
     }
     lines.push(format!(
-        "at most {CHECK_WAITING} batches of one coordinator wait at once, and {CHECK_FRAMES} frames of one configuration \
-         are in force ({CHECK_LEFT} where undoing failed)"
+        "at most {CHECK_FRAMES} frames of one configuration are in force ({CHECK_LEFT} where undoing failed)"
     ));
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };

@@ -10,7 +10,7 @@ types:
   Drive:
     ports:
       out: { direction: out, type: float }
-      in: { direction: in, type: float, buffered: true }
+      in: { direction: in, type: float }
     properties:
       gain: { type: float, default: 1.0 }
       mode: { type: int, default: 0, tunable: stopped }
