@@ -110,6 +110,12 @@ impl Product<'_> {
 
     /// A batch comes to the desk.
     pub(super) fn take_in(&mut self, mut state: State, batch: Batch) -> State {
+        // To come to *down* twice with nothing asked for in between is to come once.
+        let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
+        let same = |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
+        if is_down(&batch) && state.desk.waiting().filter(same).last().is_some_and(is_down) {
+            return state;
+        }
         let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         for (request, verdict, _) in &arrival.told {

@@ -102,6 +102,8 @@ pub struct Report {
     pub traces: Vec<Vec<TraceStep>>,
     /// How far the coordinators were followed.
     pub explored: Explored,
+    /// What was left out: one bound each.
+    pub left: Vec<String>,
     /// What it comes to.
     pub verdict: Verdict,
 }
@@ -147,9 +149,10 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     }
     traced.sort_by_key(|(finding, _)| Reverse(finding.severity));
     let (findings, traces): (Findings, Vec<_>) = traced.into_iter().unzip();
-    let verdict = Verdict::of(&findings, charts.len() == all, left.into_iter().collect());
+    let left: Vec<String> = left.into_iter().collect();
+    let verdict = Verdict::of(&findings, charts.len() == all, left.clone());
     let checked = (verdict != Verdict::Refused).then(|| Checked(shared.clone()));
-    Report { checked, findings, traces, explored, verdict }
+    Report { checked, findings, traces, explored, left, verdict }
 }
 
 /// Follows the coordinators, those together that have to do with each other. `left` is told what was left out.

@@ -38,6 +38,7 @@ impl Run for Args {
                     traces: Vec::new(),
                     findings: failure.findings,
                     explored: Explored::default(),
+                    left: Vec::new(),
                     verdict: Verdict::Refused,
                 };
                 print_json(context, &report, &failure.sources);
@@ -89,9 +90,7 @@ impl Run for Args {
             }
         };
         out.line(format!("{name}: {verdict}{reach}"));
-        if let Verdict::Followed { left } = &report.verdict {
-            left.iter().for_each(|left| out.line(format!("  {left}")));
-        }
+        report.left.iter().for_each(|left| out.line(format!("  {left}")));
         for line in bounds(&explored) {
             out.line(out.paint(Style::Dim, format!("  {line}")));
         }
@@ -112,16 +111,12 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
             finding["trace"] = json!(trace);
         }
     }
-    let left = match &report.verdict {
-        Verdict::Followed { left } => left.as_slice(),
-        _ => &[],
-    };
     let trace: Vec<String> =
         first_trace(report).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
     context.out.json(&json!({
         "ok": report.verdict != Verdict::Refused,
         "verdict": report.verdict.word(),
-        "left": left,
+        "left": report.left,
         "findings": findings,
         "explored": report.explored,
         "trace": trace,
