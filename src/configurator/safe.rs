@@ -94,6 +94,7 @@ impl Engine {
                 }
             }
             // Calls that are out are told first.
+            self.running[at].stop_brief();
             self.advance(at);
         }
         before

@@ -44,7 +44,7 @@ impl Engine {
 
     fn take_down(&mut self, forced: bool, deadline: Time) -> TakenDown {
         let mut down = TakenDown::default();
-        self.refuse_waiting();
+        self.glance();
         self.confirming.clear();
         if forced {
             // Not after what is out has come in: now.
@@ -52,6 +52,7 @@ impl Engine {
             self.apply_all_safe(&mut down);
         }
         self.end_running(forced);
+        self.refuse_waiting();
         if !forced && self.world.broken.is_empty() {
             self.pop_all(&mut down, deadline);
         }

@@ -100,7 +100,8 @@ impl Transaction {
     pub(super) fn way_back(&self, part: usize, live: &System) -> WayBack {
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut way = WayBack::default();
-        if self.taken_down {
+        let held = self.planned.parts[part].on_failure == OnFailure::Hold && !self.asked_back;
+        if self.taken_down || held && part == 0 {
             return way;
         }
         let mut ends: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
@@ -112,7 +113,7 @@ impl Transaction {
         }
         let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
         for i in forward.done.iter().rev().copied() {
-            if self.taken_back.contains(&i) || self.part_of(i) < part {
+            if held || self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
             let late = forward.late.iter().find(|(late, _)| *late == i).map(|(_, undo)| undo);

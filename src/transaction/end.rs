@@ -103,7 +103,7 @@ impl Transaction {
     /// Whether a difference may be mended by itself.
     fn mends(&self, part: usize) -> bool {
         let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
-        !held && self.withheld.is_none() && !self.taken_down
+        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
     }
 
     /// The system as it should be now, from the model: without the faults that this brought about, and, where nothing keeps

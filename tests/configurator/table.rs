@@ -188,14 +188,15 @@ fn a_queued_request_is_cancelled_by_its_undo() {
 }
 
 #[test]
-fn what_has_begun_is_not_cancelled() {
+fn what_has_begun_is_given_up_by_its_undo() {
     let rig = up();
     rig.inject("stop B", Fault::LostAnswer);
     rig.submit("switch");
     rig.wait(0.01);
     rig.submit("switch.undo");
     rig.wait(100.0);
-    assert_eq!(rig.events()[3..], ["switch.ok", "switch.undone"]);
+    assert_eq!(rig.events()[3..], ["switch.cancelled", "switch.undone"], "{:?}", rig.last());
+    assert_eq!(rig.frames(), ["make", "wire", "run"]);
     rig.in_step();
 }
 
