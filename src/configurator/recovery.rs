@@ -211,7 +211,7 @@ impl Engine {
         self.note_quarantine();
         let mut at = 0;
         while at < self.world.broken.len() {
-            if self.world.broken[at].mendable && self.world.broken[at].residual.unsettled.is_empty() && self.repair(at, false).is_ok() {
+            if self.world.broken[at].mendable && self.repair(at, false).is_ok() {
                 if let Some(progress) = &self.progress {
                     progress(&Progress::Recovered);
                 }

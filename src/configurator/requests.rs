@@ -216,7 +216,7 @@ impl Engine {
                 Some(of)
             }
             (Some(frame), None) => Some(self.push_partial(frame)),
-            (None, _) => None,
+            (None, of) => of,
         };
         if !residual.is_settled() {
             let components = residual.components().collect();

@@ -117,7 +117,7 @@ impl Transaction {
                 continue;
             }
             let late = forward.late.iter().find(|(late, _)| *late == i).map(|(_, undo)| undo);
-            let undo = late.unwrap_or_else(|| self.undo_of(i));
+            let undo = late.unwrap_or_else(|| self.undo_of(i, part));
             let original = &forward.list[i as usize];
             let mut after: SmallVec<[u32; 4]> =
                 followers[i as usize].iter().flat_map(|f| ends[*f as usize].clone()).collect();
@@ -157,12 +157,19 @@ impl Transaction {
         self.planned.part_of(self.planned.place(i as usize))
     }
 
-    /// What takes a step of the forward list back: to where the parts before it have led, not to before all of them.
-    pub(super) fn undo_of(&self, i: u32) -> &Undo {
-        match self.planned.place(i as usize) {
-            Some(place) => &self.whole()[place as usize].undo,
-            None => &self.forward.as_ref().expect("something was carried out").list[i as usize].undo,
-        }
+    /// What takes a step of the forward list back, to where the parts before `part` have led.
+    pub(super) fn undo_of(&self, i: u32, part: usize) -> &Undo {
+        let forward = &self.forward.as_ref().expect("something was carried out").list[i as usize];
+        // The net was planned on the system before all of them.
+        let Some(place) = self.planned.place(i as usize).filter(|_| part > 0 && !self.planned.of.is_empty()) else {
+            return &forward.undo;
+        };
+        let whole = self.whole();
+        let Some(slot) = crate::system::touch::absolute(&forward.step) else { return &whole[place as usize].undo };
+        // An earlier write of the same slot may have been left out of the net.
+        let from = self.planned.parts[part].range.start as usize;
+        let first = whole[from..].iter().find(|planned| crate::system::touch::absolute(&planned.step) == Some(slot));
+        &first.unwrap_or(&whole[place as usize]).undo
     }
 
     /// Adds what is missing of the parts before `part`: they were to stand whatever comes after them.

@@ -60,7 +60,7 @@ impl Transaction {
             ..Residual::of(self.reason())
         };
         let own = self.own();
-        let broken = self.broken(0, residual, live.snapshot_some(&own));
+        let broken = self.broken(0, residual, live.snapshot_some(&own), false);
         self.over(vec![broken]);
     }
 
@@ -94,7 +94,7 @@ impl Transaction {
     fn remaining(&self, part: usize) -> Vec<u32> {
         let forward = self.forward.as_ref().expect("it was carried out");
         let left = |i: &u32| {
-            let needs = !matches!(self.undo_of(*i), Undo::Nothing);
+            let needs = !matches!(self.undo_of(*i, part), Undo::Nothing);
             needs && !self.taken_back.contains(i) && self.part_of(*i) >= part
         };
         forward.done.iter().copied().filter(left).collect()
@@ -118,13 +118,13 @@ impl Transaction {
         }
         let remaining = self.remaining(part);
         let plain = |i: &u32| {
-            let steps = self.undo_of(*i).steps();
+            let steps = self.undo_of(*i, part).steps();
             !steps.is_empty() && steps.iter().all(|step| !matches!(step, Step::Operation(_)))
         };
         let whole = self.mends(part) && remaining.iter().all(plain);
         if whole {
             for i in remaining.iter().rev() {
-                for back in self.undo_of(*i).steps() {
+                for back in self.undo_of(*i, part).steps() {
                     let _ = step::apply(back, &mut wanted);
                 }
             }
@@ -137,7 +137,7 @@ impl Transaction {
         let part = self.failed_part();
         let own = self.own();
         let (wanted, whole) = match self.target.take() {
-            Some(target) => (*target, true),
+            Some(target) => *target,
             None => self.wanted(part, live),
         };
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
@@ -151,7 +151,7 @@ impl Transaction {
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
             if !steps.is_empty() && (asked || !steps.iter().any(|step| step::moves(step, live))) {
-                return self.mend(steps, wanted);
+                return self.mend(steps, (wanted, whole));
             }
         }
         self.judge(part, &wanted, whole, observed, live, can);
@@ -189,7 +189,7 @@ impl Transaction {
             difference,
             unsettled: unsettled.clone(),
             irreversible: (remaining.iter())
-                .filter(|i| matches!(self.undo_of(**i), Undo::Irreversible(_)))
+                .filter(|i| matches!(self.undo_of(**i, part), Undo::Irreversible(_)))
                 .map(|i| forward.list[*i as usize].step.clone())
                 .collect(),
             faulted,
@@ -204,12 +204,12 @@ impl Transaction {
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if at < part {
-                if missing.contains(&at) { self.broken(at, Residual::of(self.reason()), Snapshot::default()) } else { PartEnd::Done }
+                if missing.contains(&at) { self.broken(at, Residual::of(self.reason()), Snapshot::default(), false) } else { PartEnd::Done }
             } else if at == part {
                 match (clean, self.given_up) {
                     (true, Some(_)) if matches!(self.stopped_by, Some(Reason::GivenUp)) => PartEnd::Cancelled,
                     (true, _) => PartEnd::Failed(self.reason()),
-                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own)),
+                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
                 }
             } else if self.interrupted || self.taken_down {
                 PartEnd::Failed(self.reason())
@@ -234,12 +234,15 @@ impl Transaction {
         places.map(|place| self.planned.part_of(Some(place))).filter(|at| *at < part).collect()
     }
 
-    /// A part that is neither done nor taken back.
-    fn broken(&self, part: usize, residual: Residual, expected: Snapshot) -> PartEnd {
+    /// A part that is neither done nor taken back. `whole`: going to `expected` takes all of it back, and its frame has
+    /// nothing to add to that.
+    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool) -> PartEnd {
         let planned = &self.planned.parts[part];
         let forward = self.forward.as_ref().expect("it was carried out");
         let undone = planned.pushes.is_none();
-        let items: Vec<Item> = if undone {
+        let items: Vec<Item> = if whole && !undone {
+            Vec::new()
+        } else if undone {
             // What is still to be undone of the frame.
             let done: FxHashSet<u32> = (forward.done.iter())
                 .filter(|i| !self.taken_back.contains(*i))
@@ -251,7 +254,7 @@ impl Transaction {
             let left = self.remaining(part).into_iter().filter(|i| self.part_of(*i) == part).rev();
             left.flat_map(|i| {
                 let of = &forward.list[i as usize];
-                self.undo_of(i).steps().iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
+                self.undo_of(i, part).steps().iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
             })
             .collect()
         };
@@ -280,6 +283,8 @@ impl Transaction {
         });
         let instead = if undone { frame.as_ref().map(|frame| frame.id) } else { None };
         let residual = Arc::new(residual);
+        // Of a frame that was being undone nothing is: it stays as it is.
+        let frame = frame.filter(|_| !(whole && undone));
         PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected }))
     }
 }

@@ -146,8 +146,8 @@ pub struct Transaction {
     reading: bool,
     seen: Option<Option<Snapshot>>,
     cancels: Vec<u32>,
-    /// What the components are compared with.
-    target: Option<Box<System>>,
+    /// What the components are compared with after mending, and whether that has nothing of what was done.
+    target: Option<Box<(System, bool)>>,
     end: Option<End>,
 }
 
@@ -254,7 +254,7 @@ impl Transaction {
     pub fn done_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &crate::system::Undo)> {
         let forward = self.forward.as_ref().expect("something was carried out");
         let open = forward.done.iter().copied().filter(|i| !self.taken_back.contains(i));
-        open.map(|i| (&forward.list[i as usize], self.undo_of(i)))
+        open.map(|i| (&forward.list[i as usize], self.undo_of(i, 0)))
     }
 
     /// What failed so far, and what nobody knows of.
@@ -383,7 +383,7 @@ impl Transaction {
             return None;
         }
         if self.reading {
-            let seen = self.seen.take()?;
+            let Some(seen) = self.seen.take() else { return Some(Poll::Wait) };
             self.reading = false;
             self.in_hand_mut().settle_by(seen.as_ref(), live);
             return None;
@@ -513,7 +513,7 @@ impl Transaction {
     }
 
     /// Mends the difference between what is there and what should be.
-    fn mend(&mut self, steps: Vec<Step>, target: System) {
+    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.target = Some(Box::new(target));
         let list = chain(steps);
         self.back = Some((Run::new(list, Time::NEVER), WayBack::default()));

@@ -1,7 +1,6 @@
 //! Prepared switches do what the ordinary way does, and give way to it when they no longer fit.
 
 use crate::rig::*;
-use davit::configurator::Requester;
 use davit::model::*;
 use davit::platform::simulated::{Options, Simulated};
 use davit::platform::*;

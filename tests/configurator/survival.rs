@@ -1,7 +1,7 @@
 //! Hung components, silent platforms, faults, panics, irreversible steps: named, bounded, survived.
 
 use crate::rig::*;
-use davit::configurator::{Reason, Recovery, Requester};
+use davit::configurator::{Reason, Recovery};
 use davit::model::*;
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
 use davit::platform::*;
