@@ -11,7 +11,7 @@ use super::request::{Reason, Request, Residual};
 use super::touched::Touched;
 use super::transaction::{Interruption, Left};
 use super::work::Item;
-use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
+use crate::model::{Ask, Change, ConfigId, Configuration, StateList, Target, Verdict};
 use crate::plan;
 use crate::system::{System, step};
 use crate::time::Time;
@@ -146,7 +146,7 @@ impl Engine {
     pub(super) fn apply_safe(&mut self, id: ConfigId, between: &mut Interruption) -> Effort {
         let configurations = self.configurations.clone();
         let Some(configuration) = configurations.get(&id) else { return Effort::default() };
-        for entry in configuration.pre.iter().chain(&configuration.post) {
+        for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
                 between.touched.add_state(component);
             }
@@ -226,9 +226,10 @@ fn first(effort: &Effort) -> Reason {
 /// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.
 fn pieces(whole: &Configuration) -> Vec<Configuration> {
     let empty = || Configuration::new(whole.id);
-    let pre = whole.pre.iter().map(|entry| Configuration { pre: vec![*entry], ..empty() });
+    let one = |entry| StateList::of([entry]).expect("one `_default` at most");
+    let pre = whole.pre.iter().map(|entry| Configuration { pre: one(entry), ..empty() });
     let changes =
         whole.changes.iter().map(|change: &Change| Configuration { changes: vec![change.clone()], ..empty() });
-    let post = whole.post.iter().map(|entry| Configuration { post: vec![*entry], ..empty() });
+    let post = whole.post.iter().map(|entry| Configuration { post: one(entry), ..empty() });
     pre.chain(changes).chain(post).collect()
 }

@@ -77,11 +77,11 @@ fn conf(id: &str, pre: &[&str], changes: Vec<ChangeKind>, post: &[&str]) -> Conf
             "_default" => Target::Default,
             name => Target::Component(ComponentName::new(name).unwrap()),
         };
-        StateEntry { target, state: RunState::from_name(state).unwrap(), origin }
+        StateEntry { target, state: RunState::from_name(state).and_then(RunState::wanted).unwrap(), origin }
     };
-    conf.pre = pre.iter().map(|t| entry(t, next())).collect();
+    conf.pre = StateList::of(pre.iter().map(|t| entry(t, next()))).unwrap();
     conf.changes = changes.into_iter().map(|kind| Change { kind, origin: next() }).collect();
-    conf.post = post.iter().map(|t| entry(t, next())).collect();
+    conf.post = StateList::of(post.iter().map(|t| entry(t, next()))).unwrap();
     conf
 }
 
@@ -296,8 +296,6 @@ fn lists() {
     assert_eq!(on(&["C:stopped"], vec![create("C", "t.Gain", &[])], &[]), [("conf::pre_on_created", 1, vec![2])]);
     let gone = vec![disconnect("A.y", "B.u"), destroy("B")];
     assert_eq!(on(&[], gone, &["B:stopped"]), [("conf::post_on_destroyed", 3, vec![2])]);
-    assert_eq!(on(&["_default:stopped", "_default:running"], vec![], &[]), [("conf::default_twice", 2, vec![1])]);
-    assert_eq!(on(&["A:faulted"], vec![], &[]), [("conf::faulted_demanded", 1, vec![])]);
     assert_eq!(on(&[], vec![], &["C:running"]), [("conf::unknown_component", 1, vec![])]);
     // A property that needs `stopped`, after an entry that starts; and one that is enough.
     assert_eq!(on(&["A:stopped", "A:running"], vec![set("A.k", 2)], &[]), [("conf::not_tunable", 3, vec![91])]);

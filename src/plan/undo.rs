@@ -5,7 +5,7 @@
 
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
-use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition};
+use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -69,7 +69,7 @@ pub struct Script<'o, 's> {
     /// The steps so far.
     pub steps: Vec<PlannedStep>,
     /// Where failed components are to go, once something needs them there.
-    goals: BTreeMap<ComponentName, (RunState, Stage, Origin)>,
+    goals: BTreeMap<ComponentName, (Wanted, Stage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
     failed: BTreeSet<ComponentName>,
 }
@@ -107,7 +107,7 @@ impl<'o, 's> Script<'o, 's> {
                 let state = self.view.component(component).map(|n| n.state);
                 if state == Some(RunState::Faulted) || self.failed.contains(&component) {
                     self.failed.insert(component);
-                    self.goals.insert(component, (transition.target(), item.stage, item.origin));
+                    self.goals.insert(component, (transition.wanted(), item.stage, item.origin));
                     return Ok(None);
                 }
             }
@@ -133,7 +133,7 @@ impl<'o, 's> Script<'o, 's> {
     /// Brings a failed component to where it is to be.
     fn settle(&mut self, component: ComponentName, wave: u32) -> Result<(), Vec<Violation>> {
         let Some((goal, stage, origin)) = self.goals.remove(&component) else { return Ok(()) };
-        let state = self.view.component(component).map_or(goal, |n| n.state);
+        let state = self.view.component(component).map_or(goal.into(), |n| n.state);
         for transition in state.path_to(goal) {
             let step = Step::State { component, transition: *transition };
             self.push(Item::bare(step, stage, origin), wave, &[])?;

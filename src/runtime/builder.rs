@@ -6,7 +6,7 @@
 use super::beat::Beat;
 use super::component::{Answer, Arguments, Component, Context, HookResult, Reply, Returned};
 use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
-use super::probe::{Probes, ProbesEnd, Wanted};
+use super::probe::{Observed, Probes, ProbesEnd};
 use super::property::{Prop, PropEnd};
 use super::value::PortValue;
 use crate::model::monitor::Condition;
@@ -435,7 +435,7 @@ impl<C: Component> Builder<C> {
     }
 
     /// Probes of what is `wanted`, beside connections. They come and go with what they look at; a component has one set.
-    pub fn probes(&mut self, wanted: Arc<[Wanted]>) -> Probes {
+    pub fn probes(&mut self, wanted: Arc<[Observed]>) -> Probes {
         match &mut self.mode {
             Mode::Describe(_) => Probes::loose(),
             Mode::Make(m) => {
