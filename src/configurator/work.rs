@@ -20,6 +20,9 @@ pub(super) fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4
         step,
         reversibility: Reversibility::Exact,
         undo: Undo::Nothing,
+        // Nobody asks this of a step that stands alone: it is done because somebody wants it done.
+        moves: false,
+        undo_moves: false,
         origin: Origin::NONE,
     }
 }

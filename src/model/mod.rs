@@ -2,6 +2,7 @@
 
 pub mod codes;
 pub mod component_type;
+mod condition_walk;
 pub mod configuration;
 pub mod deployment;
 pub mod event;

@@ -124,8 +124,8 @@ impl Switch {
         }
         let index = system.index_of(name)?;
         let node = system.node_at(index)?;
-        let never = node.ty.irreversible;
-        if never.configure || never.stop {
+        let (never, moves) = (node.ty.irreversible, node.ty.moves);
+        if never.configure || never.stop || moves.start || moves.stop {
             return None;
         }
         self.parts.push(Part { name, index, born: node.born, state: node.state });
@@ -388,6 +388,9 @@ impl Switch {
                 reversibility: step::reversibility(&step, &undo),
                 step,
                 undo,
+                // What moves is not prepared.
+                moves: false,
+                undo_moves: false,
                 origin: self.origin(*act),
             });
         }

@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, Refusal, Stage, plan};
+use super::{Context, Plan, PlannedStep, Refusal, Stage, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,6 +51,7 @@ fn types() -> Arc<Catalogue> {
         (ident("open"), operation(Effect::Undo(ident("close")))),
         (ident("close"), operation(Effect::None)),
         (ident("weld"), operation(Effect::Irreversible)),
+        (ident("swing"), OperationType { moves: true, ..operation(Effect::Undo(ident("swing"))) }),
     ]);
     gain.start_after = vec![TypeName::new("t.Motor").unwrap()];
     let mut motor = ComponentType::new("t.Motor", "moves");
@@ -58,6 +59,7 @@ fn types() -> Arc<Catalogue> {
     motor.ports = gain.ports.clone();
     motor.properties.insert(ident("id"), property("int", None, Tunable::Unconfigured));
     motor.irreversible.destroy = true;
+    motor.moves.start = true;
     let mut catalogue = Catalogue::new();
     catalogue.insert(gain);
     catalogue.insert(motor);
@@ -334,6 +336,33 @@ fn reversibility_is_known_beforehand() {
     assert!(attempt(&base(), &meant).unwrap().warnings.is_empty());
     let named = conf("c", &[], vec![call("A.weld", Some("B.open"))], &[]);
     assert_eq!(attempt(&base(), &named).unwrap().steps[0].reversibility, Reversibility::Compensated);
+}
+
+#[test]
+fn what_moves_is_known_beforehand() {
+    let moving = |undo: &str, moves: bool, undo_moves: bool| {
+        let plan = attempt(&base(), &conf("c", &[], vec![call("B.swing", (!undo.is_empty()).then_some(undo))], &[]));
+        let plan = plan.unwrap();
+        assert_eq!((plan.steps[0].moves, plan.steps[0].undo_moves), (moves, undo_moves), "{undo}");
+    };
+    moving("", true, true);
+    moving("B.open", true, false);
+    moving("B.swing", true, true);
+    let back = attempt(&base(), &conf("c", &[], vec![call("B.open", Some("B.swing"))], &[])).unwrap();
+    assert_eq!((back.steps[0].moves, back.steps[0].undo_moves), (false, true));
+    // Of a component that this plan creates, too; and what it destroys is stopped first.
+    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
+    let flags = |plan: &Plan| {
+        let one = |s: &PlannedStep| (s.step.to_string(), s.moves, s.undo_moves);
+        plan.steps.iter().map(one).filter(|(_, a, b)| *a || *b).collect::<Vec<_>>()
+    };
+    assert_eq!(flags(&attempt(&base(), &new).unwrap()), [("start C".to_owned(), true, false)]);
+    let mut system = base();
+    for s in attempt(&system, &new).unwrap().steps {
+        step::apply(&s.step, &mut system).unwrap();
+    }
+    let gone = attempt(&system, &conf("d", &[], vec![destroy("C")], &[])).unwrap();
+    assert_eq!(flags(&gone), [("stop C".to_owned(), false, true)]);
 }
 
 #[test]

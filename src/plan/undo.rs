@@ -161,6 +161,7 @@ impl<'o, 's> Script<'o, 's> {
             return Err(found);
         }
         let undo = step::inverse(&item.step, item.call.as_ref(), self.view);
+        let (moves, undo_moves) = (step::moves(&item.step, self.view), step::undo_moves(&undo, self.view));
         step::effect(&item.step, self.view);
         let id = StepId::try_from(self.steps.len()).expect("fewer steps than that");
         self.steps.push(PlannedStep {
@@ -170,6 +171,8 @@ impl<'o, 's> Script<'o, 's> {
             after: SmallVec::from_slice(after),
             reversibility: step::reversibility(&item.step, &undo),
             undo,
+            moves,
+            undo_moves,
             step: item.step,
             origin: item.origin,
         });

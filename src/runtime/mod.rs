@@ -21,6 +21,7 @@ pub mod probe;
 pub mod property;
 mod realtime;
 pub mod value;
+mod words;
 
 pub use crate::model::ActivityStatus;
 pub use beat::{Notice, NoticeSink, Notices};
