@@ -261,8 +261,10 @@ fn show(out: &Output, planned: &Planned) {
             format!("{:>3}", step.id),
             out.paint(Style::Dim, shown.stage),
             step.step.to_string(),
-            out.paint(style, format!("{:?}", step.reversibility).to_lowercase()),
-            if step.moves { out.paint(Style::Care, "moves") } else { String::new() },
+            out.paint(
+                style,
+                format!("{:?}", step.reversibility).to_lowercase() + if step.moves { ", moves" } else { "" },
+            ),
             if undo.is_empty() {
                 String::new()
             } else {

@@ -192,16 +192,20 @@ fn one(out: &Output, ty: &ComponentType) {
     for (name, operation) in &ty.operations {
         let args: Vec<String> = operation.args.iter().map(ToString::to_string).collect();
         let returns = operation.returns.as_ref().map_or_else(String::new, |ty| format!(" -> {ty}"));
-        let effect = match &operation.effect {
+        let mut effect = match &operation.effect {
             Effect::None => "leaves nothing behind".to_owned(),
             Effect::Undo(undo) => format!("undone by {undo}"),
             Effect::Irreversible => "irreversible".to_owned(),
         };
+        if operation.moves {
+            effect += ", moves hardware";
+        }
+        if let Some(condition) = &operation.settled_by {
+            effect += &format!(", settled by {}", settling(condition));
+        }
         table.row([
             format!("{}({}){returns}", out.paint(Style::Name, name), args.join(", ")),
             effect,
-            if operation.moves { "moves hardware".to_owned() } else { String::new() },
-            operation.settled_by.as_ref().map_or_else(String::new, |c| format!("settled by {}", settling(c))),
             operation.doc.clone(),
         ]);
     }

@@ -207,7 +207,7 @@ fn configurations_in_yaml() {
         ("timeout: 0.5", "timout: 0.5", "text::unknown_key 3:5", "`timeout`"),
         ("\"A:stopped\"", "\"A:stoped\"", "conf::bad_state 5:25", "`stopped`"),
         ("\"A:stopped\"", "\"A:faulted\"", "conf::faulted_demanded 5:25", "unconfigured"),
-        ("\"A:stopped\"", "\"_default:stopped\"", "conf::default_twice 5:45", "keep one"),
+        ("\"A:stopped\"", "\"_default:stopped\"", "conf::default_twice 5:43", "keep one"),
         ("- create:", "- crate:", "conf::unknown_change 7:9", "`create`"),
         ("component: A", "compnent: A", "text::unknown_key 7:19", "`component`"),
         ("k: 1.0", "k-1: 1.0", "text::bad_name 7:78", "friction_comp"),
