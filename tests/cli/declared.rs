@@ -44,7 +44,7 @@ fn names_are_checked() {
         ("deployment.yaml", "source.k, sink", "source.y, sink", "conf::not_an_in_port", "out-port", 31),
         ("deployment.yaml", "rest: [slow]", "rest: [solw]", "deploy::unknown_configuration", "did you mean `slow`", 34),
         ("deployment.yaml", "property_set source.k,", "property_set source.kk,", "conf::unknown_property", "`k`", 32),
-        ("deployment.yaml", "property_set source.k,", "set source.k,", "simulated::unknown_step", "property_set", 32),
+        ("deployment.yaml", "property_set source.k,", "set source.k,", "simulated::unknown_step", "known steps", 32),
         ("deployment.yaml", "[self.y, 0.5]", "[self.yy, 0.5]", "conf::unknown_port", "did you mean `y`", 16),
         ("deployment.yaml", "[self.y, 0.5]", "[source.y, 0.5]", "type::settled_elsewhere", "`self`", 16),
         ("deployment.yaml", "{ above: [self.y, 0.5] }", "{ is_true: self.y.z }", "monitor::no_such_part", "fields", 16),
