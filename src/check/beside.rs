@@ -52,7 +52,7 @@ fn touched(configuration: &Configuration) -> (BTreeSet<ComponentName>, bool) {
         }
     }
     let mut everything = false;
-    for entry in configuration.pre.iter().chain(&configuration.post) {
+    for entry in configuration.pre.iter().chain(configuration.post.iter()) {
         match entry.target {
             Target::Component(component) => _ = components.insert(component),
             Target::Default => everything = true,

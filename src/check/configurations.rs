@@ -5,15 +5,14 @@
 
 use super::universe::{Creation, Universe};
 use crate::model::codes::{
-    BAD_ARGUMENTS, BAD_VALUE, BUFFER_SIZE, DEFAULT_TWICE, FAULTED_DEMANDED, MISSING_PROPERTY, NEEDS_BUFFER,
-    NOT_AN_IN_PORT, NOT_AN_OUT_PORT, PORT_NOT_WRITABLE, PORT_TYPES, PORT_UNITS, UNKNOWN_ACTIVITY, UNKNOWN_OPERATION,
-    UNKNOWN_PORT, UNKNOWN_PROPERTY, UNKNOWN_TYPE,
+    BAD_ARGUMENTS, BAD_VALUE, BUFFER_SIZE, MISSING_PROPERTY, NEEDS_BUFFER, NOT_AN_IN_PORT, NOT_AN_OUT_PORT,
+    PORT_NOT_WRITABLE, PORT_TYPES, PORT_UNITS, UNKNOWN_ACTIVITY, UNKNOWN_OPERATION, UNKNOWN_PORT, UNKNOWN_PROPERTY,
+    UNKNOWN_TYPE,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::{
     Call, Catalogue, Change, ChangeKind, Code, ComponentName, ComponentType, ConfigId, Configuration, Deployment,
-    Direction, Finding, Findings, Ident, MemberRef, Origin, Policy, PortType, RunState, StateEntry, Target, TypeName,
-    Value,
+    Direction, Finding, Findings, Ident, MemberRef, Origin, Policy, PortType, StateList, Target, TypeName, Value,
 };
 use std::collections::BTreeMap;
 
@@ -86,36 +85,11 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn states(&mut self, configuration: &Configuration, list: &str, entries: &[StateEntry]) {
-        let mut default: Option<Origin> = None;
+    fn states(&mut self, configuration: &Configuration, list: &str, entries: &StateList) {
         for (i, entry) in entries.iter().enumerate() {
             self.path = format!("configurations.{}.{list}[{i}]", configuration.id);
-            match entry.target {
-                Target::Component(component) => {
-                    self.component(component, entry.origin);
-                }
-                Target::Default => {
-                    if let Some(first) = default {
-                        self.add(
-                            Finding::error(DEFAULT_TWICE, format!("`_default` stands twice in {list}"))
-                                .at(entry.origin)
-                                .labelled("the second one")
-                                .also(first, "the first one")
-                                .help("keep one of them: it stands for every component that the list does not name"),
-                        );
-                    }
-                    default = Some(entry.origin);
-                }
-            }
-            if entry.state == RunState::Faulted {
-                self.add(
-                    Finding::error(
-                        FAULTED_DEMANDED,
-                        format!("{}: the state `faulted` cannot be demanded", entry.target),
-                    )
-                    .at(entry.origin)
-                    .help("demand unconfigured, stopped or running: components fault by themselves"),
-                );
+            if let Target::Component(component) = entry.target {
+                self.component(component, entry.origin);
             }
         }
     }

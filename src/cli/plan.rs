@@ -256,12 +256,20 @@ fn show(out: &Output, planned: &Planned) {
             Reversibility::Irreversible => Style::Bad,
         };
         let undo: Vec<String> = step.undo.steps().iter().map(ToString::to_string).collect();
+        let moving = if step.undo_moves { " (moves)" } else { "" };
         table.row([
             format!("{:>3}", step.id),
             out.paint(Style::Dim, shown.stage),
             step.step.to_string(),
-            out.paint(style, format!("{:?}", step.reversibility).to_lowercase()),
-            if undo.is_empty() { String::new() } else { out.paint(Style::Dim, format!("undo: {}", undo.join("; "))) },
+            out.paint(
+                style,
+                format!("{:?}", step.reversibility).to_lowercase() + if step.moves { ", moves" } else { "" },
+            ),
+            if undo.is_empty() {
+                String::new()
+            } else {
+                out.paint(Style::Dim, format!("undo: {}{moving}", undo.join("; ")))
+            },
             match after.len() {
                 0 => String::new(),
                 n if n > 6 => out.paint(Style::Dim, format!("after {} … ({n})", after[..4].join(" "))),

@@ -120,7 +120,10 @@ impl Shown {
             Reversibility::Irreversible => "irreversible",
         };
         view.insert("reversibility".to_owned(), json!(reversibility));
-        view.insert("undo".to_owned(), undo(&step.undo));
+        view.insert("moves".to_owned(), json!(step.moves));
+        let mut back = undo(&step.undo);
+        back["moves"] = json!(step.undo_moves);
+        view.insert("undo".to_owned(), back);
         view
     }
 }

@@ -6,7 +6,7 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
+use crate::model::{Ask, Change, ConfigId, Configuration, StateList, Target, Verdict};
 use crate::plan::{PlannedStep, plan_on};
 use crate::stack::{Edits, Frame, Op, Planned, transaction};
 use crate::system::{Overlay, System, step};
@@ -50,7 +50,7 @@ impl Engine {
         let (own, planned, troubles) = self.plan_whole(configuration, request, &system);
         let frame = frame.or(own);
         let mut touched = Touched::default();
-        for entry in configuration.pre.iter().chain(&configuration.post) {
+        for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
                 touched.add_state(component);
             }
@@ -246,9 +246,10 @@ impl Engine {
 /// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.
 fn pieces(whole: &Configuration) -> Vec<Configuration> {
     let empty = || Configuration::new(whole.id);
-    let pre = whole.pre.iter().map(|entry| Configuration { pre: vec![*entry], ..empty() });
+    let one = |entry| StateList::of([entry]).expect("one `_default` at most");
+    let pre = whole.pre.iter().map(|entry| Configuration { pre: one(entry), ..empty() });
     let changes =
         whole.changes.iter().map(|change: &Change| Configuration { changes: vec![change.clone()], ..empty() });
-    let post = whole.post.iter().map(|entry| Configuration { post: vec![*entry], ..empty() });
+    let post = whole.post.iter().map(|entry| Configuration { post: one(entry), ..empty() });
     pre.chain(changes).chain(post).collect()
 }

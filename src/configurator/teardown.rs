@@ -271,7 +271,7 @@ fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
         };
         let undo = Undo::Nothing;
         let reversibility = Reversibility::Exact;
-        work.push(PlannedStep { id, stage: Stage::Changes, wave, after, step, reversibility, undo, origin: Origin::NONE });
+        work.push(PlannedStep { id, stage: Stage::Changes, wave, after, step, reversibility, undo, moves: false, undo_moves: false, origin: Origin::NONE });
     }
     work
 }

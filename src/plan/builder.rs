@@ -85,6 +85,7 @@ impl Builder<'_, '_, '_> {
     pub(super) fn allowed(&mut self, what: Step, undo: Option<&Call>, origin: Origin, after: &[StepId]) -> StepId {
         let inverse = step::inverse(&what, undo, self.view);
         self.record(&what, undo, &inverse, true);
+        let (moves, undo_moves) = (step::moves(&what, self.view), step::undo_moves(&inverse, self.view));
         step::effect(&what, self.view);
         let id = self.next();
         self.steps.push(PlannedStep {
@@ -94,6 +95,8 @@ impl Builder<'_, '_, '_> {
             after: SmallVec::from_slice(after),
             reversibility: step::reversibility(&what, &inverse),
             undo: inverse,
+            moves,
+            undo_moves,
             step: what,
             origin,
         });

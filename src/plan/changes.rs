@@ -10,7 +10,7 @@ use super::conflicts::{Sorted, Use, clash};
 use crate::model::codes;
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Call, Change, ChangeKind, ComponentName, Finding, Ident, MemberRef, Origin, RunState, Step, TypeName, Value,
+    Call, Change, ChangeKind, ComponentName, Finding, Ident, MemberRef, Origin, RunState, Step, TypeName, Value, Wanted,
 };
 use crate::system::{View, Violation, step};
 use rustc_hash::FxHashMap;
@@ -116,7 +116,7 @@ fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName,
     if let Some(state) = b.view.component(component).map(|n| n.state)
         && state != RunState::Faulted
     {
-        for transition in state.path_to(RunState::Unconfigured) {
+        for transition in state.path_to(Wanted::Unconfigured) {
             let step = Step::State { component, transition: *transition };
             let id = b.step(step, None, origin, &after);
             after = id.into_iter().collect();

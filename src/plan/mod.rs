@@ -62,6 +62,10 @@ pub struct PlannedStep {
     pub reversibility: Reversibility,
     /// What undoes it, with the values that the planner saw.
     pub undo: Undo,
+    /// Whether doing it moves hardware.
+    pub moves: bool,
+    /// Whether undoing it moves hardware: no automatic rollback does that unasked.
+    pub undo_moves: bool,
     /// The element of the configuration it comes from.
     pub origin: Origin,
 }

@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, Refusal, Stage, plan};
+use super::{Context, Plan, PlannedStep, Refusal, Stage, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,6 +51,7 @@ fn types() -> Arc<Catalogue> {
         (ident("open"), operation(Effect::Undo(ident("close")))),
         (ident("close"), operation(Effect::None)),
         (ident("weld"), operation(Effect::Irreversible)),
+        (ident("swing"), OperationType { moves: true, ..operation(Effect::Undo(ident("swing"))) }),
     ]);
     gain.start_after = vec![TypeName::new("t.Motor").unwrap()];
     let mut motor = ComponentType::new("t.Motor", "moves");
@@ -58,6 +59,7 @@ fn types() -> Arc<Catalogue> {
     motor.ports = gain.ports.clone();
     motor.properties.insert(ident("id"), property("int", None, Tunable::Unconfigured));
     motor.irreversible.destroy = true;
+    motor.moves.start = true;
     let mut catalogue = Catalogue::new();
     catalogue.insert(gain);
     catalogue.insert(motor);
@@ -77,11 +79,11 @@ fn conf(id: &str, pre: &[&str], changes: Vec<ChangeKind>, post: &[&str]) -> Conf
             "_default" => Target::Default,
             name => Target::Component(ComponentName::new(name).unwrap()),
         };
-        StateEntry { target, state: RunState::from_name(state).unwrap(), origin }
+        StateEntry { target, state: RunState::from_name(state).and_then(RunState::wanted).unwrap(), origin }
     };
-    conf.pre = pre.iter().map(|t| entry(t, next())).collect();
+    conf.pre = StateList::of(pre.iter().map(|t| entry(t, next()))).unwrap();
     conf.changes = changes.into_iter().map(|kind| Change { kind, origin: next() }).collect();
-    conf.post = post.iter().map(|t| entry(t, next())).collect();
+    conf.post = StateList::of(post.iter().map(|t| entry(t, next()))).unwrap();
     conf
 }
 
@@ -296,8 +298,6 @@ fn lists() {
     assert_eq!(on(&["C:stopped"], vec![create("C", "t.Gain", &[])], &[]), [("conf::pre_on_created", 1, vec![2])]);
     let gone = vec![disconnect("A.y", "B.u"), destroy("B")];
     assert_eq!(on(&[], gone, &["B:stopped"]), [("conf::post_on_destroyed", 3, vec![2])]);
-    assert_eq!(on(&["_default:stopped", "_default:running"], vec![], &[]), [("conf::default_twice", 2, vec![1])]);
-    assert_eq!(on(&["A:faulted"], vec![], &[]), [("conf::faulted_demanded", 1, vec![])]);
     assert_eq!(on(&[], vec![], &["C:running"]), [("conf::unknown_component", 1, vec![])]);
     // A property that needs `stopped`, after an entry that starts; and one that is enough.
     assert_eq!(on(&["A:stopped", "A:running"], vec![set("A.k", 2)], &[]), [("conf::not_tunable", 3, vec![91])]);
@@ -336,6 +336,45 @@ fn reversibility_is_known_beforehand() {
     assert!(attempt(&base(), &meant).unwrap().warnings.is_empty());
     let named = conf("c", &[], vec![call("A.weld", Some("B.open"))], &[]);
     assert_eq!(attempt(&base(), &named).unwrap().steps[0].reversibility, Reversibility::Compensated);
+}
+
+#[test]
+fn what_moves_is_known_beforehand() {
+    let moving = |undo: &str, moves: bool, undo_moves: bool| {
+        let plan = attempt(&base(), &conf("c", &[], vec![call("B.swing", (!undo.is_empty()).then_some(undo))], &[]));
+        let plan = plan.unwrap();
+        assert_eq!((plan.steps[0].moves, plan.steps[0].undo_moves), (moves, undo_moves), "{undo}");
+    };
+    moving("", true, true);
+    moving("B.open", true, false);
+    moving("B.swing", true, true);
+    let back = attempt(&base(), &conf("c", &[], vec![call("B.open", Some("B.swing"))], &[])).unwrap();
+    assert_eq!((back.steps[0].moves, back.steps[0].undo_moves), (false, true));
+    // Of a component that this plan creates, too; and what it destroys is stopped first.
+    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
+    let flags = |plan: &Plan| {
+        let one = |s: &PlannedStep| (s.step.to_string(), s.moves, s.undo_moves);
+        plan.steps.iter().map(one).filter(|(_, a, b)| *a || *b).collect::<Vec<_>>()
+    };
+    assert_eq!(flags(&attempt(&base(), &new).unwrap()), [("start C".to_owned(), true, false)]);
+    let mut system = base();
+    for s in attempt(&system, &new).unwrap().steps {
+        step::apply(&s.step, &mut system).unwrap();
+    }
+    let gone = attempt(&system, &conf("d", &[], vec![destroy("C")], &[])).unwrap();
+    assert_eq!(flags(&gone), [("stop C".to_owned(), false, true)]);
+}
+
+#[test]
+fn what_moves_is_not_prepared() {
+    let mut system = base();
+    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
+    for s in attempt(&system, &new).unwrap().steps {
+        step::apply(&s.step, &mut system).unwrap();
+    }
+    let switch = |name: &str| conf("s", &[&format!("{name}:stopped")], vec![], &[&format!("{name}:running")]);
+    assert!(super::prepare::Switch::new(&mut system, &switch("A")).is_some());
+    assert!(super::prepare::Switch::new(&mut system, &switch("C")).is_none());
 }
 
 #[test]

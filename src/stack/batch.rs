@@ -10,7 +10,7 @@ use super::{FrameId, Reason, Request, Requester, Why, World, claims, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
-use crate::system::{Overlay, step};
+use crate::system::Overlay;
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -282,7 +282,7 @@ fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Plann
         let _ = place;
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
-        if let Some((_, moving)) = own.find(|(_, planned)| step::moves(&planned.step, &world.system)) {
+        if let Some((_, moving)) = own.find(|(_, planned)| planned.moves) {
             return Some((part, Reason::Moves(moving.step.clone())));
         }
     }

@@ -184,21 +184,29 @@ pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
     }
 }
 
-/// Whether `step` moves hardware: an operation that is declared so, or starting or stopping a component whose type says so.
-/// Such a step is run when somebody asks for it, and not by itself (design §3).
+/// Whether doing `step` moves hardware: a call of an operation that is declared to, or starting or stopping a component of
+/// a type that says so. Seen in a system in which its component exists; of one that does not, nothing is known to move.
+///
+/// What moves because of a value (a gain, a reference) cannot be known.
 pub fn moves(step: &Step, view: &impl View) -> bool {
+    let Some(ty) = view.component(step.component()).map(|node| &node.ty) else { return false };
     match step {
-        Step::Operation(call) => view
-            .component(call.operation.component)
-            .and_then(|node| node.ty.operations.get(&call.operation.member))
-            .is_some_and(|operation| operation.moves),
-        Step::State { component, transition } => view.component(*component).is_some_and(|node| match transition {
-            Transition::Start => node.ty.moves.start,
-            Transition::Stop => node.ty.moves.stop,
-            Transition::Configure | Transition::Cleanup => false,
-        }),
-        _ => false,
+        Step::State { transition: Transition::Start, .. } => ty.moves.start,
+        Step::State { transition: Transition::Stop, .. } => ty.moves.stop,
+        Step::Operation(call) => ty.operations.get(&call.operation.member).is_some_and(|o| o.moves),
+        Step::State { transition: Transition::Configure | Transition::Cleanup, .. }
+        | Step::Create { .. }
+        | Step::Destroy { .. }
+        | Step::Connect { .. }
+        | Step::Disconnect { .. }
+        | Step::PropertySet { .. }
+        | Step::PortWrite { .. } => false,
     }
+}
+
+/// Whether undoing a step moves hardware, seen in the system before it or after it.
+pub fn undo_moves(undo: &Undo, view: &impl View) -> bool {
+    undo.steps().iter().any(|step| moves(step, view))
 }
 
 /// Makes `step` happen in the picture, when its precondition holds.
@@ -399,5 +407,45 @@ fn call_allowed(call: &Call, view: &impl View, found: &mut Vec<Violation>) {
             };
             found.push(Violation::Argument { operation, position: i + 1, reason });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Catalogue, ComponentType, Moves, OperationType};
+    use crate::system::System;
+    use std::sync::Arc;
+
+    #[test]
+    fn what_moves_is_what_its_type_says() {
+        let ident = |name| Ident::new(name).unwrap();
+        let mut ty = ComponentType::new("Arm", "");
+        ty.moves = Moves { start: true, stop: false };
+        for (name, moves) in [("fold", true), ("look", false)] {
+            ty.operations.insert(ident(name), OperationType { moves, ..OperationType::new(Effect::None) });
+        }
+        let mut types = Catalogue::new();
+        types.insert(ty);
+        let mut system = System::new(Arc::new(types));
+        let arm = ComponentName::new("arm").unwrap();
+        let create =
+            Step::Create { component: arm, ty: TypeName::new("Arm").unwrap(), activity: None, properties: vec![] };
+        let state = |transition| Step::State { component: arm, transition };
+        let call = |name| Step::Operation(Call { operation: arm.member(ident(name)), args: vec![] });
+        assert!(!moves(&state(Transition::Start), &system), "of a component that is not there nothing is known");
+        assert!(!moves(&create, &system));
+        apply(&create, &mut system).unwrap();
+        let moving: Vec<bool> = [Transition::Configure, Transition::Start, Transition::Stop, Transition::Cleanup]
+            .map(|transition| moves(&state(transition), &system))
+            .to_vec();
+        assert_eq!(moving, [false, true, false, false]);
+        assert_eq!(["fold", "look", "nothing"].map(|name| moves(&call(name), &system)), [true, false, false]);
+        assert!(!moves(&Step::Destroy { component: arm }, &system));
+        assert!(undo_moves(&inverse(&state(Transition::Stop), None, &system), &system));
+        assert!(!undo_moves(&inverse(&state(Transition::Start), None, &system), &system));
+        let Step::Operation(fold) = call("fold") else { unreachable!() };
+        assert!(undo_moves(&inverse(&call("look"), Some(&fold), &system), &system));
+        assert!(!undo_moves(&Undo::Nothing, &system));
     }
 }

@@ -68,6 +68,8 @@ fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> Plan
         step,
         reversibility: Reversibility::Exact,
         undo: Undo::Nothing,
+        moves: false,
+        undo_moves: false,
         origin: Origin::NONE,
     }
 }

@@ -3,6 +3,7 @@
 mod background;
 mod breakages;
 mod commands;
+mod declared;
 mod demo;
 mod explored;
 mod monitor;
