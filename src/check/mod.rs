@@ -101,7 +101,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
-    findings.extend(configurations::check(deployment, catalogue, &universe));
+    findings.extend(configurations::check(deployment, &universe));
     findings.extend(monitors::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
     let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
@@ -274,7 +274,7 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
 pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
     let universe = universe::Universe::new(deployment, catalogue);
-    configurations::some(deployment, catalogue, &universe, ids)
+    configurations::some(deployment, &universe, ids)
 }
 
 /// Bring-up and shutdown must work when everything goes well.

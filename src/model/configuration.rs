@@ -95,7 +95,7 @@ pub struct StateEntry {
 pub enum Target {
     /// One component.
     Component(ComponentName),
-    /// `_default`: every component of the (sub)system that the same list does not name.
+    /// `_default`: every component of the configuration's own file that the same list does not name.
     Default,
 }
 

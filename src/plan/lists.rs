@@ -10,37 +10,52 @@ use crate::model::{ComponentName, Finding, Origin, RunState, StateEntry, Step, T
 use crate::system::{View, Violation};
 use rustc_hash::FxHashSet;
 
+/// What must not be written in a list, wherever it is applied: its place in the list, and why.
+pub fn refused_entries(list: &[StateEntry], stage: Stage) -> Vec<(usize, Finding)> {
+    let mut found = Vec::new();
+    let mut default: Option<Origin> = None;
+    for (i, entry) in list.iter().enumerate() {
+        if entry.state == RunState::Faulted {
+            let message = format!("`{}`: the state `faulted` cannot be demanded", entry.target);
+            let finding = Finding::error(codes::FAULTED_DEMANDED, message).at(entry.origin);
+            let help = "demand unconfigured, stopped or running: components fault by themselves";
+            found.push((i, finding.help(help)));
+            continue;
+        }
+        if entry.target != Target::Default {
+            continue;
+        }
+        if let Some(first) = default {
+            let list = if stage == Stage::Pre { "pre_conf_state" } else { "post_conf_state" };
+            found.push((
+                i,
+                Finding::error(codes::DEFAULT_TWICE, format!("`_default` stands twice in {list}"))
+                    .at(entry.origin)
+                    .labelled("the second one")
+                    .also(first, "the first one")
+                    .help("keep one, and name the components that are to be in another state"),
+            ));
+        } else {
+            default = Some(entry.origin);
+        }
+    }
+    found
+}
+
 pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], stage: Stage, sorted: &Sorted) {
     b.stage = stage;
-    let mut default: Option<Origin> = None;
+    let refused = refused_entries(list, stage);
     let mut frontier: Vec<StepId> = Vec::new();
-    for entry in list {
-        if entry.state == RunState::Faulted {
-            let message = format!("`{}` is to become faulted", entry.target);
-            b.findings.push(
-                Finding::error(codes::FAULTED_DEMANDED, message)
-                    .at(entry.origin)
-                    .help("demand unconfigured, stopped or running"),
-            );
+    for (i, entry) in list.iter().enumerate() {
+        if refused.iter().any(|(at, _)| *at == i) {
             continue;
         }
         match entry.target {
             Target::Component(component) => named(b, component, entry, sorted, &mut frontier),
-            Target::Default => {
-                if let Some(first) = default {
-                    b.findings.push(
-                        Finding::error(codes::DEFAULT_TWICE, "`_default` stands twice in one list")
-                            .at(entry.origin)
-                            .also(first, "the first one")
-                            .help("keep one, and name the components that are to be in another state"),
-                    );
-                    continue;
-                }
-                default = Some(entry.origin);
-                expand(b, list, entry, &mut frontier);
-            }
+            Target::Default => expand(b, list, entry, &mut frontier),
         }
     }
+    b.findings.extend(refused.into_iter().map(|(_, finding)| finding));
 }
 
 fn named(
@@ -69,7 +84,8 @@ fn named(
 fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: &StateEntry, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
-        (Stage::Pre, Some(create), _) => {
+        // One that is destroyed and created again concerns the component that was there before.
+        (Stage::Pre, Some(create), None) => {
             let message =
                 format!("`{component}` is created by this configuration and does not exist before the changes");
             Finding::error(codes::PRE_ON_CREATED, message)
@@ -84,20 +100,9 @@ fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: &StateE
                 .help("remove the entry: destroy stops and cleans up by itself")
         }
         _ if b.blamed.contains(&component) => return,
-        _ => {
-            let violation = Violation::UnknownComponent(component);
-            let mut finding = Finding::error(violation.code(), violation.to_string());
-            finding.help = violation.help(b.view);
-            finding
-        }
+        _ => Violation::UnknownComponent(component).finding(b.view),
     };
     b.findings.push(finding.at(entry.origin));
-}
-
-/// Whether a component belongs to the (sub)system of that path.
-fn in_scope(component: ComponentName, scope: &str) -> bool {
-    let prefix = component.prefix();
-    scope.is_empty() || prefix == scope || prefix.strip_prefix(scope).is_some_and(|rest| rest.starts_with('/'))
 }
 
 fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, frontier: &mut Vec<StepId>) {
@@ -106,7 +111,8 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, 
     let scope = b.configuration.id.prefix();
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
-        if node.state != entry.state && in_scope(node.name, scope) && !named.contains(&node.name) {
+        // The components of the configuration's own file, none of a subsystem.
+        if node.state != entry.state && node.name.prefix() == scope && !named.contains(&node.name) {
             moving.push(node.name);
         }
     });

@@ -8,6 +8,7 @@ mod changes;
 mod conflicts;
 pub mod footprint;
 mod lists;
+pub mod meant;
 mod order;
 pub mod prepare;
 #[cfg(test)]
@@ -15,9 +16,10 @@ mod tests;
 pub mod undo;
 
 use crate::model::codes;
-use crate::model::{ConfigId, Configuration, Finding, Findings, Ident, Origin, Step};
+use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
 use footprint::{Footprint, Saved, Slot};
+pub use lists::refused_entries;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
@@ -26,6 +28,13 @@ use std::collections::BTreeSet;
 pub struct Context {
     /// The deployment's activities.
     pub activities: BTreeSet<Ident>,
+}
+
+impl Context {
+    /// That of a deployment's configurations.
+    pub fn of(deployment: &Deployment) -> Self {
+        Self { activities: deployment.activities.keys().copied().collect() }
+    }
 }
 
 /// The stage a step belongs to. Stages are barriers.

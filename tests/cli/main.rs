@@ -5,6 +5,7 @@ mod breakages;
 mod commands;
 mod demo;
 mod explored;
+mod hot_swap;
 mod monitor;
 mod simulated;
 mod together;
