@@ -67,8 +67,8 @@ pub enum Violation {
     NotUnconfigured { component: ComponentName, state: RunState },
     #[error("`{component}` still has connections: {}", list(links))]
     StillConnected { component: ComponentName, links: Vec<(MemberRef, MemberRef)> },
-    /// `types` are all that the component may be of.
-    #[error("`{}` ({}) has no {} `{}`", member.component, either(types), what.words().0, member.member)]
+    /// `types` are all that the component may be of. The member alone is quoted: a finding points at what it quotes first.
+    #[error("{} ({}) has no {} `{}`", member.component, either(types), what.words().0, member.member)]
     UnknownMember { what: Member, member: MemberRef, types: Vec<TypeName> },
     #[error("`{port}` is an in-port; a connection begins at an out-port")]
     NotOut { port: MemberRef, declared: Origin },

@@ -200,7 +200,7 @@ const SHARED: &[Shared] = &[
         of_pid: "property_set('ctrl.k', 2.0)",
         off: "",
         of_mpc: "property_set('ctrl.steps', 8)",
-        wrong: ["conf::unknown_property", "`ctrl` (Mpc) has no property `k`", "known properties: `steps`"],
+        wrong: ["conf::unknown_property", "ctrl (Mpc) has no property `k`", "known properties: `steps`"],
     },
     Shared {
         what: "a member of another kind",
@@ -209,7 +209,7 @@ const SHARED: &[Shared] = &[
         of_pid: "property_set('ctrl.k', 2.0)",
         off: "",
         of_mpc: "port_write('ctrl.k', 3.0)",
-        wrong: ["conf::unknown_property", "`ctrl` (Mpc) has no property `k`", "`k` is a port of Mpc"],
+        wrong: ["conf::unknown_property", "ctrl (Mpc) has no property `k`", "`k` is a port of Mpc"],
     },
 ];
 
@@ -328,7 +328,7 @@ fn a_configuration_that_meets_either_type_is_refused_when_both_refuse_it() {
     assert!(tune(k, x, "property_set('ctrl.k', 2.0), port_write('ctrl.x', 1.0)").is_empty());
     let found = tune(k, x, "property_set('ctrl.gain', 2.0)");
     assert_eq!(found.len(), 1, "{found:#?}");
-    assert_eq!(found[0]["message"], "`ctrl` (Pid or Mpc) has no property `gain`");
+    assert_eq!(found[0]["message"], "ctrl (Pid or Mpc) has no property `gain`");
     let labels: Vec<&str> = found[0]["labels"].as_array().unwrap().iter().filter_map(|l| l["text"].as_str()).collect();
     for text in ["Pid is declared here", "Mpc is declared here", "`ctrl` is created here as Pid"] {
         assert!(labels.contains(&text), "{labels:?}");
@@ -339,10 +339,10 @@ fn a_configuration_that_meets_either_type_is_refused_when_both_refuse_it() {
     let found = tune(k, x, "property_set('ctrl.k', 6.0)");
     assert_eq!(found.len(), 1, "{found:#?}");
     assert_eq!(found[0]["message"], "`ctrl.k` cannot be 6.0: 6 is outside 5 and less, if `ctrl` is Pid");
-    let text = "if `ctrl` is Mpc: `ctrl` (Mpc) has no property `k`";
+    let text = "if `ctrl` is Mpc: ctrl (Mpc) has no property `k`";
     assert!(found[0]["labels"].as_array().unwrap().iter().any(|l| l["text"] == text), "{found:#?}");
     let found = tune(x, x, "disconnect('plant.y', 'ctrl.z')");
-    assert_eq!(found[0]["message"], "`ctrl` (Pid or Mpc) has no port `z`");
+    assert_eq!(found[0]["message"], "ctrl (Pid or Mpc) has no port `z`");
 }
 
 #[test]
@@ -356,7 +356,7 @@ fn disconnects_and_pre_entries_concern_the_component_that_is_destroyed() {
     // The new one's port is not there yet when the old one is disconnected.
     demo.replace("configurations.lua", "disconnect('plant.y', 'ctrl.x')", "disconnect('plant.y', 'ctrl.w')");
     let found = errors(&demo.run(&["check", "deployment.yaml", "--json"]).json());
-    assert_eq!(found[0]["message"], "`ctrl` (Pid) has no port `w`");
+    assert_eq!(found[0]["message"], "ctrl (Pid) has no port `w`");
 }
 
 #[test]
