@@ -284,6 +284,10 @@ pub const CHECK_FRAMES: usize = 3;
 /// coordinator. What one left frame under another leads to, further ones do too.
 pub const CHECK_LEFT: usize = 2;
 
+/// Types as which configurations create one component, up to which `check` judges each configuration by them: a hot swap
+/// has a few. A connection is looked at for every pair of them.
+pub const CHECK_TYPES: usize = 16;
+
 /// Coordinators side by side that `check` follows together: the states of their product are soon past any budget.
 pub const CHECK_TOGETHER: usize = 3;
 

@@ -102,7 +102,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
-    findings.extend(configurations::check(deployment, catalogue, &universe));
+    findings.extend(configurations::check(deployment, &universe));
     findings.extend(monitors::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
     findings.extend(declared::check(deployment, &universe));
@@ -276,7 +276,7 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
 pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
     let universe = universe::Universe::new(deployment, catalogue);
-    let mut findings = configurations::some(deployment, catalogue, &universe, ids);
+    let mut findings = configurations::some(deployment, &universe, ids);
     findings.extend(declared::holds(deployment, &universe, ids));
     findings
 }

@@ -1,12 +1,12 @@
 //! What the deployment says that simulated components raise by themselves, and what goes wrong there: do the steps and
 //! components exist, does somebody listen.
 
-use super::configurations::Member;
 use super::universe::Universe;
 use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP};
 use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction};
 use crate::statechart::Chart;
+use crate::system::Member;
 use std::collections::BTreeSet;
 
 /// The steps that are done to a component as a whole.
@@ -149,21 +149,8 @@ fn member(at: Origin, verb: &str, part: Member, operand: &str, universe: &Univer
     let Ok(member) = MemberRef::new(operand) else {
         return vec![unreadable(at, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };
-    let creations = universe.of(member.component);
-    if creations.is_empty() {
+    if universe.of(member.component).is_empty() {
         return vec![universe.unknown(member.component, at)];
     }
-    let types = || creations.iter().filter_map(|creation| creation.description.as_ref());
-    // That a type is unknown is said where it is created.
-    if types().count() < creations.len() || types().any(|ty| part.of(ty).contains(&member.member.as_str())) {
-        return Vec::new();
-    }
-    let (what, plural, code) = part.words();
-    let known: BTreeSet<&str> = types().flat_map(|ty| part.of(ty)).collect();
-    vec![
-        Finding::error(code, format!("{} has no {what} `{}`", member.component, member.member))
-            .at(at)
-            .labelled(format!("no such {what}"))
-            .help(did_you_mean(member.member.as_str(), plural, known)),
-    ]
+    universe.lacks(part, member, at).into_iter().collect()
 }

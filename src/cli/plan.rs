@@ -140,7 +140,7 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     if has_errors(&wrong) {
         return Err(wrong);
     }
-    let context = crate::plan::Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
+    let context = crate::plan::Context::of(deployment);
     let mut system = System::new(Arc::new(read.catalogue.clone()));
     let mut stack = Stack::new(deployment.limits.stack);
     let mut planned = Vec::new();

@@ -47,7 +47,8 @@ fn named(
 fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
-        (Stage::Pre, Some(create), _) => {
+        // One that is destroyed and created again concerns the component that was there before.
+        (Stage::Pre, Some(create), None) => {
             let message =
                 format!("`{component}` is created by this configuration and does not exist before the changes");
             Finding::error(codes::PRE_ON_CREATED, message)
@@ -62,20 +63,9 @@ fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEn
                 .help("remove the entry: destroy stops and cleans up by itself")
         }
         _ if b.blamed.contains(&component) => return,
-        _ => {
-            let violation = Violation::UnknownComponent(component);
-            let mut finding = Finding::error(violation.code(), violation.to_string());
-            finding.help = violation.help(b.view);
-            finding
-        }
+        _ => Violation::UnknownComponent(component).finding(b.view),
     };
     b.findings.push(finding.at(entry.origin));
-}
-
-/// Whether a component belongs to the (sub)system of that path.
-fn in_scope(component: ComponentName, scope: &str) -> bool {
-    let prefix = component.prefix();
-    scope.is_empty() || prefix == scope || prefix.strip_prefix(scope).is_some_and(|rest| rest.starts_with('/'))
 }
 
 fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
@@ -85,7 +75,7 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
         if node.state != wanted
-            && in_scope(node.name, scope)
+            && node.name.prefix() == scope
             && !named.contains(&node.name)
             && !b.context.avoid.contains(&node.name)
         {

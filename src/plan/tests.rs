@@ -207,15 +207,19 @@ fn defaults_stop_producers_first_and_start_consumers_first() {
     let plan = apply(&mut system, &conf("loop", &["_default:stopped"], changes, &["_default:running"]));
     assert_eq!(steps(&plan)[5..], ["configure Z", "start Z", "start A", "start B"]);
     assert_eq!(plan.warnings[0].code, codes::ACTUATOR_BY_DEFAULT);
-    // A subsystem's `_default` leaves the others alone, and a sibling that only begins alike.
+}
+
+#[test]
+fn default_stays_in_the_file_of_its_configuration() {
     let mut system = System::new(types());
     let names = ["top", "left/a", "left/in/b", "left_too/c", "right/d"];
     let changes = names.iter().map(|n| create(n, "t.Gain", &[])).collect();
     apply(&mut system, &conf("up", &[], changes, &[]));
-    let plan = attempt(&system, &conf("left/go", &[], vec![], &["_default:stopped"])).unwrap();
-    let mut moved = steps(&plan);
-    moved.sort();
-    assert_eq!(moved, ["configure left/a", "configure left/in/b"]);
+    let moved = |id: &str| steps(&attempt(&system, &conf(id, &[], vec![], &["_default:stopped"])).unwrap());
+    assert_eq!(moved("go"), ["configure top"]);
+    assert_eq!(moved("left/go"), ["configure left/a"]);
+    assert_eq!(moved("left/in/go"), ["configure left/in/b"]);
+    assert!(moved("lef/go").is_empty());
 }
 
 #[test]
@@ -266,8 +270,8 @@ fn names_types_and_values() {
     assert_eq!(one(vec![create("C", "t.Motor", &[])]), [("conf::missing_property", 1, vec![91])]);
     // A property_set beside the create does not replace the value.
     assert_eq!(one(vec![create("C", "t.Motor", &[]), set("C.id", 3)]), [("conf::missing_property", 1, vec![91])]);
-    assert_eq!(one(vec![connect("A.n", "A.u")]), [("conf::port_types", 1, vec![90])]);
-    assert_eq!(one(vec![connect("A.m", "A.u")]), [("conf::port_units", 1, vec![90])]);
+    assert_eq!(one(vec![connect("A.n", "A.u")]), [("conf::port_types", 1, vec![90, 90])]);
+    assert_eq!(one(vec![connect("A.m", "A.u")]), [("conf::port_units", 1, vec![90, 90])]);
     assert_eq!(one(vec![connect("A.u", "A.u")]), [("conf::not_an_out_port", 1, vec![90])]);
     assert_eq!(one(vec![connect("A.y", "B.y")]), [("conf::not_an_in_port", 1, vec![90])]);
     assert_eq!(one(vec![connect("A.y", "B.q")]), [("conf::needs_buffer", 1, vec![90])]);
@@ -296,6 +300,14 @@ fn names_types_and_values() {
 fn lists() {
     let on = |pre: &[&str], changes, post: &[&str]| findings(&conf("c", pre, changes, post));
     assert_eq!(on(&["C:stopped"], vec![create("C", "t.Gain", &[])], &[]), [("conf::pre_on_created", 1, vec![2])]);
+    // Of one that is destroyed and created again the old one is meant, in a list as elsewhere.
+    let again = |name: &str| vec![destroy(name), create(name, "t.Gain", &[])];
+    let swapped = conf("c", &["A:stopped"], [vec![disconnect("A.y", "B.u")], again("A")].concat(), &["A:stopped"]);
+    let expected = ["stop A", "disconnect A.y -> B.u", "cleanup A", "destroy A", "create A : t.Gain", "configure A"];
+    assert_eq!(steps(&attempt(&base(), &swapped).unwrap()), expected);
+    let missing = conf("c", &["C:stopped"], again("C"), &[]);
+    let missing = attempt(&base(), &missing).unwrap_err();
+    assert!(missing.findings.iter().all(|f| f.code == codes::UNKNOWN_COMPONENT), "{missing:?}");
     let gone = vec![disconnect("A.y", "B.u"), destroy("B")];
     assert_eq!(on(&[], gone, &["B:stopped"]), [("conf::post_on_destroyed", 3, vec![2])]);
     assert_eq!(on(&[], vec![], &["C:running"]), [("conf::unknown_component", 1, vec![])]);

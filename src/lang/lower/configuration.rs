@@ -305,7 +305,7 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
             let activity = fields
                 .take("activity")
                 .and_then(|node| name::<Ident>(cx, &node, "`activity`", "activity = \"control\""));
-            let properties = fields.take("properties").map(|node| properties(cx, node)).unwrap_or_default();
+            let properties = fields.take("properties").map(|node| properties(cx, node, component)).unwrap_or_default();
             component.zip(ty).map(|(component, ty)| ChangeKind::Create { component, ty, activity, properties })
         }
         "destroy" => component(cx, &mut fields).map(|component| ChangeKind::Destroy { component }),
@@ -321,12 +321,12 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
         }
         "property_set" => {
             let property = member(cx, &mut fields, "property", "Dynamics.force_gain");
-            let value = required_value(cx, &mut fields, "a property's value");
+            let value = required_value(cx, &mut fields, property, "a property's value");
             property.zip(value).map(|(property, value)| ChangeKind::PropertySet { property, value })
         }
         "port_write" => {
             let port = member(cx, &mut fields, "port", "Cart_Impedance.ext_ref_mode");
-            let value = required_value(cx, &mut fields, "a port's value");
+            let value = required_value(cx, &mut fields, port, "a port's value");
             port.zip(value).map(|(port, value)| ChangeKind::PortWrite { port, value })
         }
         _ => {
@@ -358,9 +358,13 @@ fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) ->
     name(cx, &node, key, example)
 }
 
-fn required_value(cx: &mut Cx, fields: &mut Fields, what: &str) -> Option<Value> {
+/// The value of `slot`, which is called `what` where its name could not be read.
+fn required_value(cx: &mut Cx, fields: &mut Fields, slot: Option<MemberRef>, what: &str) -> Option<Value> {
     let node = fields.required(cx, "value", "value: 0.5")?;
-    value(cx, node, what)
+    match slot {
+        Some(slot) => value(cx, node, &format!("`{slot}`")),
+        None => value(cx, node, what),
+    }
 }
 
 fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
@@ -369,7 +373,8 @@ fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
         None => Some(Vec::new()),
         Some(Node { kind: Kind::List(list), .. }) => {
             let length = list.len();
-            let args: Vec<Value> = list.into_iter().filter_map(|node| value(cx, node, "an argument")).collect();
+            let what = operation.map_or_else(|| "an argument".to_owned(), |o| format!("an argument of `{o}`"));
+            let args: Vec<Value> = list.into_iter().filter_map(|node| value(cx, node, &what)).collect();
             (args.len() == length).then_some(args)
         }
         Some(node) => {
@@ -392,7 +397,7 @@ fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
     u32::try_from(length?).ok().map(Policy::Buffer)
 }
 
-fn properties(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Value> {
+fn properties(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
     let Some(entries) = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }") else {
         return BTreeMap::new();
     };
@@ -400,7 +405,11 @@ fn properties(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Value> {
     for entry in entries {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
         let field = name::<Ident>(cx, &key, "a property", "friction_comp = 0.9");
-        if let (Some(field), Some(value)) = (field, value(cx, entry.value, "a property's value")) {
+        let what = match (component, field) {
+            (Some(component), Some(field)) => format!("`{component}.{field}`"),
+            _ => "a property's value".to_owned(),
+        };
+        if let (Some(field), Some(value)) = (field, value(cx, entry.value, &what)) {
             out.insert(field, value);
         }
     }
