@@ -2,7 +2,9 @@
 
 use crate::model::codes::UNKNOWN_COMPONENT;
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, ChangeKind, ComponentName, ComponentType, Deployment, Finding, Origin, TypeName};
+use crate::model::{
+    Catalogue, ChangeKind, ComponentName, ComponentType, Deployment, Effect, Finding, MemberRef, Origin, TypeName,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -49,6 +51,15 @@ impl Universe {
     /// How a component of that name may have been created; empty when none creates it.
     pub fn of(&self, component: ComponentName) -> &[Creation] {
         self.components.get(&component).map_or(&[], Vec::as_slice)
+    }
+
+    /// The operations that undo another one, as the types say.
+    pub fn undone_by(&self, operation: MemberRef) -> impl Iterator<Item = MemberRef> + '_ {
+        let types = self.of(operation.component).iter().filter_map(|creation| creation.description.as_ref());
+        types.filter_map(move |ty| match &ty.operations.get(&operation.member)?.effect {
+            Effect::Undo(undo) => Some(operation.component.member(*undo)),
+            _ => None,
+        })
     }
 
     /// The finding that nothing creates a component of that name.

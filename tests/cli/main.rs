@@ -5,6 +5,7 @@ mod breakages;
 mod commands;
 mod demo;
 mod explored;
+mod faults;
 mod monitor;
 mod simulated;
 mod together;
