@@ -187,6 +187,13 @@ pub const EVENT_PAUSE: Duration = Duration::from_millis(1);
 /// Operations that may wait for an activity. They are called one after the other by a few workers.
 pub const ACTIVITY_REQUESTS: usize = 64;
 
+/// How often one fault of the simulated platform may happen at most: what is to go wrong more often is a slip of the pen.
+pub const FAULT_TIMES: u32 = 1_000_000;
+
+/// How long after its deadline a call that is to come back late does so on the simulated platform: long enough that whoever
+/// waited has settled what became of it.
+pub const FAULT_LATE: Duration = Duration::from_secs(5);
+
 /// How long taking down the embedded runtime waits for each thread of it; one that hangs is left behind.
 pub const RUNTIME_END: Duration = Duration::from_secs(1);
 /// Blocking platform calls one session makes at the same time: enough to configure the components of a robot side by

@@ -3,6 +3,7 @@
 //! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
+mod faults;
 mod sandbox;
 mod values;
 
@@ -11,7 +12,7 @@ use crate::functions::message_within;
 use crate::lang::LoadOptions;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ComponentName, ConfigId, EventName, MemberRef};
+use crate::model::{Ask, ComponentName, ConfigId, EventName, Ident, MemberRef};
 use crate::runtime::Libraries;
 use crate::session::{Ended, Hub, NotUp, Observer, Session};
 use crate::time::{Clock, Time};
@@ -30,6 +31,8 @@ pub struct Options {
     pub libraries: Libraries,
     /// Parameters for the deployments it loads (`--set`).
     pub load: LoadOptions,
+    /// The platform they run on, one of [`PLATFORMS`](super::PLATFORMS), instead of the one they name.
+    pub platform: Option<Ident>,
     /// Hears everything that happens.
     pub observer: Option<Observer>,
     /// Where `say` goes.
@@ -78,6 +81,8 @@ struct Host {
     options: Options,
     folder: PathBuf,
     session: Option<Arc<Session>>,
+    /// What goes wrong, and where it does.
+    faults: faults::Faults,
     /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
     mark: u64,
     taken: Vec<u64>,
@@ -102,6 +107,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         options,
         folder,
         session: None,
+        faults: faults::Faults::default(),
         mark: 0,
         taken: Vec::new(),
         refused: None,
@@ -150,6 +156,7 @@ pub const FUNCTIONS: &[&str] = &[
     "active",
     "now",
     "say",
+    "fault",
     "shutdown",
 ];
 
@@ -197,12 +204,16 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         (h.borrow().options.say)(&text);
         Ok(())
     });
+    function!("fault", (String, String, Option<f64>), |h, _lua, (step, how, times)| {
+        h.borrow_mut().faults.add(&step, &how, times)
+    });
     function!("shutdown", Option<Table>, |h, _lua, options| {
         let force = options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))?;
         let session = session(h)?;
         let ended = session.take_down(force);
         let mut host = h.borrow_mut();
         host.session = None;
+        host.faults.down();
         let clean = ended.is_clean();
         let left = ended.left.join(", ");
         host.ended = Some(ended);
@@ -248,7 +259,11 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
     let (path, checked) = {
         let host = host.borrow();
         let path = host.folder.join(file);
-        let checked = super::read(&path, &host.options.load, &host.options.libraries).and_then(super::check);
+        let read = super::read(&path, &host.options.load, &host.options.libraries);
+        let checked = read.and_then(|mut read| {
+            read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
+            super::check(read)
+        });
         (path, checked)
     };
     let checked = checked.map_err(|refused| {
@@ -256,7 +271,10 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
         error(format!("{file} is refused"))
     })?;
     let clock = clock(host);
-    let session = super::start(&checked, &clock).map_err(|e: StartError| error(e.to_string()))?;
+    host.borrow().faults.fit(&checked)?;
+    let started = super::start::start_open(&checked, &clock, true);
+    let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
+    host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {
         session.hub().observe(observer.clone());
     }
@@ -274,7 +292,9 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
                 text.push_str("\n  ");
                 text.push_str(reason);
             }
-            host.borrow_mut().ended = Some(ended);
+            let mut host = host.borrow_mut();
+            host.ended = Some(ended);
+            host.faults.down();
             Err(error(text))
         }
     }

@@ -25,7 +25,7 @@ use crate::model::codes::{
     CLASH, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED,
     UNKNOWN_COMPONENT,
 };
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Ident, Severity, finding};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, Ident, Severity, StepFault, finding};
 use crate::statechart::Chart;
 use crate::system::View;
 pub use drive::{Drive, Happening, Until, drive};
@@ -271,6 +271,11 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
         findings.extend(monitors::events(deployment, &charts.iter().collect::<Vec<_>>()));
     }
     findings
+}
+
+/// What is wrong with the step of a fault, where the deployment runs on the simulated platform.
+pub fn fault(fault: &StepFault, deployment: &Deployment, catalogue: &Catalogue) -> Findings {
+    simulated::fault(fault, deployment, &universe::Universe::new(deployment, catalogue))
 }
 
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.

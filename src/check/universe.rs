@@ -3,7 +3,7 @@
 use crate::model::codes::UNKNOWN_COMPONENT;
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Finding, MemberRef, Origin, Step,
+    Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin, Step,
     TypeName, Value,
 };
 use crate::system::{Member, System, Violation, step};
@@ -93,6 +93,15 @@ impl Universe {
             step::effect(&Step::Create { component: *component, ty: ty.name, activity: None, properties }, &mut system);
         }
         system
+    }
+
+    /// The operations that undo another one, as the types say.
+    pub fn undone_by(&self, operation: MemberRef) -> impl Iterator<Item = MemberRef> + '_ {
+        let types = self.of(operation.component).iter().filter_map(|creation| creation.description.as_ref());
+        types.filter_map(move |ty| match &ty.operations.get(&operation.member)?.effect {
+            Effect::Undo(undo) => Some(operation.component.member(*undo)),
+            _ => None,
+        })
     }
 
     /// The finding that nothing creates a component of that name.

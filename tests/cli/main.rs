@@ -6,6 +6,7 @@ mod commands;
 mod declared;
 mod demo;
 mod explored;
+mod faults;
 mod hot_swap;
 mod monitor;
 mod simulated;
