@@ -433,7 +433,7 @@ impl Engine {
         }
         while let Some((request, begun)) = self.current.pop() {
             let verdict = match request.ask {
-                Ask::Apply(_) | Ask::Commit => Verdict::Broken,
+                Ask::Apply(_) | Ask::Commit { .. } => Verdict::Broken,
                 Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoBroken,
             };
             self.tell_answer(request, verdict, Some(Arc::new(Reason::Broken(residual.clone()))), begun);
@@ -446,7 +446,7 @@ impl Engine {
         while let Some(batch) = self.queue.pop_front() {
             for request in batch.requests {
                 let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
+                    Ask::Apply(_) | Ask::Commit { .. } => Verdict::Failed,
                     Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
                 };
                 let now = self.clock.now();

@@ -32,7 +32,7 @@ mod work;
 pub use crate::stack::Requester;
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{Progress, ProgressSink, StepEnd, StepName};
-pub use request::{Answer, Batch, Full, Reason, Request, Residual};
+pub use request::{Answer, Batch, Full, Reason, Request, Residual, WAY_OUT};
 
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident, Verdict};
@@ -141,7 +141,7 @@ impl ConfiguratorHandle {
             let at = self.inner.clock.now();
             for request in batch.requests {
                 let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
+                    Ask::Apply(_) | Ask::Commit { .. } => Verdict::Failed,
                     Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
                 };
                 let reason = Some(Arc::new(Reason::Full));

@@ -10,6 +10,10 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// The way out of *broken*, as it is told wherever something is.
+pub const WAY_OUT: &str = "`davit undo ID` of the configuration that broke it goes back, and so does `davit recover --back`; \
+                           `davit recover --accept` takes what is there as the state; `davit drift` shows what differs";
+
 /// One request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
@@ -237,8 +241,7 @@ impl fmt::Display for Reason {
 
 impl Residual {
     fn finding(&self, code: crate::model::Code) -> Finding {
-        Finding::error(code, self.to_string())
-            .help("`davit drift` shows the difference, `davit recover --back` undoes it, `--forward` finishes it")
+        Finding::error(code, self.to_string()).help(WAY_OUT)
     }
 }
 

@@ -6,7 +6,7 @@ use super::progress::Progress;
 use super::request::{Batch, Reason, Request};
 use super::transaction::{Ended, Spec};
 use crate::model::{Ask, ConfigId, Configuration, OnFailure, Verdict};
-use crate::stack::Requester;
+use crate::stack::{Requester, may_commit};
 use smallvec::SmallVec;
 
 /// What a request comes to, once its names are looked up.
@@ -55,7 +55,7 @@ impl Engine {
                 }
                 Ask::Undo => self.handle_undo(request),
                 Ask::UndoTo(frames) => self.handle_undo_to(request, frames),
-                Ask::Commit => self.handle_commit(request),
+                Ask::Commit { force } => self.handle_commit(request, force),
             }
         }
         self.together(undos, pushes);
@@ -93,7 +93,7 @@ impl Engine {
                     }
                 }
             }
-            Ask::Undo | Ask::UndoTo(_) | Ask::Commit => {}
+            Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => {}
         }
         None
     }
@@ -286,18 +286,18 @@ impl Engine {
         self.alone(Part { request, op: Op::To(frames) });
     }
 
-    fn handle_commit(&mut self, request: Request) {
-        match &self.broken {
-            Some(broken) => {
-                let reason = Reason::StillBroken(broken.residual.clone());
-                self.answer(request, Verdict::Failed, Some(reason));
-            }
-            None => {
-                self.stack.make_floor();
-                self.confirming.clear();
-                self.answer(request, Verdict::Ok, None);
-            }
+    fn handle_commit(&mut self, request: Request, force: bool) {
+        if let Some(broken) = &self.broken {
+            let reason = Reason::StillBroken(broken.residual.clone());
+            return self.answer(request, Verdict::Failed, Some(reason));
         }
+        if let Err(held) = may_commit(&self.stack, request.requester, force) {
+            return self.answer(request, Verdict::Failed, Some(Reason::Refused(vec![held])));
+        }
+        self.stack.make_permanent(request.requester);
+        self.forget_confirmations();
+        self.changed();
+        self.answer(request, Verdict::Ok, None);
     }
 
     /// Pops the frames whose confirmation did not come in time, and says so.

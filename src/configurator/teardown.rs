@@ -72,6 +72,9 @@ impl Engine {
                         self.stack = Stack::new(self.limits.stack);
                         self.confirming.clear();
                         self.changed();
+                        if let Some(progress) = &self.progress {
+                            progress(&Progress::Recovered);
+                        }
                         Ok(())
                     }
                     _ => {
@@ -150,7 +153,7 @@ impl Engine {
             for request in batch.requests {
                 self.begin(request);
                 let verdict = match request.ask {
-                    Ask::Apply(_) | Ask::Commit => Verdict::Failed,
+                    Ask::Apply(_) | Ask::Commit { .. } => Verdict::Failed,
                     Ask::UndoOf(_) | Ask::Undo | Ask::UndoTo(_) => Verdict::UndoFailed,
                 };
                 self.answer(request, verdict, Some(Reason::TakenDown));

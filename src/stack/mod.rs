@@ -5,6 +5,7 @@
 //! and dropping the transaction leaves the stack as it was.
 
 mod net;
+mod permanent;
 mod prepared;
 mod share;
 mod squash;
@@ -13,6 +14,7 @@ mod tests;
 mod transaction;
 
 pub use net::reduce;
+pub use permanent::may_commit;
 pub use transaction::{Request, Transaction, transaction};
 
 use crate::model::{ComponentName, ConfigId, Finding, Ident, codes};
@@ -205,16 +207,6 @@ impl Stack {
         if active {
             self.active.push(frame);
         }
-    }
-
-    /// Makes the present state the floor: nothing that is in force now can be undone any more.
-    pub fn make_floor(&mut self) {
-        for frame in self.frames.drain(..) {
-            self.committed.insert(frame.part());
-            self.committed.extend(frame.parts.iter().copied());
-        }
-        self.active.clear();
-        self.version += 1;
     }
 
     /// Forgets everything: the system is empty, or is no longer what the frames say.

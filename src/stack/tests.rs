@@ -92,7 +92,7 @@ impl Bench {
         let running = [("A", RunState::Running), ("B", RunState::Running)];
         let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
         bench.ok(&[push(&up)]);
-        bench.stack.make_floor();
+        bench.stack.make_permanent(Requester::Operator);
         bench
     }
 
@@ -168,7 +168,7 @@ fn undo_does_not_pass_a_floor() {
     assert_eq!(bench.codes(&[Request::Undo(below)]), ["stack::floor"]);
     bench.ok(&[Request::UndoTop]);
     assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
-    bench.stack.make_floor();
+    bench.stack.make_permanent(Requester::Operator);
     assert_eq!(bench.codes(&[Request::UndoTop]), ["stack::floor"]);
     assert!(bench.stack.is_buried(ConfigId::new("weld").unwrap(), None));
     bench.stack.discard();

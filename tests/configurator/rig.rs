@@ -213,7 +213,8 @@ impl Rig {
     fn request(&self, word: &str, requester: Requester) -> Request {
         let ask = match word {
             "undo" => Ask::Undo,
-            "commit" => Ask::Commit,
+            "commit" => Ask::Commit { force: false },
+            "commit --force" => Ask::Commit { force: true },
             _ => match word.strip_suffix(".undo") {
                 Some(name) => Ask::UndoOf(id(name)),
                 None => match word.strip_prefix("to=") {
