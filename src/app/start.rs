@@ -3,7 +3,7 @@
 use super::Checked;
 use crate::functions::Opener;
 use crate::model::finding::did_you_mean;
-use crate::model::{Deployment, Ident, SimulatedReaction, Statechart};
+use crate::model::{Coordinator, Deployment, SimulatedReaction};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Simulated, StepPattern};
@@ -73,8 +73,7 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
 
 /// The same, on a platform of the caller's.
 pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -> Arc<Session> {
-    let beside = checked.deployment.beside.iter().map(|b| &b.chart);
-    let charts = std::iter::once(&checked.deployment.coordinator).chain(beside).map(|written| {
+    let charts = checked.deployment.charts().map(|written| {
         let (chart, _) = statechart::compile(written);
         Arc::new(chart.expect("a checked deployment's coordinators compile"))
     });
@@ -91,11 +90,9 @@ pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -
 /// What opens the functions of a deployment's coordinators, by coordinator; none for those that have none.
 fn openers(checked: &Checked) -> Vec<Option<Opener>> {
     let deployment = &checked.deployment;
-    let beside = deployment.beside.iter().map(|b| &b.chart);
-    let charts = std::iter::once(&deployment.coordinator).chain(beside);
-    let opener = |(name, chart): (Ident, &Statechart)| {
-        let program = deployment.programs.get(&name)?;
-        Some(Opener::new(program.clone(), Arc::new(chart.clone())))
+    let opener = |own: &Coordinator| {
+        let program = deployment.programs.get(&own.name)?;
+        Some(Opener::new(program.clone(), Arc::new(own.chart.clone())))
     };
-    deployment.coordinators().into_iter().zip(charts).map(opener).collect()
+    deployment.coordinators.iter().map(opener).collect()
 }

@@ -9,14 +9,15 @@
 use super::coordinator::ask_of;
 use crate::model::codes::{COORD_REQUEST_REFUSED, COORD_SHARED, DEPLOY_EVENT_UNHEARD, UNKNOWN_COMPONENT};
 use crate::model::{
-    Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Severity, Target,
+    Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Severity, Target,
 };
 use crate::statechart::{Chart, EventId};
 use std::collections::BTreeSet;
 
 /// The deployment as its `number`-th coordinator alone sees it. `charts` are all of them, compiled.
 pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option<Deployment> {
-    let mut seen = deployment.seen_by(number)?;
+    let alone = deployment.coordinators.get(number)?.clone();
+    let mut seen = Deployment { coordinators: vec![alone], ..deployment.clone() };
     let own = charts[number];
     let others = || charts.iter().enumerate().filter(move |(other, _)| *other != number).map(|(_, chart)| *chart);
     let raises = |chart: &Chart, name| chart.raises().iter().any(|site| site.name == name);
@@ -25,7 +26,7 @@ pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option
     let between = own.raises().iter().filter(|site| others().any(|other| other.event(site.name) != EventId::OTHER));
     seen.emits.extend(between.map(|site| (site.name, site.origin)));
     // A failed state without a coordinator's name is meant of those that have it; of the first, if none does.
-    seen.deploy
+    seen.coordinators[0]
         .failed
         .retain(|state| own.find(state).is_ok() || (number == 0 && !others().any(|other| other.find(state).is_ok())));
     Some(seen)
@@ -104,7 +105,7 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Fin
     if charts.len() < 2 {
         return Vec::new();
     }
-    let names = deployment.coordinators();
+    let names: Vec<Ident> = deployment.coordinators.iter().map(|c| c.name).collect();
     let of = |chart: &Chart| -> Vec<(&Configuration, BTreeSet<ComponentName>, bool)> {
         let ids = asked(deployment, chart);
         let configurations = deployment.configurations.iter().filter(|c| ids.contains(&c.id));

@@ -41,9 +41,13 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
 }
 
 fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
-    let mut named =
-        vec![("deploy.up".to_owned(), &deployment.deploy.up), ("shutdown.down".to_owned(), &deployment.shutdown.down)];
-    named.extend(deployment.deploy.failed.iter().enumerate().map(|(i, s)| (format!("deploy.failed[{i}]"), s)));
+    let mut named = vec![
+        ("deploy.up".to_owned(), &deployment.first_coordinator().up),
+        ("shutdown.down".to_owned(), &deployment.first_coordinator().down),
+    ];
+    named.extend(
+        deployment.first_coordinator().failed.iter().enumerate().map(|(i, s)| (format!("deploy.failed[{i}]"), s)),
+    );
     for (key, state) in named {
         if let Err(error) = chart.find(state) {
             let at = deployment.key_origins.get(&key).copied();
@@ -55,7 +59,7 @@ fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 Finding::error(DEPLOY_UNKNOWN_STATE, format!("{key}: {error}"))
                     .at(at)
                     .path(key)
-                    .also(deployment.coordinator.root.origin, "the coordinator")
+                    .also(deployment.first_coordinator().chart.root.origin, "the coordinator")
                     .help(did_you_mean(own, "states", names.iter().map(String::as_str))),
             );
         }
@@ -70,7 +74,7 @@ fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 )
                 .at(deployment.key_origin(key))
                 .path(key)
-                .also(deployment.coordinator.root.origin, "the coordinator")
+                .also(deployment.first_coordinator().chart.root.origin, "the coordinator")
                 .help(did_you_mean(event.as_str(), "events", heard)),
             );
         }

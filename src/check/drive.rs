@@ -89,7 +89,7 @@ pub(super) fn product<'a>(deployment: &'a Deployment, chart: &'a Chart, catalogu
         chart,
         reactions: Reactions::new(deployment, chart, &outside),
         worlds: Worlds::new(deployment, catalogue, undone(deployment, chart)),
-        down: chart.find(&deployment.shutdown.down).ok(),
+        down: chart.find(&deployment.first_coordinator().down).ok(),
     }
 }
 
@@ -197,8 +197,8 @@ fn settled(product: &mut Product<'_>, start: State) -> State {
 /// The ways up and, when that arrives, down. None when the coordinator cannot be entered or a state is not there.
 pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let deployment = product.deployment;
-    let up = product.chart.find(&deployment.deploy.up).ok()?;
-    let down = product.chart.find(&deployment.shutdown.down).ok()?;
+    let up = product.chart.find(&deployment.first_coordinator().up).ok()?;
+    let down = product.chart.find(&deployment.first_coordinator().down).ok()?;
     let start = product.start()?;
     let start = settled(product, start);
     let rise = way(product, start, deployment.deploy.event, deployment.shutdown.event, up);
@@ -214,7 +214,7 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
 ///
 /// None when the coordinator cannot be entered, or a state that the deployment names is not there.
 pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Option<Drive> {
-    let chart = crate::statechart::compile(&deployment.coordinator).0?;
+    let chart = crate::statechart::compile(&deployment.first_coordinator().chart).0?;
     let mut product = product(deployment, &chart, catalogue);
     let (rise, fall) = ways(&mut product)?;
     let mut world =

@@ -317,7 +317,7 @@ impl Search<'_, '_> {
             let fqn = product.chart.fqn(leaf);
             let finding = Finding::warning(
                 COORD_NO_WAY_DOWN,
-                format!("from `{fqn}` no way leads to `{}`", product.deployment.shutdown.down),
+                format!("from `{fqn}` no way leads to `{}`", product.deployment.first_coordinator().down),
             )
             .at(product.chart.origin(leaf))
             .path(format!("coordinator.{fqn}"))

@@ -279,5 +279,5 @@ impl Search<'_, '_> {
 
 /// Whether so many coordinators are followed together at all.
 pub fn few(deployment: &Deployment, charts: &[&Chart]) -> bool {
-    deployment.beside.len() < limits::CHECK_TOGETHER && charts.iter().all(|chart| chart.is_pure())
+    deployment.coordinators.len() <= limits::CHECK_TOGETHER && charts.iter().all(|chart| chart.is_pure())
 }

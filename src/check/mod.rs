@@ -6,6 +6,7 @@
 mod beside;
 mod configurations;
 mod coordinator;
+mod declared;
 mod drive;
 mod explore;
 mod joint;
@@ -104,7 +105,8 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     findings.extend(configurations::check(deployment, catalogue, &universe));
     findings.extend(monitors::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
-    let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
+    findings.extend(declared::check(deployment, &universe));
+    let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;
     for chart in written {
@@ -115,7 +117,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     }
     let mut looked = Looked {
         charts: charts.iter().collect(),
-        names: deployment.coordinators(),
+        names: deployment.coordinators.iter().map(|c| c.name).collect(),
         entangled: false,
         catalogue,
         findings,
@@ -134,7 +136,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         } else {
             let of = |number| beside::view(deployment, &looked.charts, number);
             let views: Vec<Deployment> = (0..all).filter_map(of).collect();
-            for (number, (seen, name)) in views.iter().zip(deployment.coordinators()).enumerate() {
+            for (number, (seen, name)) in views.iter().zip(deployment.coordinators.iter().map(|c| c.name)).enumerate() {
                 looked.at(seen, number, &format!("{name}: "));
             }
             looked.together(deployment, &views);
@@ -263,7 +265,7 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
         true => monitors::check(deployment, &universe::Universe::new(deployment, catalogue)),
         false => Vec::new(),
     };
-    let written = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
+    let written = deployment.charts();
     let charts: Option<Vec<Chart>> = written.map(|chart| crate::statechart::compile(chart).0).collect();
     if let Some(charts) = charts {
         findings.extend(monitors::events(deployment, &charts.iter().collect::<Vec<_>>()));
@@ -274,7 +276,9 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
 pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
     let universe = universe::Universe::new(deployment, catalogue);
-    configurations::some(deployment, catalogue, &universe, ids)
+    let mut findings = configurations::some(deployment, catalogue, &universe, ids);
+    findings.extend(declared::holds(deployment, &universe, ids));
+    findings
 }
 
 /// Bring-up and shutdown must work when everything goes well.
@@ -316,7 +320,7 @@ fn ways(deployment: &Deployment, chart: &Chart, product: &mut product::Product<'
     }
     if !rise.reached {
         found.push((
-            stops(&rise, DEPLOY_NEVER_UP, "deploy.up", &deployment.deploy.up, "the bring-up"),
+            stops(&rise, DEPLOY_NEVER_UP, "deploy.up", &deployment.first_coordinator().up, "the bring-up"),
             tell(product, &rise),
         ));
     }
@@ -341,7 +345,7 @@ fn ways(deployment: &Deployment, chart: &Chart, product: &mut product::Product<'
             }
         } else {
             found.push((
-                stops(&fall, DEPLOY_NEVER_DOWN, "shutdown.down", &deployment.shutdown.down, "the shutdown"),
+                stops(&fall, DEPLOY_NEVER_DOWN, "shutdown.down", &deployment.first_coordinator().down, "the shutdown"),
                 way,
             ));
         }

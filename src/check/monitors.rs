@@ -7,10 +7,9 @@ use crate::model::codes::{
     UNKNOWN_ACTIVITY, UNKNOWN_PORT,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
+use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
 use crate::model::{
-    Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Monitor, Origin, PortType,
-    ValueType,
+    Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
 use crate::statechart::Chart;
 use std::collections::BTreeSet;
@@ -20,9 +19,16 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     let mut check = Check { deployment, universe, path: String::new(), findings: Vec::new() };
     for monitor in &deployment.monitors {
         check.path = format!("monitors.{}", monitor.name);
-        check.monitor(monitor);
+        check.condition(&monitor.when);
     }
     check.findings.extend(never_run(deployment));
+    check.findings
+}
+
+/// What is wrong with a condition that is no monitor's, said with that path.
+pub fn condition(deployment: &Deployment, universe: &Universe, condition: &Condition, path: String) -> Findings {
+    let mut check = Check { deployment, universe, path, findings: Vec::new() };
+    check.condition(condition);
     check.findings
 }
 
@@ -84,8 +90,8 @@ impl Check<'_> {
         self.findings.push(finding.path(self.path.clone()));
     }
 
-    fn monitor(&mut self, monitor: &Monitor) {
-        monitor.for_each_condition(&mut |condition| match &condition.kind {
+    fn condition(&mut self, condition: &Condition) {
+        condition.for_each(&mut |condition| match &condition.kind {
             ConditionKind::IsTrue(port) => self.number(port, condition.origin),
             ConditionKind::InState { component, .. } | ConditionKind::Faulted(component) => {
                 self.component(*component, condition.origin);
@@ -93,7 +99,7 @@ impl Check<'_> {
             ConditionKind::Silent { port, .. } => _ = self.port(*port, condition.origin),
             _ => {}
         });
-        monitor.for_each_signal(&mut |signal| match &signal.kind {
+        condition.for_each_signal(&mut |signal| match &signal.kind {
             SignalKind::Port(port) => self.number(port, signal.origin),
             SignalKind::Age(port) | SignalKind::Rate { port, .. } => _ = self.port(*port, signal.origin),
             SignalKind::Activity { activity, .. } => self.activity(*activity, signal.origin),

@@ -14,10 +14,10 @@ const TELLS: &str = "checkevents";
 /// One finding that names every state and transition with functions, and the plugins that added some; none for a
 /// coordinator without any.
 pub fn check(deployment: &Deployment) -> Option<Finding> {
-    let name = deployment.coordinators().into_iter().next();
-    let program = name.and_then(|name| deployment.programs.get(&name));
+    let coordinator = deployment.first_coordinator();
+    let program = deployment.programs.get(&coordinator.name);
     let beside = program.map_or(&[][..], |program| &program.beside);
-    let places = function_places(&deployment.coordinator, beside);
+    let places = function_places(&coordinator.chart, beside);
     // Of each plugin: in how many places it put a function, and the first of them.
     let mut plugins: BTreeMap<&str, (usize, Origin)> = BTreeMap::new();
     for place in &places {
@@ -50,7 +50,7 @@ pub fn check(deployment: &Deployment) -> Option<Finding> {
         message += &format!(", beside those of {by}");
     }
     let mut finding = Finding::info(COORD_NOT_PURE, message + ": what depends on them is not verified")
-        .at(deployment.coordinator.root.origin);
+        .at(coordinator.chart.root.origin);
     for place in own.iter().take(SHOWN) {
         let parts = place.own();
         finding = finding.also(place.origin, format!("{}: {} — {}", place.what, parts.join(", "), unknown(&parts)));

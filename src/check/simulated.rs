@@ -1,11 +1,11 @@
-//! What the deployment says that simulated components raise by themselves: do the steps and components exist, does somebody
-//! listen.
+//! What the deployment says that simulated components raise by themselves, and what goes wrong there: do the steps and
+//! components exist, does somebody listen.
 
 use super::configurations::Member;
 use super::universe::Universe;
 use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP};
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, Deployment, Finding, Findings, MemberRef, SimulatedReaction};
+use crate::model::{ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction};
 use crate::statechart::Chart;
 use std::collections::BTreeSet;
 
@@ -25,11 +25,25 @@ const PARTS: [(&str, Member); 5] = [
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     let mut findings = Vec::new();
     for (i, reaction) in deployment.reactions.iter().enumerate() {
-        let mut wrong = step(reaction, universe);
+        let mut wrong = step(&reaction.after, reaction.origin, universe);
         if universe.of(reaction.component).is_empty() {
             wrong.push(universe.unknown(reaction.component, reaction.origin));
         }
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("simulated.reactions[{i}]"))));
+    }
+    for (i, fault) in deployment.faults.iter().enumerate() {
+        let wrong = step(&fault.step, fault.origin, universe);
+        findings.extend(wrong.into_iter().map(|finding| finding.path(format!("faults[{i}]"))));
+    }
+    if deployment.platform.as_str() != "simulated" && !deployment.faults.is_empty() {
+        let message =
+            format!("the platform is `{}`: faults are injected on the simulated one only", deployment.platform);
+        findings.push(
+            Finding::info(SIMULATED_NOT_USED, message)
+                .at(deployment.key_origin("faults"))
+                .path("faults")
+                .help("`davit run --platform simulated` runs it there"),
+        );
     }
     if deployment.platform.as_str() != "simulated" && !deployment.reactions.is_empty() {
         let message = format!("the platform is `{}`: what `simulated` says is not used", deployment.platform);
@@ -61,83 +75,83 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     .collect()
 }
 
-/// What is wrong with the step after which it happens. A verb alone means each of its steps.
-fn step(reaction: &SimulatedReaction, universe: &Universe) -> Findings {
-    let text = reaction.after.trim();
+/// What is wrong with the text of a step. A verb alone means each of its steps.
+fn step(text: &str, at: Origin, universe: &Universe) -> Findings {
+    let text = text.trim();
     let (verb, rest) = text.split_once(' ').map_or((text, None), |(verb, rest)| (verb, Some(rest)));
     let part = PARTS.iter().find(|(name, _)| *name == verb).map(|(_, member)| *member);
     if part.is_none() && !WHOLE.contains(&verb) {
         let known = WHOLE.into_iter().chain(PARTS.iter().map(|(name, _)| *name));
         return vec![
             Finding::error(SIMULATED_UNKNOWN_STEP, format!("`{verb}` is no step"))
-                .at(reaction.origin)
-                .labelled("after which step?")
+                .at(at)
+                .labelled("which step?")
                 .help(did_you_mean(verb, "steps", known)),
         ];
     }
     let Some(rest) = rest else { return Vec::new() };
-    let Some(part) = part else { return whole(reaction, verb, rest, universe) };
+    let Some(part) = part else { return whole(at, verb, rest, universe) };
     if !matches!(verb, "connect" | "disconnect") {
         // A value or arguments follow, which nobody can know before the step is planned.
         let (operand, _) = rest.split_once([' ', '(']).unwrap_or((rest, ""));
-        return member(reaction, verb, part, operand, universe);
+        return member(at, verb, part, operand, universe);
     }
     let mut words = rest.split(' ');
-    let mut findings = member(reaction, verb, part, words.next().unwrap_or_default(), universe);
+    let mut findings = member(at, verb, part, words.next().unwrap_or_default(), universe);
     match words.next() {
         None => {}
         Some("->") => {
-            findings.extend(words.next().into_iter().flat_map(|to| member(reaction, verb, part, to, universe)));
+            findings.extend(words.next().into_iter().flat_map(|to| member(at, verb, part, to, universe)));
             let policy = words.collect::<Vec<_>>().join(" ");
             if !policy.is_empty() && (verb == "disconnect" || !policy.starts_with('(')) {
-                findings.push(never(reaction, &policy, &format!("{verb} radio.out -> arm.in")));
+                findings.push(never(at, &policy, &format!("{verb} radio.out -> arm.in")));
             }
         }
-        Some(word) => findings.push(never(reaction, word, &format!("{verb} radio.out -> arm.in"))),
+        Some(word) => findings.push(never(at, word, &format!("{verb} radio.out -> arm.in"))),
     }
     findings
 }
 
 /// What follows is in the text of no such step.
-fn never(reaction: &SimulatedReaction, word: &str, example: &str) -> Finding {
+fn never(at: Origin, word: &str, example: &str) -> Finding {
     Finding::error(SIMULATED_UNKNOWN_STEP, format!("no step is written with `{word}` there"))
-        .at(reaction.origin)
-        .labelled("after which step?")
+        .at(at)
+        .labelled("which step?")
         .help(format!("write it as `davit plan` prints steps, such as `{example}`"))
 }
 
 /// What is wrong with the component of a step that is done to it as a whole. A creation goes on with its type.
-fn whole(reaction: &SimulatedReaction, verb: &str, rest: &str, universe: &Universe) -> Findings {
+fn whole(at: Origin, verb: &str, rest: &str, universe: &Universe) -> Findings {
     let mut words = rest.split(' ');
     let operand = words.next().unwrap_or_default();
     let Ok(name) = ComponentName::new(operand) else {
-        return vec![unreadable(reaction, operand, "a component", &format!("{verb} radio"))];
+        return vec![unreadable(at, operand, "a component", &format!("{verb} radio"))];
     };
     let creations = universe.of(name);
     if creations.is_empty() {
-        return vec![universe.unknown(name, reaction.origin)];
+        return vec![universe.unknown(name, at)];
     }
     match words.next() {
         None => Vec::new(),
         Some(":") if verb == "create" => Vec::new(),
-        Some(word) => vec![never(reaction, word, &format!("{verb} {operand}"))],
+        Some(word) => vec![never(at, word, &format!("{verb} {operand}"))],
     }
 }
 
-fn unreadable(reaction: &SimulatedReaction, operand: &str, what: &str, example: &str) -> Finding {
+fn unreadable(at: Origin, operand: &str, what: &str, example: &str) -> Finding {
     Finding::error(SIMULATED_UNKNOWN_STEP, format!("`{operand}` is not {what}"))
-        .at(reaction.origin)
+        .at(at)
         .help(format!("write it as `davit plan` prints steps, such as `{example}`"))
 }
 
 /// What is wrong with a member that a step is done to.
-fn member(reaction: &SimulatedReaction, verb: &str, part: Member, operand: &str, universe: &Universe) -> Findings {
+fn member(at: Origin, verb: &str, part: Member, operand: &str, universe: &Universe) -> Findings {
     let Ok(member) = MemberRef::new(operand) else {
-        return vec![unreadable(reaction, operand, "a member of a component", &format!("{verb} radio.channel"))];
+        return vec![unreadable(at, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };
     let creations = universe.of(member.component);
     if creations.is_empty() {
-        return vec![universe.unknown(member.component, reaction.origin)];
+        return vec![universe.unknown(member.component, at)];
     }
     let types = || creations.iter().filter_map(|creation| creation.description.as_ref());
     // That a type is unknown is said where it is created.
@@ -148,7 +162,7 @@ fn member(reaction: &SimulatedReaction, verb: &str, part: Member, operand: &str,
     let known: BTreeSet<&str> = types().flat_map(|ty| part.of(ty)).collect();
     vec![
         Finding::error(code, format!("{} has no {what} `{}`", member.component, member.member))
-            .at(reaction.origin)
+            .at(at)
             .labelled(format!("no such {what}"))
             .help(did_you_mean(member.member.as_str(), plural, known)),
     ]

@@ -85,7 +85,7 @@ pub struct Together<'a> {
 impl<'a> Together<'a> {
     /// The product of these charts. `views` are the deployment as each of them sees it.
     pub fn new(deployment: &'a Deployment, views: &[Deployment], charts: &[&'a Chart], catalogue: &Catalogue) -> Self {
-        let names = deployment.coordinators();
+        let names: Vec<Ident> = deployment.coordinators.iter().map(|c| c.name).collect();
         let raised: Vec<BTreeSet<EventName>> =
             charts.iter().map(|chart| chart.raises().iter().map(|site| site.name).collect()).collect();
         let mut outside = BTreeSet::new();
@@ -102,8 +102,8 @@ impl<'a> Together<'a> {
             members.push(Member {
                 name: *name,
                 chart,
-                up: chart.find(&view.deploy.up).ok(),
-                down: chart.find(&view.shutdown.down).ok(),
+                up: chart.find(&view.first_coordinator().up).ok(),
+                down: chart.find(&view.first_coordinator().down).ok(),
                 undone: drive::undone(deployment, chart),
                 by: Requester::Coordinator(ComponentName::new(name.as_str()).expect("a plain name")),
                 reactions: Reactions::new(deployment, chart, &own),

@@ -1,4 +1,4 @@
-//! The component types that a deployment declares, and what it says about itself.
+//! The component types that a deployment declares.
 
 use crate::model::codes::{TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;

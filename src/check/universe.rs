@@ -39,6 +39,13 @@ impl Universe {
         Self { components }
     }
 
+    /// One component of one type.
+    pub fn alone(component: &str, ty: &ComponentType) -> Self {
+        let name = ComponentName::new(component).expect("the name of a component");
+        let creation = Creation { ty: ty.name, description: Some(Arc::new(ty.clone())), origin: ty.origin };
+        Self { components: BTreeMap::from([(name, vec![creation])]) }
+    }
+
     /// How a component of that name may have been created; empty when none creates it.
     pub fn of(&self, component: ComponentName) -> &[Creation] {
         self.components.get(&component).map_or(&[], Vec::as_slice)

@@ -143,7 +143,7 @@ pub fn coordinator(
 
 /// The coordinator of that name; without one, the only one.
 fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(String, Statechart, Option<Arc<Program>>), Failure> {
-    let names = deployment.coordinators();
+    let names: Vec<Ident> = deployment.coordinators.iter().map(|c| c.name).collect();
     let number = match of {
         None if names.len() == 1 => Some(0),
         None => None,
@@ -160,12 +160,9 @@ fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(String, Statechar
         };
         return Err(Failure::usage(CLI_WHICH_COORDINATOR, message, help));
     };
-    let program = deployment.programs.get(&names[number]).cloned();
-    let chart = match number.checked_sub(1) {
-        None => deployment.coordinator,
-        Some(at) => deployment.beside.into_iter().nth(at).map_or(deployment.coordinator, |own| own.chart),
-    };
-    Ok((names[number].to_string(), chart, program))
+    let mut deployment = deployment;
+    let own = deployment.coordinators.swap_remove(number);
+    Ok((own.name.to_string(), own.chart, deployment.programs.remove(&own.name)))
 }
 
 fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {

@@ -204,8 +204,8 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
         return Err(check::run(deployment.clone(), &read.catalogue).findings);
     };
     let (code, what, key, goal) = match until {
-        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.deploy.up),
-        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &deployment.shutdown.down),
+        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.first_coordinator().up),
+        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &deployment.first_coordinator().down),
     };
     let on_the_way = drive.happenings.iter().flat_map(|happening| match happening {
         Happening::Applied { asks, .. } => asks.as_slice(),

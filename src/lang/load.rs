@@ -449,7 +449,10 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
     if charts.len() < draft.coordinators.len() {
         return None;
     }
-    let joined = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?)?;
+    if charts.is_empty() {
+        return None;
+    }
+    let (coordinators, deploy, shutdown) = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?);
     Some(Deployment {
         name: draft.name?,
         platform: draft.platform?,
@@ -457,17 +460,17 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
         types: draft.types,
         activities: draft.activities,
         configurations,
-        coordinator: joined.coordinator,
+        coordinators,
         programs,
-        first: joined.first,
-        beside: joined.beside,
         monitors,
         emits: draft.emits,
-        deploy: joined.deploy,
-        shutdown: joined.shutdown,
+        safety: draft.safety,
+        operator: draft.operator,
+        deploy,
+        shutdown,
         limits: draft.limits,
-        durability: draft.durability,
         reactions: draft.reactions,
+        faults: draft.faults,
         origin,
         key_origins: draft.key_origins,
     })

@@ -186,6 +186,13 @@ codes! {
         "The coordinator reaches the state that means down, but components that the bring-up created are still there. \
          Shutdown would have to be forced, without the order that the coordinator knows. Let the coordinator undo what it \
          applied, or apply a configuration that destroys what is left; the finding names it.";
+    DEPLOY_UNKNOWN_CONFIGURATION = "deploy::unknown_configuration", "the deployment names a configuration that there is not",
+        "`operator` lists what an operator may do while the deployment is up: configurations by their names, properties and \
+         in-ports as `Component.member`. `shutdown.rest` lists the configurations that bring the system to rest when it is \
+         taken down by force. A name that no configuration has would be missed when it is needed. Correct it, or remove it.";
+    DEPLOY_NO_JOURNAL = "deploy::no_journal", "there is no journal whose durability could be set",
+        "`durability` is to say how safely a journal is kept, and no journal is written yet: whatever the key said, a crash \
+         would lose the same. A promise that is not kept is worse than none, so the key is refused. Leave it out.";
     DEPLOY_UNKNOWN_LIBRARY = "deploy::unknown_library", "there is no such component library",
         "`libraries` names the component libraries that this program was built with. A library of your own is linked into \
          a program of your own: `davit::cli::main(libraries)`. `davit types` lists what this program has.";
@@ -200,6 +207,10 @@ codes! {
         "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
          or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \
          arguments, or declare the effect as `none` or `irreversible`.";
+    TYPE_SETTLED_ELSEWHERE = "type::settled_elsewhere", "the condition that settles an operation is not about its own component",
+        "`settled_by` is a condition that is true once the operation was done, so that a call of which no answer came can be \
+         settled by looking. It is written of the component itself, under the name `self`: `equals: [self.mode, 6]`. Ports \
+         are those of the type; other components and activities are not known to a type.";
     DEPLOY_UNKNOWN_PLATFORM = "deploy::unknown_platform", "there is no such platform",
         "The key `platform` names where the components live, and this program has no platform of that name. `embedded` \
          runs components of the libraries in this process; `simulated` runs any declared type without components.";
@@ -222,6 +233,13 @@ codes! {
     CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
         "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
          them, and the requests for it.";
+    CONF_CONFIRM_CONTRADICTED = "conf::confirm_contradicted", "`confirm` stands beside `safe` or `on_failure = \"hold\"`",
+        "`confirm` says that the configuration is undone when an event does not come in time. A safe configuration stays in \
+         force until somebody undoes it, and `on_failure = \"hold\"` says that nothing is undone unasked: both at once \
+         cannot be kept. Keep one. A coordinator can wait for the event itself, with `e_after(s)`, and undo.";
+    CONF_ON_FAILURE_SAFE = "conf::on_failure_safe", "`on_failure` stands beside `safe`",
+        "Of a safe configuration every step is tried, past failures, and none is taken back: that is what makes it safe to \
+         ask for at any time. `on_failure` says something else of failures. Leave it out.";
     UNKNOWN_COMPONENT = "conf::unknown_component", "there is no such component",
         "The configuration names a component that does not exist where it is applied: it was never created, was destroyed, or its name is misspelt. Nothing can be done to it. Create it earlier (or in the same configuration), or correct the name.";
     UNKNOWN_TYPE = "conf::unknown_type", "there is no such component type",
@@ -641,16 +659,16 @@ codes! {
         "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
          watches in vain. The name may be misspelt in one of the two places.";
     // ---- the simulated platform ------------------------------------------------------------------------------------
-    SIMULATED_UNKNOWN_STEP = "simulated::unknown_step", "a reaction of a simulated component names no step",
-        "`simulated: { reactions: [...] }` says what components raise by themselves after a step was done. The step is \
-         written as `davit plan` prints it, or with its beginning: `start radio`, `property_set radio.channel`, \
+    SIMULATED_UNKNOWN_STEP = "simulated::unknown_step", "a reaction or a fault of the simulated platform names no step",
+        "`simulated: { reactions: [...] }` says what components raise by themselves after a step was done, `faults: [...]` \
+         which steps go wrong. The step is written as `davit plan` prints it, or with its beginning: `start radio`, `property_set radio.channel`, \
          `operation_call arm.home`, or a verb alone for all of its steps. Here the first word is no step's, or what follows \
-         is no component or member, or stands in no step's text: the reaction would never come.";
+         is no component or member, or stands in no step's text: the reaction or fault would never come.";
     SIMULATED_UNHEARD = "simulated::unheard", "nobody listens to what a simulated component raises",
         "A simulated component raises an event that no transition of a coordinator waits for, and no configuration is \
          confirmed by it. It is probably misspelt; if not, it can be left out.";
-    SIMULATED_NOT_USED = "simulated::not_used", "`simulated` is said of another platform",
-        "What `simulated` says stands for the behaviour of components that the simulated platform does not run. On another \
+    SIMULATED_NOT_USED = "simulated::not_used", "`simulated` or `faults` is said of another platform",
+        "`faults` are injected where the simulated platform runs the deployment, and nowhere else. What `simulated` says stands for the behaviour of components that the simulated platform does not run. On another \
          platform the components behave by themselves, and it is not used.";
     // ---- recorded samples ------------------------------------------------------------------------------------------
     SAMPLES_UNREADABLE = "samples::unreadable", "a file of samples cannot be read",

@@ -1,7 +1,8 @@
 //! Component types: what components of a type have and may do.
 
 use super::finding::Origin;
-use super::names::{Ident, TypeName};
+use super::monitor::{Condition, SELF};
+use super::names::{ComponentName, Ident, TypeName};
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
 use serde::Serialize;
@@ -27,11 +28,22 @@ pub struct ComponentType {
     pub stop_before: Vec<TypeName>,
     /// Whether it moves something.
     pub actuator: bool,
+    /// Which of its run state's changes move hardware.
+    pub moves: Moves,
     /// What of its life cannot be undone.
     pub irreversible: Irreversible,
     /// Where it was declared (none for types of a library).
     #[serde(skip)]
     pub origin: Origin,
+}
+
+/// Which changes of a component's run state move hardware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Moves {
+    /// Starting.
+    pub start: bool,
+    /// Stopping.
+    pub stop: bool,
 }
 
 /// Which moves of a component cannot be undone.
@@ -199,11 +211,43 @@ pub struct OperationType {
     pub returns: Option<ValueType>,
     /// What it leaves behind; without a word, irreversible.
     pub effect: Effect,
+    /// Whether calling it moves hardware.
+    pub moves: bool,
+    /// What is true of the component once it was done: this settles a call of which no answer came. The component itself is
+    /// written [`SELF`](super::monitor::SELF) in it.
+    #[serde(skip)]
+    pub settled_by: Option<Condition>,
     /// What it does.
     pub doc: String,
     /// Where it was declared.
     #[serde(skip)]
     pub origin: Origin,
+}
+
+impl OperationType {
+    /// One without arguments and result.
+    pub fn new(effect: Effect) -> Self {
+        Self {
+            args: Vec::new(),
+            returns: None,
+            effect,
+            moves: false,
+            settled_by: None,
+            doc: String::new(),
+            origin: Origin::NONE,
+        }
+    }
+
+    /// The condition that settles a call of it on `component`.
+    pub fn settled_by_for(&self, component: ComponentName) -> Option<Condition> {
+        let mut condition = self.settled_by.clone()?;
+        condition.for_each_component_mut(&mut |name| {
+            if name.as_str() == SELF {
+                *name = component;
+            }
+        });
+        Some(condition)
+    }
 }
 
 /// The component types a deployment may use, by name.
@@ -255,6 +299,7 @@ impl ComponentType {
             start_after: Vec::new(),
             stop_before: Vec::new(),
             actuator: false,
+            moves: Moves::default(),
             irreversible: Irreversible::default(),
             origin: Origin::NONE,
         }

@@ -1,6 +1,7 @@
 //! Configurations: what is to be changed, as written (paper §"Modeling configuration"; design §3).
 
 use super::finding::Origin;
+use super::monitor::Condition;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
 use super::run_state::RunState;
 use super::value::Value;
@@ -28,6 +29,8 @@ pub struct Configuration {
     pub safe: bool,
     /// What to do when a step fails.
     pub on_failure: OnFailure,
+    /// What it stands for: true once it has been applied, and watched while a frame of it is in force.
+    pub holds: Option<Condition>,
     /// Popped again unless this comes in time.
     pub confirm: Option<Confirm>,
     /// The author knows that it contains steps that cannot be undone.
@@ -49,7 +52,8 @@ impl Configuration {
             timeout: None,
             group: None,
             safe: false,
-            on_failure: OnFailure::Rollback,
+            on_failure: OnFailure::Unset,
+            holds: None,
             confirm: None,
             irreversible: false,
             description: None,
@@ -62,10 +66,12 @@ impl Configuration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OnFailure {
-    /// What was done is undone.
+    /// Not said: what was done is undone, as far as undoing it moves nothing.
     #[default]
+    Unset,
+    /// What was done is undone, also where that moves hardware.
     Rollback,
-    /// Nothing is undone; the answer is *broken* with its residual, and the coordinator decides.
+    /// Nothing is undone; the answer is *broken*, what was done stays, and the coordinator decides.
     Hold,
 }
 

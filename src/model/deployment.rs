@@ -4,11 +4,12 @@ use super::component_type::ComponentType;
 use super::configuration::Configuration;
 use super::finding::Origin;
 use super::monitor::Monitor;
-use super::names::{ComponentName, ConfigId, EventName, Ident};
+use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::program::Program;
 use super::statechart::Statechart;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,28 +28,28 @@ pub struct Deployment {
     pub activities: BTreeMap<Ident, Activity>,
     /// Configurations in written order; IDs are unique.
     pub configurations: Vec<Configuration>,
-    /// The coordinator; the first one, if there are several.
-    pub coordinator: Statechart,
-    /// The first coordinator's name, where it was given one; else it is called like the deployment.
-    pub first: Option<Ident>,
-    /// Coordinators that run beside the first one.
-    pub beside: Vec<Beside>,
+    /// The coordinators in written order: at least one, and no two of one name.
+    pub coordinators: Vec<Coordinator>,
     /// The texts of coordinators that have functions, by the coordinators' names.
     pub programs: BTreeMap<Ident, Arc<Program>>,
     /// Monitors in written order; names are unique.
     pub monitors: Vec<Monitor>,
     /// Events that leave the deployment.
     pub emits: Vec<(EventName, Origin)>,
+    /// Events that must lead to a `safe` configuration wherever an actuator exists.
+    pub safety: Vec<(EventName, Origin)>,
+    /// What an operator may do while it is up.
+    pub operator: Vec<(OperatorMay, Origin)>,
     /// How it is brought up.
     pub deploy: BringUp,
     /// How it is taken down.
     pub shutdown: TakeDown,
     /// Bounds the user may set.
     pub limits: DeploymentLimits,
-    /// How safely the journal is kept.
-    pub durability: Durability,
     /// What simulated components raise by themselves; nothing on other platforms.
     pub reactions: Vec<SimulatedReaction>,
+    /// What goes wrong on the simulated platform.
+    pub faults: Vec<StepFault>,
     /// Where it was written.
     pub origin: Origin,
     /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
@@ -56,15 +57,17 @@ pub struct Deployment {
     pub key_origins: BTreeMap<String, Origin>,
 }
 
-/// A coordinator beside the first one. It has its own state that means *up* and its own that means *down*: a deployment is
-/// up when all of its coordinators are.
+/// A coordinator of a deployment. Each has its own state that means *up* and its own that means *down*: a deployment is up
+/// when all of its coordinators are.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beside {
-    /// Its name, by which its frames are known.
+pub struct Coordinator {
+    /// Its name, by which its frames are known. One without a name of its own is called like the deployment.
     pub name: Ident,
+    /// How it came to its name.
+    pub written: Written,
     /// Its statechart.
     pub chart: Statechart,
-    /// Its state that means *up*.
+    /// Its state that means *up*: a name or a path (`operational`, `root.operational`).
     pub up: String,
     /// Its states that mean that the bring-up failed.
     pub failed: Vec<String>,
@@ -72,6 +75,16 @@ pub struct Beside {
     pub down: String,
     /// Where it was named.
     pub origin: Origin,
+}
+
+/// How a deployment names a coordinator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Written {
+    /// `coordinator: FILE`: it has the name of the deployment.
+    #[default]
+    Alone,
+    /// `coordinators: { NAME: FILE }`.
+    Named,
 }
 
 /// What a component of the simulated platform raises by itself after a step was done: this stands for its behaviour, so
@@ -90,6 +103,70 @@ pub struct SimulatedReaction {
     pub origin: Origin,
 }
 
+/// A step of the simulated platform that goes wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepFault {
+    /// Each step whose text begins so, at a word's end: `property_set a.k`, `start radio`.
+    pub step: String,
+    /// How.
+    pub how: FaultKind,
+    /// How many times, 1 or more; after that the step goes well.
+    pub times: u32,
+    /// Where it was written.
+    pub origin: Origin,
+}
+
+/// How a step goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FaultKind {
+    /// It is not done, and that is answered.
+    Fail,
+    /// Its call never comes back.
+    Hang,
+    /// Its call comes back after the deadline; what it had done is taken back then.
+    Late,
+    /// It is done, and nothing is answered.
+    Lost,
+    /// It is not done, and the answer says that it was.
+    Lie,
+}
+
+impl FaultKind {
+    /// All, with the words they are written by.
+    pub const NAMES: [(&'static str, Self); 5] =
+        [("fail", Self::Fail), ("hang", Self::Hang), ("late", Self::Late), ("lost", Self::Lost), ("lie", Self::Lie)];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Fail => "fail",
+            Self::Hang => "hang",
+            Self::Late => "late",
+            Self::Lost => "lost",
+            Self::Lie => "lie",
+        }
+    }
+}
+
+/// Something that an operator may do without being told that it is outside of what was checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum OperatorMay {
+    /// Apply this configuration.
+    Apply(ConfigId),
+    /// Set this property, or write this in-port.
+    Set(MemberRef),
+}
+
+impl fmt::Display for OperatorMay {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Apply(id) => write!(f, "{id}"),
+            Self::Set(member) => write!(f, "{member}"),
+        }
+    }
+}
+
 /// A thread of the embedded runtime that updates components.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Activity {
@@ -104,28 +181,24 @@ pub struct Activity {
     pub origin: Origin,
 }
 
-/// How a deployment comes up.
-#[derive(Debug, Clone, PartialEq)]
+/// How a deployment comes up. Which states mean *up* and *failed* is said of each [`Coordinator`].
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BringUp {
     /// The event that starts it.
     pub event: EventName,
-    /// The coordinator's state that means *up*: a name or a path (`operational`, `root.operational`).
-    pub up: String,
-    /// States that mean it failed.
-    pub failed: Vec<String>,
     /// How long it may take.
     pub within: Duration,
 }
 
-/// How a deployment goes down.
+/// How a deployment goes down. Which state means *down* is said of each [`Coordinator`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct TakeDown {
     /// The event that starts it.
     pub event: EventName,
-    /// The coordinator's state that means *down*.
-    pub down: String,
-    /// How long it may take before it is forced.
+    /// How long each stage of it may take before the next begins.
     pub within: Duration,
+    /// Configurations that bring the system to rest when it is taken down by force, in this order.
+    pub rest: Vec<(ConfigId, Origin)>,
 }
 
 /// Bounds the user may set; defaults are in [`crate::limits`].
@@ -143,40 +216,36 @@ impl Default for DeploymentLimits {
     }
 }
 
-/// How safely the journal is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Durability {
-    /// Every application is on disk before it begins.
-    #[default]
-    Full,
-    /// Faster; after a crash the last application may be unknown.
-    Relaxed,
-}
-
 impl Deployment {
     /// The configuration of that name.
     pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
         self.configurations.iter().find(|c| c.id == id)
     }
 
-    /// The names of the coordinators, the first one's first.
-    pub fn coordinators(&self) -> Vec<Ident> {
-        std::iter::once(self.first.unwrap_or(self.name)).chain(self.beside.iter().map(|b| b.name)).collect()
+    /// The coordinator of that name.
+    pub fn coordinator_named(&self, name: Ident) -> Option<&Coordinator> {
+        self.coordinators.iter().find(|c| c.name == name)
     }
 
-    /// The deployment as one of its coordinators sees it: that one alone, with its states. `None` for a number past the last.
-    pub fn seen_by(&self, number: usize) -> Option<Self> {
-        let mut seen = Self { beside: Vec::new(), ..self.clone() };
-        if let Some(number) = number.checked_sub(1) {
-            let own = self.beside.get(number)?;
-            seen.coordinator = own.chart.clone();
-            seen.first = Some(own.name);
-            seen.deploy.up.clone_from(&own.up);
-            seen.deploy.failed.clone_from(&own.failed);
-            seen.shutdown.down.clone_from(&own.down);
+    /// The coordinator that is named first: the only one, for what looks at one alone.
+    ///
+    /// # Panics
+    /// When there is none, which no text can say.
+    pub fn first_coordinator(&self) -> &Coordinator {
+        self.coordinators.first().expect("a deployment has a coordinator")
+    }
+
+    /// The statecharts of the coordinators, in order.
+    pub fn charts(&self) -> impl Iterator<Item = &Statechart> {
+        self.coordinators.iter().map(|c| &c.chart)
+    }
+
+    /// The states that mean *down*, for messages: `idle`; of several coordinators `arm:idle, gripper:open`.
+    pub fn down_states(&self) -> String {
+        match &self.coordinators[..] {
+            [one] => one.down.clone(),
+            all => all.iter().map(|c| format!("{}:{}", c.name, c.down)).collect::<Vec<_>>().join(", "),
         }
-        Some(seen)
     }
 
     /// Where the key of that path was written.

@@ -18,11 +18,12 @@ pub mod step;
 pub mod value;
 
 pub use component_type::{
-    Catalogue, ComponentType, Direction, Effect, Irreversible, OperationType, PortType, PropertyType, Tunable,
+    Catalogue, ComponentType, Direction, Effect, Irreversible, Moves, OperationType, PortType, PropertyType, Tunable,
 };
 pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy, StateEntry, Target};
 pub use deployment::{
-    Activity, Beside, BringUp, Deployment, DeploymentLimits, Durability, SimulatedReaction, TakeDown,
+    Activity, BringUp, Coordinator, Deployment, DeploymentLimits, FaultKind, OperatorMay, SimulatedReaction, StepFault,
+    TakeDown, Written,
 };
 pub use event::{Ask, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};

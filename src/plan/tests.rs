@@ -26,7 +26,7 @@ fn property(ty: &str, default: Option<Value>, tunable: Tunable) -> PropertyType 
 }
 
 fn operation(effect: Effect) -> OperationType {
-    OperationType { args: vec![ValueType::Float], returns: None, effect, doc: String::new(), origin: Origin(92) }
+    OperationType { args: vec![ValueType::Float], origin: Origin(92), ..OperationType::new(effect) }
 }
 
 fn ident(name: &str) -> Ident {

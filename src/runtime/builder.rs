@@ -9,6 +9,7 @@ use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
 use super::probe::{Probes, ProbesEnd, Wanted};
 use super::property::{Prop, PropEnd};
 use super::value::PortValue;
+use crate::model::monitor::Condition;
 use crate::model::{
     ComponentType, Direction, Effect, EventName, Ident, Irreversible, OperationType, Origin, PortType, PropertyType,
     Transition, Tunable, TypeName, Value, ValueType,
@@ -74,6 +75,8 @@ struct Words {
     tunable: Tunable,
     buffered: bool,
     effect: Option<Effect>,
+    moves: bool,
+    settled_by: Option<Condition>,
 }
 
 struct Making<C> {
@@ -194,6 +197,16 @@ impl<C: Component> Builder<C> {
         self.ty(|ty| ty.actuator = true)
     }
 
+    /// Starting one moves hardware: an automatic rollback does not do it unasked.
+    pub fn moves_on_start(&mut self) -> &mut Self {
+        self.ty(|ty| ty.moves.start = true)
+    }
+
+    /// Stopping one moves hardware.
+    pub fn moves_on_stop(&mut self) -> &mut Self {
+        self.ty(|ty| ty.moves.stop = true)
+    }
+
     /// Components of type `other` start before those of this type.
     ///
     /// # Panics
@@ -290,6 +303,17 @@ impl<C: Component> Builder<C> {
     /// The operation is undone by another one of the same component.
     pub fn undone_by(&mut self, operation: &str) -> &mut Self {
         self.words(|w| w.effect = Some(Effect::Undo(ident(operation))))
+    }
+
+    /// Calling the operation moves hardware: an automatic rollback does not do it unasked.
+    pub fn moves(&mut self) -> &mut Self {
+        self.words(|w| w.moves = true)
+    }
+
+    /// What is true of the component once the operation was done: a call of which no answer came is settled by it. The
+    /// component itself is written `self`: `Condition::compare("self.mode", Comparison::Equals, 6.0)`.
+    pub fn settled_by(&mut self, condition: Condition) -> &mut Self {
+        self.words(|w| w.settled_by = Some(condition))
     }
 
     // ---- members -----------------------------------------------------------------------------------------------
@@ -472,7 +496,9 @@ impl<C> Description<C> {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);
         let effect = words.effect.unwrap_or(Effect::Irreversible);
-        let operation = OperationType { args, returns, effect, doc: words.doc, origin: Origin::NONE };
+        let (moves, settled_by) = (words.moves, words.settled_by);
+        let operation =
+            OperationType { args, returns, effect, moves, settled_by, doc: words.doc, origin: Origin::NONE };
         assert!(self.ty.operations.insert(name, operation).is_none(), "{}: `{name}` is declared twice", self.ty.name);
         self.operations.push((name, f));
     }

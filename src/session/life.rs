@@ -103,6 +103,7 @@ impl Session {
     pub fn take_down(&self, force: bool) -> Ended {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
+        let goal = self.deployment().down_states();
         hub.set_phase(Phase::ShuttingDown);
         let mut why = None;
         if force {
@@ -120,7 +121,7 @@ impl Session {
                     break;
                 }
                 if self.clock().now() >= deadline {
-                    why = Some(format!("not `{}` after {} s", take_down.down, take_down.within.as_secs_f64()));
+                    why = Some(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
                     break;
                 }
                 self.tell_slow();
@@ -128,7 +129,7 @@ impl Session {
             }
         }
         if why.is_none() && !self.is_empty() {
-            why = Some(format!("`{}` was reached with components left", take_down.down));
+            why = Some(format!("`{goal}` was reached with components left"));
         }
         let ended = match why {
             None => self.finish(Vec::new()),

@@ -37,12 +37,12 @@ impl Part {
         hub: &Arc<Hub>,
         junction: &Arc<Junction>,
     ) -> Vec<Self> {
-        let names = deployment.coordinators();
-        let several = names.len() > 1;
+        let several = deployment.coordinators.len() > 1;
         // None reacts before all are known: what the first one emits on its first entry must find the others.
         let mut known = lock(&junction.coordinators);
         let mut parts = Vec::new();
-        for (number, (name, (chart, functions))) in names.into_iter().zip(charts).enumerate() {
+        for (own, (chart, functions)) in deployment.coordinators.iter().zip(charts) {
+            let name = own.name;
             let requester = Requester::Coordinator(name.into());
             let listener = ToConfigurator {
                 hub: hub.clone(),
@@ -62,18 +62,14 @@ impl Part {
                 }
             };
             known.push((requester, coordinator.clone()));
-            let (up, down, failed) = match number.checked_sub(1).map(|at| &deployment.beside[at]) {
-                None => (&deployment.deploy.up, &deployment.shutdown.down, &deployment.deploy.failed),
-                Some(own) => (&own.up, &own.down, &own.failed),
-            };
             let state = |name: &str| chart.find(name).ok();
             parts.push(Self {
                 name,
-                up: state(up),
-                down: state(down),
+                up: state(&own.up),
+                down: state(&own.down),
                 sees_all,
                 told_slow: AtomicU64::new(u64::MAX),
-                failed: failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
+                failed: own.failed.iter().filter_map(|n| state(n).map(|id| (id, n.clone()))).collect(),
                 chart: chart.clone(),
                 coordinator,
             });

@@ -34,7 +34,7 @@ fn types() -> Arc<Catalogue> {
     for (name, effect) in
         [("open", Effect::Undo(ident("close"))), ("close", Effect::None), ("weld", Effect::Irreversible)]
     {
-        let operation = OperationType { args: vec![], returns: None, effect, doc: String::new(), origin: Origin::NONE };
+        let operation = OperationType::new(effect);
         ty.operations.insert(ident(name), operation);
     }
     let mut catalogue = Catalogue::new();

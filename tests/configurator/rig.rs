@@ -49,8 +49,7 @@ pub fn catalogue() -> Catalogue {
         doc: String::new(),
         origin: Origin::NONE,
     };
-    let operation =
-        |effect| OperationType { args: vec![], returns: None, effect, doc: String::new(), origin: Origin::NONE };
+    let operation = OperationType::new;
     let mut node = ComponentType::new("Node", "A component with a bit of everything.");
     node.ports.insert(ident("u"), port(Direction::In, "float"));
     node.ports.insert(ident("w"), port(Direction::In, "float"));

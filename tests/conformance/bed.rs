@@ -69,9 +69,7 @@ fn operation(args: &[&str], returns: Option<&str>) -> OperationType {
     OperationType {
         args: args.iter().map(|t| t.parse().unwrap()).collect(),
         returns: returns.map(|t| t.parse().unwrap()),
-        effect: Effect::None,
-        doc: String::new(),
-        origin: Origin::NONE,
+        ..OperationType::new(Effect::None)
     }
 }
 

@@ -52,7 +52,7 @@ fn a_deployment_keeps_its_coordinator_with_all_that_belongs_to_it() {
         let main = files[0].0.clone();
         let again = load_from(&Sources::memory(files), Path::new(&main), &LoadOptions::default());
         let again = again.deployment.unwrap_or_else(|| panic!("{:?}", again.findings));
-        assert_eq!(again.coordinator, first.coordinator);
+        assert_eq!(again.coordinators, first.coordinators);
         let (one, other) = (&first.programs[&first.name], &again.programs[&again.name]);
         assert_eq!((&one.text, one.open, one.host.len()), (&other.text, other.open, other.host.len()));
         assert_eq!(one.files.keys().collect::<Vec<_>>(), other.files.keys().collect::<Vec<_>>());

@@ -17,16 +17,18 @@ types:
     properties:
       k: { type: float, default: 1.0, min: 0.0, max: 10.0, tunable: stopped }
     operations:
-      reset: { args: [float], returns: bool, effect: none }
+      reset: { args: [float], returns: bool, effect: none, moves: true, settled_by: { below: [self.y, 0.1] } }
 activities:
   control: { period_ms: 1.0, priority: 80 }
 configurations: [c.lua]
 coordinator: k.lua
 emits: [e_ready]
 deploy: { event: e_start, up: operational, failed: [fault], within_s: 20 }
-shutdown: { event: e_shutdown, down: idle, within_s: 20 }
+shutdown: { event: e_shutdown, down: idle, within_s: 20, rest: [up] }
 limits: { stack: 32, step_timeout_s: 0.5 }
-durability: relaxed
+safety: [e_estop]
+operator: [up, A.k]
+faults: [{ step: \"start A\", how: fail, times: 2 }]
 ";
 
 pub const CONFIGURATIONS: &str = "\

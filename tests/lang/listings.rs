@@ -66,7 +66,7 @@ fn the_example_deployment_is_clean() {
     clean(&loaded);
     let deployment = loaded.deployment.unwrap();
     assert_eq!(deployment.configurations.len(), 1);
-    assert_eq!(deployment.coordinator.root.children.len(), 3);
+    assert_eq!(deployment.coordinators[0].chart.root.children.len(), 3);
     assert_eq!(deployment.limits.stack, 32);
 }
 

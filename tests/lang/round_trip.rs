@@ -6,7 +6,7 @@ use davit::lang::{self, LoadOptions, Sources, print};
 use davit::model::monitor::*;
 use davit::model::statechart::{Action, Connector, Node, Since, State, Statechart, Transition as Edge, Trigger};
 use davit::model::*;
-use proptest::collection::{btree_map, vec};
+use proptest::collection::{btree_map, btree_set, vec};
 use proptest::option;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -123,25 +123,43 @@ fn states() -> impl Strategy<Value = Vec<StateEntry>> {
     })
 }
 
+fn config_id() -> impl Strategy<Value = ConfigId> {
+    component().prop_map(|name| ConfigId::new(name.as_str()).unwrap())
+}
+
+/// What is written nowhere.
+fn placed<T>(all: impl IntoIterator<Item = T>) -> Vec<(T, Origin)> {
+    all.into_iter().map(|one| (one, Origin::NONE)).collect()
+}
+
 fn configuration() -> impl Strategy<Value = Configuration> {
-    let id = component().prop_map(|name| ConfigId::new(name.as_str()).unwrap());
+    let id = config_id();
     let confirm = option::of((event(), time()).prop_map(|(event, within)| Confirm { event, within }));
-    let attributes = (option::of(time()), option::of(ident()), any::<[bool; 3]>(), confirm, option::of(any_text()));
-    (id, states(), vec(change(), 0..5), states(), attributes).prop_map(
-        |(id, pre, changes, post, (timeout, group, [safe, hold, irreversible], confirm, description))| Configuration {
+    let on_failure = prop::sample::select(vec![OnFailure::Unset, OnFailure::Rollback, OnFailure::Hold]);
+    let failing = (any::<bool>(), on_failure, confirm).prop_map(|(safe, on_failure, confirm)| {
+        // What contradicts each other is refused.
+        let on_failure = if safe { OnFailure::Unset } else { on_failure };
+        (safe, on_failure, confirm.filter(|_| !safe && on_failure != OnFailure::Hold))
+    });
+    let holds = option::weighted(0.3, condition());
+    let attributes = (option::of(time()), option::of(ident()), failing, holds, any::<bool>(), option::of(any_text()));
+    (id, states(), vec(change(), 0..5), states(), attributes).prop_map(|(id, pre, changes, post, attributes)| {
+        let (timeout, group, (safe, on_failure, confirm), holds, irreversible, description) = attributes;
+        Configuration {
             pre,
             changes,
             post,
             timeout,
             group,
             safe,
-            on_failure: if hold { OnFailure::Hold } else { OnFailure::Rollback },
+            on_failure,
+            holds,
             confirm,
             irreversible,
             description,
             ..Configuration::new(id)
-        },
-    )
+        }
+    })
 }
 
 fn configurations() -> impl Strategy<Value = Vec<Configuration>> {
@@ -337,17 +355,26 @@ fn component_type() -> impl Strategy<Value = ComponentType> {
         PropertyType { ty, default, min, max, tunable, unit, doc, origin: Origin::NONE }
     });
     let effect = prop_oneof![Just(Effect::None), Just(Effect::Irreversible), ident().prop_map(Effect::Undo)];
-    let operation = (vec(value_type(), 0..3), option::of(value_type()), effect, any_text())
-        .prop_map(|(args, returns, effect, doc)| OperationType { args, returns, effect, doc, origin: Origin::NONE });
+    let settled = option::weighted(0.2, condition());
+    let operation = (vec(value_type(), 0..3), option::of(value_type()), effect, any::<bool>(), settled, any_text())
+        .prop_map(|(args, returns, effect, moves, settled_by, doc)| OperationType {
+            args,
+            returns,
+            effect,
+            moves,
+            settled_by,
+            doc,
+            origin: Origin::NONE,
+        });
     let members =
         (btree_map(ident(), port, 0..3), btree_map(ident(), property, 0..3), btree_map(ident(), operation, 0..3));
-    let others = (vec(type_name(), 0..2), vec(type_name(), 0..2), any::<[bool; 4]>());
+    let others = (vec(type_name(), 0..2), vec(type_name(), 0..2), any::<[bool; 6]>());
     (type_name(), any_text(), members, others).prop_map(
         |(
             name,
             doc,
             (ports, properties, operations),
-            (start_after, stop_before, [actuator, configure, stop, destroy]),
+            (start_after, stop_before, [actuator, configure, stop, destroy, starting, stopping]),
         )| ComponentType {
             doc,
             ports,
@@ -356,6 +383,7 @@ fn component_type() -> impl Strategy<Value = ComponentType> {
             start_after,
             stop_before,
             actuator,
+            moves: Moves { start: starting, stop: stopping },
             irreversible: Irreversible { configure, stop, destroy },
             ..ComponentType::new(name.as_str(), "")
         },
@@ -366,13 +394,9 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     let activity = (option::of(time()), 0_u8..100, option::of(0_u32..64))
         .prop_map(|(period, priority, cpu)| Activity { period, priority, cpu, origin: Origin::NONE });
     let path = || "[a-z]{1,4}(\\.[a-z]{1,4}){0,2}";
-    let up = (event(), path(), vec(path(), 0..3), time()).prop_map(|(event, up, failed, within)| BringUp {
-        event,
-        up,
-        failed,
-        within,
-    });
-    let down = (event(), path(), time()).prop_map(|(event, down, within)| TakeDown { event, down, within });
+    let up = (event(), time()).prop_map(|(event, within)| BringUp { event, within });
+    let rest = btree_set(config_id(), 0..3).prop_map(placed);
+    let down = (event(), time(), rest).prop_map(|(event, within, rest)| TakeDown { event, within, rest });
     let types = vec(component_type(), 0..3).prop_map(|mut types| {
         let mut seen = BTreeSet::new();
         types.retain(|ty| seen.insert(ty.name));
@@ -383,18 +407,23 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             let component = ComponentName::new(name.as_str()).unwrap();
             SimulatedReaction { after, delay, raise, component, origin: Origin::NONE }
         });
+    let how = prop::sample::select(FaultKind::NAMES.to_vec()).prop_map(|(_, how)| how);
+    let fault = ("(start|stop|property_set) [a-z]{1,4}(\\.[a-z])?", how, 1_u32..4)
+        .prop_map(|(step, how, times)| StepFault { step, how, times, origin: Origin::NONE });
     let limits = (1_usize..100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
-    let ends = (any::<bool>(), vec(reaction, 0..3));
+    let may = prop_oneof![config_id().prop_map(OperatorMay::Apply), member().prop_map(OperatorMay::Set)];
+    let watched = (btree_set(event(), 0..3).prop_map(placed), btree_set(may, 0..3).prop_map(placed));
+    let ends = (vec(reaction, 0..3), vec(fault, 0..3), watched);
     let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, ends);
-    let beside = vec((ident(), chart(), path(), vec(path(), 0..2), path()), 0..2);
-    let charts = (chart(), proptest::option::of(ident()), beside);
-    (vec(ident(), 2..5), configurations(), charts, monitors(), parts).prop_map(
+    let coordinator = (option::of(ident()), chart(), path(), vec(path(), 0..3), path());
+    let coordinators = vec(coordinator, 1..4);
+    (vec(ident(), 2..5), configurations(), coordinators, monitors(), parts).prop_map(
         |(
             names,
             configurations,
-            (coordinator, first, beside),
+            coordinators,
             monitors,
-            (types, activities, emits, deploy, shutdown, limits, (full, reactions)),
+            (types, activities, emits, deploy, shutdown, limits, (reactions, faults, (safety, operator))),
         )| Deployment {
             name: names[0],
             platform: names[1],
@@ -402,23 +431,34 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             types,
             activities,
             configurations,
-            coordinator,
-            first,
-            beside: {
-                let mut taken = BTreeSet::from([first.unwrap_or(names[0])]);
-                let named = beside.into_iter().filter(|(name, ..)| taken.insert(*name));
-                let made =
-                    |(name, chart, up, failed, down)| Beside { name, chart, up, failed, down, origin: Origin::NONE };
-                named.map(made).collect()
+            coordinators: {
+                let mut taken = BTreeSet::new();
+                let made = |(at, (name, chart, up, failed, down)): (usize, (Option<Ident>, _, _, _, _))| {
+                    // Only the first one can stand under `coordinator`.
+                    let written = if at == 0 && name.is_none() { Written::Alone } else { Written::Named };
+                    let name = name.unwrap_or(names[0]);
+                    taken.insert(name).then_some(Coordinator {
+                        name,
+                        written,
+                        chart,
+                        up,
+                        failed,
+                        down,
+                        origin: Origin::NONE,
+                    })
+                };
+                coordinators.into_iter().enumerate().filter_map(made).collect()
             },
             programs: BTreeMap::new(),
             monitors,
-            emits: emits.into_iter().map(|event| (event, Origin::NONE)).collect(),
+            emits: placed(emits),
+            safety,
+            operator,
             deploy,
             shutdown,
             limits,
             reactions,
-            durability: if full { Durability::Full } else { Durability::Relaxed },
+            faults,
             origin: Origin::NONE,
             key_origins: BTreeMap::new(),
         },

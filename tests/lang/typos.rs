@@ -75,9 +75,28 @@ fn deployment_keys_names_and_values() {
         ("stack: 32", "stack: 0", "text::bad_value 20:18", "100000"),
         ("step_timeout_s: 0.5", "step_timeout_s: 500000", "text::bad_time 20:38", "longer than a day"),
         ("step_timeout_s: 0.5", "step_timeout_ms: 0.5", "text::unknown_key 20:22", "`step_timeout_s`"),
-        ("durability: relaxed", "durability: relaxd", "text::bad_value 21:13", "`relaxed`"),
-        ("durability: relaxed", "monitors: [m.lua]", "text::no_file 21:12", "`c.lua`"),
-        ("durability: relaxed", "durability: relaxed\nwith: { gain: 1 }", "text::unknown_parameter 22:9", "gain"),
+        ("moves: true", "moves: yes", "text::wrong_type 12:67", "true or false"),
+        ("moves: true, settled", "moves: true, setled", "text::unknown_key 12:73", "`settled_by`"),
+        ("below: [self.y", "belw: [self.y", "monitor::unknown_word 12:87", "`below`"),
+        ("    operations:", "    moves: [start, halt]\n    operations:", "text::bad_value 11:20", "`start`"),
+        ("rest: [up]", "rest: [\"u p\"]", "text::bad_name 19:65", "rest: [park]"),
+        ("rest: [up]", "rest: [up, up]", "text::duplicate_key 19:69", "once"),
+        ("[e_estop]", "[e_estop, e_estop]", "text::duplicate_key 21:19", "once"),
+        ("[e_estop]", "[e estop]", "text::bad_name 21:10", "safety: [e_estop]"),
+        ("[up, A.k]", "[up, A.]", "text::bad_name 22:16", "operator: ["),
+        ("[up, A.k]", "[up, A.k, up]", "text::duplicate_key 22:21", "once"),
+        ("step: \"start A\"", "stp: \"start A\"", "text::unknown_key 23:12", "`step`"),
+        ("how: fail", "how: fial", "text::bad_value 23:34", "`fail`"),
+        (", how: fail", "", "text::missing_key 23:10", "how: fail"),
+        ("times: 2", "times: 0", "text::bad_value 23:47", "times: 1"),
+        (
+            "safety: [e_estop]",
+            "durability: full",
+            "deploy::no_journal 21:1",
+            "there is no journal yet; leave the key out",
+        ),
+        ("safety: [e_estop]", "monitors: [m.lua]", "text::no_file 21:12", "`c.lua`"),
+        ("safety: [e_estop]", "with: { gain: 1 }", "text::unknown_parameter 21:9", "gain"),
     ];
     let mut answers = Answers::default();
     for (from, to, expected, hint) in table {
@@ -93,7 +112,7 @@ fn deployment_keys_names_and_values() {
 
 const LUA: &str = "\
 ConfiguratorConf {
-  up = Configuration { timeout = 0.5, group = \"dof\", on_failure = \"hold\",
+  up = Configuration { timeout = 0.5, group = \"dof\", on_failure = \"rollback\",
     confirm = { event = \"e_ok\", within = 2.0 },
     pre_conf_state = { 'A:stopped', '_default:running' },
     create(\"A\", \"Gain\", { activity = \"control\", properties = { k = 1.0 } }),
@@ -114,7 +133,12 @@ fn configurations_in_lua() {
         ("timeout = 0.5", "timeout = -1", "text::bad_time 2:34", "more than 0"),
         ("timeout = 0.5", "timeout_ms = 500", "text::unknown_key 2:24", "`timeout`"),
         ("group = \"dof\"", "group = \"d of\"", "text::bad_name 2:47", "dof"),
-        ("\"hold\"", "\"holdd\"", "text::bad_value 2:67", "`hold`"),
+        ("\"rollback\"", "\"rolback\"", "text::bad_value 2:67", "`rollback`"),
+        ("\"rollback\"", "\"hold\"", "conf::confirm_contradicted 3:5", "keep one"),
+        ("on_failure = \"rollback\"", "safe = true", "conf::confirm_contradicted 3:5", "keep one"),
+        ("on_failure", "holds = abov(\"A.y\", 1.0), on_failure", "lua::undefined 2:62", "`above`"),
+        ("on_failure", "holds = above(\"A.y\"), on_failure", "monitor::arguments 2:62", "above("),
+        ("on_failure", "holds = 1.0, on_failure", "text::wrong_type 2:54", "a condition"),
         ("event = \"e_ok\"", "evnt = \"e_ok\"", "text::unknown_key 3:17", "`event`"),
         ("'A:stopped'", "'A:stoped'", "conf::bad_state 4:27", "`stopped`"),
         ("'A:stopped'", "'A.stopped'", "conf::bad_state 4:24", "component:state"),
@@ -166,7 +190,7 @@ configurations:
       - operation_call: { operation: A.reset, args: [1.0], undo: { operation: A.set, args: [2.0] } }
     post_conf_state: [\"_default:running\"]
     confirm: { event: e_ok, within: 2.0 }
-    on_failure: hold
+    on_failure: rollback
 ";
 
 fn yaml(text: &str) -> Loaded {
@@ -188,7 +212,11 @@ fn configurations_in_yaml() {
         ("buffer: 8", "bufer: 8", "text::unknown_key 8:50", "`buffer`"),
         ("args: [1.0]", "args: 1.0", "text::wrong_type 9:53", "args: [6]"),
         ("undo: { operation", "undo: { operatoin", "text::unknown_key 9:68", "`operation`"),
-        ("on_failure: hold", "on_failure: hodl", "text::bad_value 12:17", "`hold`"),
+        ("on_failure: rollback", "on_failure: rolback", "text::bad_value 12:17", "`rollback`"),
+        ("on_failure: rollback", "on_failure: hold", "conf::confirm_contradicted 11:5", "keep one"),
+        ("on_failure: rollback", "safe: true", "conf::confirm_contradicted 11:5", "keep one"),
+        ("confirm: { event: e_ok, within: 2.0 }", "safe: true", "conf::on_failure_safe 12:5", "leave"),
+        ("on_failure: rollback", "holds: { abov: [A.y, 1.0] }", "monitor::unknown_word 12:14", "`above`"),
         (
             "[\"_default:running\"]\n    conf",
             "{ _default: running, A: stopped }\n    conf",

@@ -126,7 +126,7 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
                 _ if takes && args.is_empty() => Effect::None,
                 _ => Effect::Undo(ident(&format!("o{undo}"))),
             };
-            let operation = OperationType { args, returns: None, effect, doc: String::new(), origin: Origin::NONE };
+            let operation = OperationType { args, ..OperationType::new(effect) };
             ty.operations.insert(ident(&format!("o{at}")), operation);
         }
         if irreversible {

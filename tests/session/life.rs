@@ -86,7 +86,7 @@ fn one_coordinator_drives_two_platforms() {
     assert_eq!(coordinator(youbot), coordinator(generic), "one file");
     let (a, b) = (checked(youbot), checked(generic));
     assert_ne!(a.deployment.platform, b.deployment.platform);
-    assert_eq!(a.deployment.coordinator, b.deployment.coordinator);
+    assert_eq!(a.deployment.coordinators[0].chart, b.deployment.coordinators[0].chart);
     assert_eq!(states(youbot), states(generic), "the same states in the same order");
 }
 

@@ -3,11 +3,13 @@
 //! A state is written `STATE`, or `COORDINATOR:STATE` where there are several coordinators. A state without a coordinator's
 //! name is meant of every coordinator that is not named with one of its own.
 
-use super::deployment::{DEPLOY, SHUTDOWN};
+use super::deployment::{DEPLOY, SHUTDOWN, names};
 use super::{Unit, name, one_or_more, text, time};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
-use crate::model::{Beside, BringUp, EventName, Finding, Ident, Origin, Statechart, TakeDown, codes};
+use crate::model::{
+    BringUp, ConfigId, Coordinator, EventName, Finding, Ident, Origin, Statechart, TakeDown, Written, codes,
+};
 use std::time::Duration;
 
 /// A state as a deployment names it.
@@ -31,6 +33,7 @@ pub struct Fall {
     event: EventName,
     down: Vec<Named>,
     within: Duration,
+    rest: Vec<(ConfigId, Origin)>,
 }
 
 const ONE: &str = "coordinator: coordinator.lua";
@@ -111,22 +114,10 @@ pub fn fall(cx: &mut Cx, node: Node) -> Option<Fall> {
     let down = states(cx, down, "`shutdown.down`", "down: idle");
     let within = fields.required(cx, "within_s", "within_s: 20");
     let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    let rest = fields.take("rest");
+    let rest = rest.map(|node| names(cx, node, "`shutdown.rest`", "a configuration", "rest: [park]"));
     fields.finish(cx);
-    Some(Fall { event: event?, down, within: within? })
-}
-
-/// The coordinators with their states: how the deployment comes up and goes down by its first one, and the others.
-pub struct Joined {
-    /// The first coordinator.
-    pub coordinator: Statechart,
-    /// Its name, if it was given one.
-    pub first: Option<Ident>,
-    /// The others.
-    pub beside: Vec<Beside>,
-    /// How it comes up.
-    pub deploy: BringUp,
-    /// How it goes down.
-    pub shutdown: TakeDown,
+    Some(Fall { event: event?, down, within: within?, rest: rest.unwrap_or_default() })
 }
 
 /// Gives each coordinator its states. `own` is the name of the deployment, and of a coordinator without one.
@@ -136,7 +127,7 @@ pub fn join(
     charts: Vec<(Option<Ident>, Statechart, Origin)>,
     rise: &Rise,
     fall: &Fall,
-) -> Option<Joined> {
+) -> (Vec<Coordinator>, BringUp, TakeDown) {
     let names: Vec<Ident> = charts.iter().map(|(name, ..)| name.unwrap_or(own)).collect();
     if let Some(again) = (1..names.len()).find(|at| names[..*at].contains(&names[*at])) {
         let message = format!("there are two coordinators `{}`", names[again]);
@@ -155,30 +146,21 @@ pub fn join(
             );
         }
     }
+    // All of *up* before all of *down*: findings come in the order of the keys.
     let up: Vec<String> = names.iter().map(|name| one(cx, *name, &rise.up, "up")).collect();
     let down: Vec<String> = names.iter().map(|name| one(cx, *name, &fall.down, "down")).collect();
     let failed = |name: Ident| -> Vec<String> {
         let meant = rise.failed.iter().filter(|f| f.coordinator.is_none_or(|c| c == name));
         meant.map(|f| f.state.clone()).collect()
     };
-    let mut beside: Vec<Beside> = Vec::new();
-    let mut first = None;
-    for (at, (name, chart, origin)) in charts.into_iter().enumerate() {
-        if at == 0 {
-            first = Some((name, chart));
-        } else {
-            let (up, down) = (up[at].clone(), down[at].clone());
-            beside.push(Beside { name: names[at], chart, up, failed: failed(names[at]), down, origin });
-        }
-    }
-    let (first, coordinator) = first?;
-    Some(Joined {
-        coordinator,
-        first,
-        beside,
-        deploy: BringUp { event: rise.event, up: up[0].clone(), failed: failed(names[0]), within: rise.within },
-        shutdown: TakeDown { event: fall.event, down: down[0].clone(), within: fall.within },
-    })
+    let coordinators = charts.into_iter().zip(names).zip(up.into_iter().zip(down));
+    let coordinators = coordinators.map(|(((named, chart, origin), name), (up, down))| {
+        let written = if named.is_some() { Written::Named } else { Written::Alone };
+        Coordinator { name, written, chart, up, failed: failed(name), down, origin }
+    });
+    let deploy = BringUp { event: rise.event, within: rise.within };
+    let shutdown = TakeDown { event: fall.event, within: fall.within, rest: fall.rest.clone() };
+    (coordinators.collect(), deploy, shutdown)
 }
 
 /// The one state that means `what` of one coordinator.

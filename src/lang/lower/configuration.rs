@@ -1,6 +1,6 @@
 //! Configurations: what both spellings mean.
 
-use super::{Unit, choice, name, text, time, truth, value, whole};
+use super::{Unit, choice, condition, name, text, time, truth, value, whole};
 use crate::lang::concern;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::{did_you_mean, nearest};
@@ -91,13 +91,23 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     if let Some(node) = fields.take("safe") {
         c.safe = truth(cx, &node, "`safe`", "safe = true").unwrap_or_default();
     }
-    if let Some(node) = fields.take("on_failure") {
+    let on_failure = fields.take_entry("on_failure").map(|entry| {
         let choices = [("rollback", OnFailure::Rollback), ("hold", OnFailure::Hold)];
-        c.on_failure = choice(cx, &node, "`on_failure`", &choices).unwrap_or_default();
+        c.on_failure = choice(cx, &entry.value, "`on_failure`", &choices).unwrap_or_default();
+        cx.part(entry.origin, "on_failure")
+    });
+    if let Some(mut entry) = fields.take_entry("holds") {
+        // Lua knows the place of the whole configuration only.
+        if !matches!(entry.value.kind, Kind::Made(..) | Kind::Map(_)) {
+            entry.value.origin = cx.part(entry.value.origin, "holds");
+        }
+        c.holds = condition::condition(cx, entry.value, 0);
     }
-    if let Some(node) = fields.take("confirm") {
-        c.confirm = confirm(cx, node);
-    }
+    let confirms = fields.take_entry("confirm").map(|entry| {
+        c.confirm = confirm(cx, entry.value);
+        cx.part(entry.origin, "confirm")
+    });
+    exclusive(cx, &c, on_failure, confirms);
     if let Some(node) = fields.take("irreversible") {
         c.irreversible = truth(cx, &node, "`irreversible`", "irreversible = true").unwrap_or_default();
     }
@@ -106,6 +116,32 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     }
     fields.finish(cx);
     Some(c)
+}
+
+/// What contradicts itself: each of these words says what happens when something goes wrong. With where `on_failure` and
+/// `confirm` stand.
+fn exclusive(cx: &mut Cx, c: &Configuration, on_failure: Option<Origin>, confirms: Option<Origin>) {
+    if let (Some(confirms), true) = (confirms, c.safe || c.on_failure == OnFailure::Hold) {
+        let (beside, why) = match c.safe {
+            true => ("`safe = true`", "what is safe stays until it is undone by somebody"),
+            false => ("`on_failure = \"hold\"`", "it says that nothing is undone unasked"),
+        };
+        let message = format!("`confirm` stands beside {beside}: {why}");
+        cx.report(
+            Finding::error(codes::CONF_CONFIRM_CONTRADICTED, message)
+                .at(confirms)
+                .help("keep one of the two; a coordinator can wait for the event and undo the configuration itself"),
+        );
+    }
+    if let (Some(on_failure), true) = (on_failure, c.safe) {
+        let message =
+            "`on_failure` stands beside `safe = true`: of a safe configuration every step is tried, none is undone";
+        cx.report(
+            Finding::error(codes::CONF_ON_FAILURE_SAFE, message)
+                .at(on_failure)
+                .help("leave `on_failure` out, or `safe`"),
+        );
+    }
 }
 
 fn confirm(cx: &mut Cx, node: Node) -> Option<Confirm> {

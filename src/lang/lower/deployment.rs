@@ -1,14 +1,16 @@
 //! Deployment files: the keys of design §16. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
-use super::{Unit, choice, name, one_or_more, simulated, text, time, types, whole};
+use super::{Unit, name, one_or_more, simulated, text, time, types, whole};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
+use crate::model::names::NameError;
 use crate::model::{
-    Activity, ComponentType, DeploymentLimits, Durability, EventName, Finding, Ident, Openings, Origin,
-    SimulatedReaction, codes,
+    Activity, ComponentType, ConfigId, DeploymentLimits, EventName, Finding, Ident, MemberRef, Openings, OperatorMay,
+    Origin, SimulatedReaction, StepFault, codes,
 };
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 /// A deployment file, before the files that it names are read.
 pub struct Draft {
@@ -36,16 +38,20 @@ pub struct Draft {
     pub with: Vec<Entry>,
     /// `emits`
     pub emits: Vec<(EventName, Origin)>,
+    /// `safety`
+    pub safety: Vec<(EventName, Origin)>,
+    /// `operator`
+    pub operator: Vec<(OperatorMay, Origin)>,
     /// `deploy`
     pub deploy: Option<Rise>,
     /// `shutdown`
     pub shutdown: Option<Fall>,
     /// `limits`
     pub limits: DeploymentLimits,
-    /// `durability`
-    pub durability: Durability,
     /// `simulated`
     pub reactions: Vec<SimulatedReaction>,
+    /// `faults`
+    pub faults: Vec<StepFault>,
     /// Where keys stand, by path.
     pub key_origins: BTreeMap<String, Origin>,
 }
@@ -126,13 +132,18 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         }
     };
     let emits = fields.take("emits").map(|node| emits(cx, node)).unwrap_or_default();
+    let safety = fields.take("safety");
+    let safety = safety.map(|node| names(cx, node, "`safety`", "an event", "safety: [e_estop]")).unwrap_or_default();
+    let operator = fields.take("operator").map(|node| operator(cx, node)).unwrap_or_default();
     let deploy = fields.required(cx, "deploy", DEPLOY).and_then(|node| beside::rise(cx, node));
     let shutdown = fields.required(cx, "shutdown", SHUTDOWN).and_then(|node| beside::fall(cx, node));
     let limits = fields.take("limits").map(|node| limits(cx, node)).unwrap_or_default();
-    let durability = fields.take("durability").and_then(|node| {
-        choice(cx, &node, "`durability`", &[("full", Durability::Full), ("relaxed", Durability::Relaxed)])
-    });
+    if let Some(entry) = fields.take_entry("durability") {
+        let finding = Finding::error(codes::DEPLOY_NO_JOURNAL, "`durability` says how a journal is kept");
+        cx.report(finding.at(entry.origin).help("there is no journal yet; leave the key out"));
+    }
     let reactions = fields.take("simulated").map(|node| simulated::reactions(cx, node)).unwrap_or_default();
+    let faults = fields.take("faults").map(|node| simulated::faults(cx, node)).unwrap_or_default();
     fields.finish(cx);
     Some(Draft {
         name: deployment,
@@ -147,11 +158,13 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         host,
         with,
         emits,
+        safety,
+        operator,
         deploy,
         shutdown,
         limits,
-        durability: durability.unwrap_or_default(),
         reactions,
+        faults,
         key_origins,
     })
 }
@@ -205,6 +218,47 @@ fn emits(cx: &mut Cx, node: Node) -> Vec<(EventName, Origin)> {
         .iter()
         .filter_map(|node| Some((name(cx, node, "an emitted event", "emits: [e_ready]")?, node.origin)))
         .collect()
+}
+
+/// A list of names, each of them once; `key` is where they stand, `what` what each of them is.
+pub(super) fn names<T>(cx: &mut Cx, node: Node, key: &str, what: &str, example: &str) -> Vec<(T, Origin)>
+where
+    T: FromStr<Err = NameError> + PartialEq + std::fmt::Display,
+{
+    let mut out: Vec<(T, Origin)> = Vec::new();
+    for node in one_or_more(node) {
+        let Some(name) = name::<T>(cx, &node, what, example) else { continue };
+        once(cx, &mut out, name, node.origin, key);
+    }
+    out
+}
+
+fn once<T: PartialEq + std::fmt::Display>(cx: &mut Cx, out: &mut Vec<(T, Origin)>, name: T, origin: Origin, key: &str) {
+    match out.iter().find(|(other, _)| *other == name) {
+        None => out.push((name, origin)),
+        Some((_, first)) => {
+            let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{name}` stands twice in {key}"));
+            cx.report(finding.at(origin).also(*first, "first here").help("name each once"));
+        }
+    }
+}
+
+/// `operator`: configurations, and properties and in-ports as `Component.member`.
+fn operator(cx: &mut Cx, node: Node) -> Vec<(OperatorMay, Origin)> {
+    const EXAMPLE: &str = "operator: [profile_soft, Cart_Impedance.stiffness]";
+    let mut out = Vec::new();
+    for node in one_or_more(node) {
+        let is_member = matches!(&node.kind, Kind::Str(text) if text.contains('.'));
+        let may = if is_member {
+            name::<MemberRef>(cx, &node, "a property or port", EXAMPLE).map(OperatorMay::Set)
+        } else {
+            name::<ConfigId>(cx, &node, "a configuration", EXAMPLE).map(OperatorMay::Apply)
+        };
+        if let Some(may) = may {
+            once(cx, &mut out, may, node.origin, "`operator`");
+        }
+    }
+    out
 }
 
 fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {

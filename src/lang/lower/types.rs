@@ -1,6 +1,6 @@
 //! Component types declared in a deployment.
 
-use super::{choice, name, number, one_or_more, text, truth, value};
+use super::{choice, condition, name, number, one_or_more, text, truth, value};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
     ComponentType, Direction, Effect, Finding, Ident, OperationType, PortType, PropertyType, Tunable, TypeName,
@@ -51,6 +51,15 @@ fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
     ty.stop_before = type_names(cx, &mut fields, "stop_before");
     if let Some(node) = fields.take("actuator") {
         ty.actuator = truth(cx, &node, "`actuator`", "actuator: true").unwrap_or_default();
+    }
+    if let Some(node) = fields.take("moves") {
+        for node in one_or_more(node) {
+            match choice(cx, &node, "`moves`", &[("start", true), ("stop", false)]) {
+                Some(true) => ty.moves.start = true,
+                Some(false) => ty.moves.stop = true,
+                None => {}
+            }
+        }
     }
     if let Some(node) = fields.take("irreversible") {
         for node in one_or_more(node) {
@@ -178,9 +187,11 @@ fn operation(cx: &mut Cx, entry: Entry) -> Option<OperationType> {
     }
     let returns = fields.take("returns").and_then(|node| value_type(cx, node));
     let effect = fields.take("effect").and_then(|node| effect(cx, node)).unwrap_or(Effect::Irreversible);
+    let moves = fields.take("moves").and_then(|node| truth(cx, &node, "`moves`", "moves: true")).unwrap_or_default();
+    let settled_by = fields.take("settled_by").and_then(|node| condition::condition(cx, node, 0));
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
-    Some(OperationType { args, returns, effect, doc, origin: entry.origin })
+    Some(OperationType { args, returns, effect, moves, settled_by, doc, origin: entry.origin })
 }
 
 /// `none`, `irreversible`, or `undo: OPERATION`: in a flow map `{…, effect: undo: park}` YAML allows no second colon, so

@@ -113,7 +113,7 @@ impl Recorder {
     }
 
     /// Puts what was made into its places, at every depth. What stands in several places is copied, under the budget.
-    fn fill(&mut self, node: &mut Node, copy: bool, depth: usize) {
+    pub(super) fn fill(&mut self, node: &mut Node, copy: bool, depth: usize) {
         if depth > limits::TEXT_DEPTH {
             let origin = node.origin;
             node.kind = Kind::Poison;
@@ -156,7 +156,7 @@ impl Recorder {
             word => words::find(word).map(|_| {
                 (
                     format!("this `{word}` stands in no monitor, so it is never evaluated"),
-                    "put it into the `when` of a monitor",
+                    "put it into the `when` of a monitor, or into the `holds` of a configuration",
                 )
             }),
         }

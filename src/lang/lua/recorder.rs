@@ -135,7 +135,11 @@ impl Recorder {
         let copy = copy || made.uses > 1;
         let mut node = if copy { made.node.clone() } else { made.node.take() }
             .unwrap_or_else(|| Node::new(Kind::Poison, made.origin));
-        if let Kind::Made("Configuration", _, items) = &mut node.kind {
+        if let Kind::Made("Configuration", named, items) = &mut node.kind {
+            // The only named part that constructors make: a condition.
+            for entry in named.iter_mut().filter(|entry| entry.key == "holds") {
+                self.fill(&mut entry.value, copy, 0);
+            }
             for item in items {
                 if let Kind::Handle(handle) = item.kind {
                     *item = self.take_or_copy(handle as usize, copy);

@@ -25,7 +25,7 @@ impl Kept {
     pub fn of(deployment: &Deployment) -> Self {
         let mut kept = Self::default();
         let Some(first) = deployment.programs.values().next() else { return kept };
-        let one = deployment.first.is_none() && deployment.beside.is_empty();
+        let one = super::alone(deployment);
         for (name, program) in &deployment.programs {
             let file = match (program.files.is_empty(), one) {
                 (true, true) => "coordinator.lua".to_owned(),

@@ -1,6 +1,8 @@
 //! Printing in Lua.
 
-use super::{float, seconds};
+use super::wrap::wrap;
+use super::{float, monitor, seconds};
+use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
 use crate::model::{Call, Change, ChangeKind, Configuration, OnFailure, Origin, Policy, StateEntry, Statechart, Value};
 use std::fmt::Write as _;
@@ -153,8 +155,13 @@ pub fn configurations_lua(list: &[Configuration]) -> String {
         if c.safe {
             out.push_str("    safe = true,\n");
         }
-        if c.on_failure == OnFailure::Hold {
-            out.push_str("    on_failure = \"hold\",\n");
+        match c.on_failure {
+            OnFailure::Unset => {}
+            OnFailure::Rollback => out.push_str("    on_failure = \"rollback\",\n"),
+            OnFailure::Hold => out.push_str("    on_failure = \"hold\",\n"),
+        }
+        if let Some(condition) = &c.holds {
+            _ = writeln!(out, "    holds = {},", wrap(&monitor::condition(condition, Language::Lua), 12, 4));
         }
         if let Some(confirm) = &c.confirm {
             let (event, within) = (quoted(confirm.event.as_str()), seconds(confirm.within));

@@ -10,11 +10,11 @@ mod yaml;
 
 pub use kept::texts as program_texts;
 pub use lua::{configurations_lua, coordinator_lua};
-pub use monitor::monitors;
+pub use monitor::{condition, monitors};
 pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
 
 use crate::diagnostics::Language;
-use crate::model::{Configuration, Deployment, Ident, Statechart};
+use crate::model::{Configuration, Deployment, Ident, Statechart, Written};
 use kept::Kept;
 use std::time::Duration;
 
@@ -47,29 +47,32 @@ pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, S
     };
     let kept = Kept::of(deployment);
     let c = format!("configurations.{other}");
-    let one = deployment.first.is_none() && deployment.beside.is_empty();
-    let names = deployment.coordinators();
+    let one = alone(deployment);
     let file = |name: &Ident| match kept.coordinators.get(name) {
         Some(file) => file.clone(),
         None if one => format!("coordinator.{ending}"),
         None => format!("{name}.coordinator.{ending}"),
     };
-    let coordinators: Vec<String> = names.iter().map(file).collect();
-    let charts = std::iter::once(&deployment.coordinator).chain(deployment.beside.iter().map(|b| &b.chart));
+    let coordinators: Vec<String> = deployment.coordinators.iter().map(|c| file(&c.name)).collect();
     let m = (!deployment.monitors.is_empty()).then(|| format!("monitors.{other}"));
     let main = deployment_yaml(deployment, &[&c], &coordinators, m.as_deref(), &kept.keys);
     let mut files = vec![
         (format!("{}.deployment.yaml", deployment.name), main),
         (c, configurations(&deployment.configurations, language)),
     ];
-    for ((name, file), chart) in names.iter().zip(&coordinators).zip(charts) {
-        if !kept.coordinators.contains_key(name) {
-            files.push((file.clone(), coordinator(chart, language)));
+    for (own, file) in deployment.coordinators.iter().zip(&coordinators) {
+        if !kept.coordinators.contains_key(&own.name) {
+            files.push((file.clone(), coordinator(&own.chart, language)));
         }
     }
     files.extend(kept.files);
     files.extend(m.map(|m| (m, monitors(&deployment.monitors, language))));
     files
+}
+
+/// Whether there is one coordinator, written without a name.
+fn alone(deployment: &Deployment) -> bool {
+    matches!(&deployment.coordinators[..], [one] if one.written == Written::Alone)
 }
 
 /// The files of the coordinators that have functions, and so stay what they are.

@@ -83,7 +83,7 @@ fn signal(s: &Signal, l: Language) -> String {
 /// Conditions that stand in several places. In YAML the first of them gets a name (`&c1 …`) and the others are that name
 /// (`*c1`); in Lua, where a local would have to stand somewhere, each is written out.
 #[derive(Default)]
-struct Shared {
+pub(super) struct Shared {
     /// By their text, how often they stand; what is in one counts once for all of them.
     times: HashMap<String, usize>,
     /// By their text, the names of those that were written.
@@ -94,12 +94,18 @@ struct Shared {
 const WORTH_A_NAME: usize = 48;
 
 impl Shared {
-    fn of(list: &[Monitor], language: Language) -> Self {
+    /// What stands in several places in these conditions of one text.
+    pub(super) fn of<'a>(conditions: impl Iterator<Item = &'a Condition>, language: Language) -> Self {
         let mut shared = Self::default();
         if language != Language::Lua {
-            list.iter().for_each(|monitor| shared.count(&monitor.when));
+            conditions.for_each(|condition| shared.count(condition));
         }
         shared
+    }
+
+    /// One of these conditions; they are printed in the order in which they were given.
+    pub(super) fn print(&mut self, c: &Condition, language: Language) -> String {
+        shared_condition(c, language, self)
     }
 
     fn count(&mut self, c: &Condition) {
@@ -129,8 +135,13 @@ fn inside(c: &Condition) -> Vec<&Condition> {
     }
 }
 
+/// A condition by itself, on one line.
+pub fn condition(c: &Condition, language: Language) -> String {
+    plain(c, language, &mut Shared::default())
+}
+
 /// A condition, or its name where it was written before.
-fn condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
+fn shared_condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
     if shared.times.is_empty() {
         return plain(c, l, shared);
     }
@@ -151,7 +162,7 @@ fn condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
 
 fn plain(c: &Condition, l: Language, shared: &mut Shared) -> String {
     use ConditionKind as K;
-    let mut one = |c: &Condition| condition(c, l, shared);
+    let mut one = |c: &Condition| shared_condition(c, l, shared);
     match &c.kind {
         K::Compare { left, op, right, hysteresis } => {
             let mut args = vec![signal(left, l), signal(right, l)];
@@ -185,7 +196,7 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
     if list.is_empty() {
         return if is_lua { "Monitors {}\n".to_owned() } else { "monitors: {}\n".to_owned() };
     }
-    let mut shared = Shared::of(list, language);
+    let mut shared = Shared::of(list.iter().map(|m| &m.when), language);
     let mut out = String::from(if is_lua { "Monitors {\n" } else { "monitors:\n" });
     for m in list {
         if is_lua {
@@ -199,7 +210,7 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
         if let Some(description) = &m.description {
             part("description", if is_lua { lua::quoted(description) } else { yaml::quoted(description) });
         }
-        let when = condition(&m.when, language, &mut shared);
+        let when = shared.print(&m.when, language);
         // In YAML every line of a value stands further right than its key.
         part("when", wrap(&when, 11, if is_lua { 4 } else { 6 }));
         if let Some(raise) = m.raise {

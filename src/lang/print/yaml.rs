@@ -1,10 +1,13 @@
 //! Printing in YAML.
 
+use super::monitor::{self, Shared};
+use super::wrap::wrap;
 use super::{float, milliseconds, seconds};
+use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
 use crate::model::{
-    Call, ChangeKind, ComponentType, Configuration, Deployment, Direction, Durability, Effect, Ident, OnFailure,
-    Origin, Policy, StateEntry, Statechart, Tunable, Value,
+    Call, ChangeKind, ComponentType, Configuration, Coordinator, Deployment, Direction, Effect, OnFailure, Origin,
+    Policy, StateEntry, Statechart, Tunable, Value, Written,
 };
 use std::fmt::{Display, Write as _};
 
@@ -112,6 +115,7 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
         return "configurations: {}\n".to_owned();
     }
     let mut out = String::from("configurations:\n");
+    let mut shared = Shared::of(configurations.iter().filter_map(|c| c.holds.as_ref()), Language::Yaml);
     for c in configurations {
         let mut body = String::new();
         if let Some(description) = &c.description {
@@ -126,8 +130,13 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
         if c.safe {
             body.push_str("    safe: true\n");
         }
-        if c.on_failure == OnFailure::Hold {
-            body.push_str("    on_failure: hold\n");
+        match c.on_failure {
+            OnFailure::Unset => {}
+            OnFailure::Rollback => body.push_str("    on_failure: rollback\n"),
+            OnFailure::Hold => body.push_str("    on_failure: hold\n"),
+        }
+        if let Some(condition) = &c.holds {
+            _ = writeln!(body, "    holds: {}", wrap(&shared.print(condition, Language::Yaml), 11, 6));
         }
         if let Some(confirm) = &c.confirm {
             let (event, within) = (t(&confirm.event), seconds(confirm.within));
@@ -285,8 +294,11 @@ fn component_type(out: &mut String, ty: &ComponentType) {
             Effect::Irreversible => "irreversible".to_owned(),
             Effect::Undo(operation) => format!("{{ undo: {} }}", t(operation)),
         };
-        let doc = doc(&operation.doc);
-        _ = writeln!(body, "      {}: {{ args: {args}{returns}, effect: {effect}{doc} }}", t(name));
+        let moves = if operation.moves { ", moves: true" } else { "" };
+        let settled = operation.settled_by.as_ref();
+        let settled = settled.map(|c| format!(", settled_by: {}", monitor::condition(c, Language::Yaml)));
+        let (settled, doc) = (settled.unwrap_or_default(), doc(&operation.doc));
+        _ = writeln!(body, "      {}: {{ args: {args}{returns}, effect: {effect}{moves}{settled}{doc} }}", t(name));
     }
     for (name, types) in [("start_after", &ty.start_after), ("stop_before", &ty.stop_before)] {
         if !types.is_empty() {
@@ -296,14 +308,14 @@ fn component_type(out: &mut String, ty: &ComponentType) {
     if ty.actuator {
         body.push_str("    actuator: true\n");
     }
-    let marks = [
-        (ty.irreversible.configure, "configure"),
-        (ty.irreversible.stop, "stop"),
-        (ty.irreversible.destroy, "destroy"),
-    ];
-    let moves: Vec<String> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| (*name).to_owned()).collect();
-    if !moves.is_empty() {
-        _ = writeln!(body, "    irreversible: {}", list(moves));
+    let lost = ty.irreversible;
+    let irreversible = [(lost.configure, "configure"), (lost.stop, "stop"), (lost.destroy, "destroy")];
+    let moves = [(ty.moves.start, "start"), (ty.moves.stop, "stop")];
+    for (key, marks) in [("moves", &moves[..]), ("irreversible", &irreversible)] {
+        let marks: Vec<String> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| (*name).to_owned()).collect();
+        if !marks.is_empty() {
+            _ = writeln!(body, "    {key}: {}", list(marks));
+        }
     }
     if body.is_empty() {
         out.truncate(out.trim_end().len());
@@ -344,13 +356,13 @@ pub fn deployment_yaml(
         _ = writeln!(out, "  {}: {parts}", t(name));
     }
     _ = writeln!(out, "configurations: {}", list(configurations.iter().map(|file| text(file))));
-    let named = d.coordinators().into_iter().zip(coordinators);
-    for (_, file) in named.clone().take(usize::from(d.first.is_none())) {
+    let files = || d.coordinators.iter().zip(coordinators);
+    for (_, file) in files().filter(|(c, _)| c.written == Written::Alone) {
         _ = writeln!(out, "coordinator: {}", text(file));
     }
-    let named: Vec<String> = named
-        .skip(usize::from(d.first.is_none()))
-        .map(|(name, file)| format!("{}: {}", t(&name), text(file)))
+    let named: Vec<String> = files()
+        .filter(|(c, _)| c.written == Written::Named)
+        .map(|(c, file)| format!("{}: {}", t(&c.name), text(file)))
         .collect();
     if !named.is_empty() {
         _ = writeln!(out, "coordinators: {{ {} }}", named.join(", "));
@@ -362,23 +374,27 @@ pub fn deployment_yaml(
     if !d.emits.is_empty() {
         _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));
     }
-    let first = (d.coordinators()[0], &d.deploy, &d.shutdown.down);
+    if !d.safety.is_empty() {
+        _ = writeln!(out, "safety: {}", list(d.safety.iter().map(|(event, _)| t(event))));
+    }
+    if !d.operator.is_empty() {
+        _ = writeln!(out, "operator: {}", list(d.operator.iter().map(|(may, _)| t(may))));
+    }
     // With one coordinator its states need no name before them; with several each has its own.
-    let own = |name: Ident, state: &String| {
-        text(&if d.beside.is_empty() { state.clone() } else { format!("{name}:{state}") })
-    };
-    let each = |states: Vec<String>| if d.beside.is_empty() { states.concat() } else { list(states) };
-    let ups = std::iter::once((first.0, &first.1.up)).chain(d.beside.iter().map(|b| (b.name, &b.up)));
-    let up = each(ups.map(|(name, state)| own(name, state)).collect());
-    let downs = std::iter::once((first.0, first.2)).chain(d.beside.iter().map(|b| (b.name, &b.down)));
-    let down = each(downs.map(|(name, state)| own(name, state)).collect());
+    let one = d.coordinators.len() == 1;
+    let own = |c: &Coordinator, state: &str| text(&if one { state.to_owned() } else { format!("{}:{state}", c.name) });
+    let each = |states: Vec<String>| if one { states.concat() } else { list(states) };
+    let up = each(d.coordinators.iter().map(|c| own(c, &c.up)).collect());
+    let down = each(d.coordinators.iter().map(|c| own(c, &c.down)).collect());
+    let failed: Vec<String> =
+        d.coordinators.iter().flat_map(|c| c.failed.iter().map(move |state| own(c, state))).collect();
     let (event, within) = (t(&d.deploy.event), seconds(d.deploy.within));
-    let failed = std::iter::once((first.0, &first.1.failed)).chain(d.beside.iter().map(|b| (b.name, &b.failed)));
-    let failed: Vec<String> = failed.flat_map(|(name, all)| all.iter().map(move |state| own(name, state))).collect();
     let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", list(failed)) };
     _ = writeln!(out, "deploy: {{ event: {event}, up: {up}{failed}, within_s: {within} }}");
     let (event, within) = (t(&d.shutdown.event), seconds(d.shutdown.within));
-    _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within} }}");
+    let rest = list(d.shutdown.rest.iter().map(|(id, _)| t(id)));
+    let rest = if d.shutdown.rest.is_empty() { String::new() } else { format!(", rest: {rest}") };
+    _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within}{rest} }}");
     let (stack, timeout) = (d.limits.stack, seconds(d.limits.step_timeout));
     _ = writeln!(out, "limits: {{ stack: {stack}, step_timeout_s: {timeout} }}");
     if !d.reactions.is_empty() {
@@ -395,10 +411,12 @@ pub fn deployment_yaml(
             t(&reaction.component)
         );
     }
-    let durability = match d.durability {
-        Durability::Full => "full",
-        Durability::Relaxed => "relaxed",
-    };
-    _ = writeln!(out, "durability: {durability}");
+    if !d.faults.is_empty() {
+        out.push_str("faults:\n");
+    }
+    for fault in &d.faults {
+        let times = if fault.times == 1 { String::new() } else { format!(", times: {}", fault.times) };
+        _ = writeln!(out, "  - {{ step: {}, how: {}{times} }}", text(&fault.step), fault.how.word());
+    }
     out
 }

@@ -1,0 +1,116 @@
+//! What the deployment declares about itself: what configurations stand for, what settles an operation, what an operator may
+//! do, what brings the system to rest. Do the things exist that these name.
+
+use super::monitors;
+use super::universe::Universe;
+use crate::model::codes::{DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY};
+use crate::model::finding::did_you_mean;
+use crate::model::monitor::{Condition, SELF, SignalKind};
+use crate::model::{
+    ComponentType, ConfigId, Deployment, Direction, Finding, Findings, Ident, MemberRef, OperatorMay, Origin,
+};
+use std::collections::BTreeSet;
+
+/// What is wrong with the names.
+pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
+    let mut findings: Findings = deployment.types.iter().flat_map(|ty| settled(deployment, ty)).collect();
+    let ids: Vec<ConfigId> = deployment.configurations.iter().map(|c| c.id).collect();
+    findings.extend(holds(deployment, universe, &ids));
+    for (i, (may, at)) in deployment.operator.iter().enumerate() {
+        let wrong = match may {
+            OperatorMay::Apply(id) => configuration(deployment, *id, *at),
+            OperatorMay::Set(member) => settable(universe, *member, *at),
+        };
+        findings.extend(wrong.map(|finding| finding.path(format!("operator[{i}]"))));
+    }
+    for (i, (id, at)) in deployment.shutdown.rest.iter().enumerate() {
+        let wrong = configuration(deployment, *id, *at);
+        findings.extend(wrong.map(|finding| finding.path(format!("shutdown.rest[{i}]"))));
+    }
+    findings
+}
+
+/// What is wrong with what these configurations stand for.
+pub fn holds(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> Findings {
+    let asked = deployment.configurations.iter().filter(|c| ids.contains(&c.id));
+    let conditions = asked.filter_map(|c| Some((c.holds.as_ref()?, format!("configurations.{}", c.id))));
+    conditions.flat_map(|(holds, path)| monitors::condition(deployment, universe, holds, path)).collect()
+}
+
+fn configuration(deployment: &Deployment, id: ConfigId, at: Origin) -> Option<Finding> {
+    if deployment.configuration(id).is_some() {
+        return None;
+    }
+    let known = deployment.configurations.iter().map(|c| c.id.as_str());
+    Some(
+        Finding::error(DEPLOY_UNKNOWN_CONFIGURATION, format!("there is no configuration `{id}`"))
+            .at(at)
+            .labelled("no such configuration")
+            .help(did_you_mean(id.as_str(), "configurations", known)),
+    )
+}
+
+/// Whether an operator can set it at all: a property or an in-port, of one of the types that the component may have.
+fn settable(universe: &Universe, member: MemberRef, at: Origin) -> Option<Finding> {
+    let creations = universe.of(member.component);
+    if creations.is_empty() {
+        return Some(universe.unknown(member.component, at));
+    }
+    let types: Vec<&ComponentType> = creations.iter().filter_map(|c| c.description.as_deref()).collect();
+    let is_in = |ty: &ComponentType| ty.port(member.member).is_some_and(|port| port.direction == Direction::In);
+    let fits = |ty: &&ComponentType| ty.properties.contains_key(&member.member) || is_in(ty);
+    // That a type is unknown is said where it is created.
+    if types.len() < creations.len() || types.iter().any(fits) {
+        return None;
+    }
+    if types.iter().any(|ty| ty.port(member.member).is_some()) {
+        let message = format!("`{member}` is an out-port: its component alone sends on it");
+        let help = "an operator can set properties, and write in-ports that nothing drives";
+        return Some(Finding::error(NOT_AN_IN_PORT, message).at(at).help(help));
+    }
+    let in_ports = |ty: &ComponentType| -> Vec<Ident> {
+        ty.ports.iter().filter(|(_, port)| port.direction == Direction::In).map(|(name, _)| *name).collect()
+    };
+    let known: BTreeSet<Ident> =
+        types.iter().flat_map(|ty| ty.properties.keys().copied().chain(in_ports(ty))).collect();
+    let message = format!("{} has no property or in-port `{}`", member.component, member.member);
+    Some(Finding::error(UNKNOWN_PROPERTY, message).at(at).labelled("no such property or in-port").help(did_you_mean(
+        member.member.as_str(),
+        "properties and in-ports",
+        known.iter().map(Ident::as_str),
+    )))
+}
+
+/// What is wrong with the conditions that settle the operations of a type.
+fn settled(deployment: &Deployment, ty: &ComponentType) -> Findings {
+    let named = ty.operations.iter().filter_map(|(name, operation)| Some((name, operation.settled_by.as_ref()?)));
+    let about = |(name, condition)| {
+        let path = format!("types.{}.operations.{name}", ty.name);
+        about_itself(deployment, ty, condition).into_iter().map(move |finding| finding.path(path.clone()))
+    };
+    named.flat_map(about).collect()
+}
+
+/// What is wrong with a condition that may look at a component of the type and at nothing else.
+fn about_itself(deployment: &Deployment, ty: &ComponentType, condition: &Condition) -> Findings {
+    let mut strangers: Vec<(String, Origin)> = Vec::new();
+    condition.for_each_component(&mut |component, at| {
+        if component.as_str() != SELF {
+            strangers.push((format!("`{component}`"), at));
+        }
+    });
+    condition.for_each_signal(&mut |signal| {
+        if let SignalKind::Activity { activity, .. } = &signal.kind {
+            strangers.push((format!("the activity `{activity}`"), signal.origin));
+        }
+    });
+    if strangers.is_empty() {
+        return monitors::condition(deployment, &Universe::alone(SELF, ty), condition, String::new());
+    }
+    let finding = |(what, at): (String, Origin)| {
+        let message = format!("`settled_by` looks at {what}: a type knows its own component only");
+        let help = format!("write the component itself as `{SELF}`: `equals: [{SELF}.mode, 6]`");
+        Finding::error(TYPE_SETTLED_ELSEWHERE, message).at(at).help(help)
+    };
+    strangers.into_iter().map(finding).collect()
+}
