@@ -11,7 +11,7 @@ use crate::functions::message_within;
 use crate::lang::LoadOptions;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ComponentName, ConfigId, EventName, MemberRef};
+use crate::model::{Ask, ComponentName, ConfigId, EventName, Ident, MemberRef};
 use crate::runtime::Libraries;
 use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Observer, Session, recovery};
 use crate::time::{Clock, Time};
@@ -30,6 +30,8 @@ pub struct Options {
     pub libraries: Libraries,
     /// Parameters for the deployments it loads (`--set`).
     pub load: LoadOptions,
+    /// The platform on which deployments run instead of their own, one of [`super::PLATFORMS`].
+    pub platform: Option<Ident>,
     /// Hears everything that happens.
     pub observer: Option<Observer>,
     /// Where `say` goes.
@@ -270,7 +272,12 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
     let (path, checked) = {
         let host = host.borrow();
         let path = host.folder.join(file);
-        let checked = super::read(&path, &host.options.load, &host.options.libraries).and_then(super::check);
+        let read = super::read(&path, &host.options.load, &host.options.libraries).map(|mut read| {
+            // Before it is checked: what it says of a simulated platform counts there only.
+            read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
+            read
+        });
+        let checked = read.and_then(super::check);
         (path, checked)
     };
     let checked = checked.map_err(|refused| {

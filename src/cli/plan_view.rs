@@ -12,6 +12,8 @@ use std::collections::BTreeSet;
 #[derive(Serialize)]
 pub struct PlanView<'a> {
     configuration: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    coordinator: Option<&'a str>,
     requests: Vec<String>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     events: &'a [String],
@@ -37,6 +39,7 @@ impl<'a> PlanView<'a> {
         };
         Self {
             configuration: applied.or_else(undone).unwrap_or_default(),
+            coordinator: planned.coordinator.as_deref(),
             requests: planned.asks.iter().map(ToString::to_string).collect(),
             events: &planned.events,
             state: planned.state.as_deref(),

@@ -6,8 +6,11 @@ use super::input::Parameters;
 use super::output::Style;
 use super::progress::Progress;
 use super::{Answer, Context, Failure, Run};
+use crate::app::PLATFORMS;
 use crate::app::script::{self, Options, ScriptFailure};
+use crate::model::Ident;
 use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX, TEXT_NO_FILE};
+use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
@@ -21,6 +24,9 @@ pub struct Args {
     /// Which clock it runs on; simulated time passes as fast as the machine, and the same way every time.
     #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
     clock: ClockKind,
+    /// The platform on which deployments run instead of their own: `simulated` tries one out without its components.
+    #[arg(long, value_name = "PLATFORM", value_parser = PossibleValuesParser::new(PLATFORMS))]
+    platform: Option<String>,
     #[command(flatten)]
     parameters: Parameters,
     /// Tell only what the script says, and failures.
@@ -46,6 +52,7 @@ impl Run for Args {
                 clock: clock.clone(),
                 libraries: context.libraries.clone(),
                 load: self.parameters.options()?,
+                platform: self.platform.as_deref().and_then(|name| Ident::new(name).ok()),
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
             },

@@ -563,7 +563,7 @@ codes! {
          without a name lists all of them; types of a deployment are listed with `davit types FILE`.";
     CLI_UNKNOWN_CONFIGURATION = "cli::unknown_configuration", "the deployment has no such configuration",
         "`davit plan FILE ID…` plans configurations of the deployment, one after the other. There is none of this name in \
-         the files that the deployment lists under `configurations`. Correct the name; without names, all are planned.";
+         the files that the deployment lists under `configurations`. Correct the name; without names, the bring-up is planned.";
     CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
          a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";

@@ -7,6 +7,7 @@ mod demo;
 mod explored;
 mod monitor;
 mod recovery;
+mod several;
 mod simulated;
 mod together;
 mod unasked;

@@ -249,3 +249,20 @@ assert_state("log", "unconfigured")
     let ran = demo.run(&["run", "typo.lua", "--clock", "simulated"]);
     assert!(ran.code == 1 && ran.err.contains("`back`"), "{}{}", ran.out, ran.err);
 }
+
+#[test]
+fn a_script_tries_a_deployment_out_on_the_simulated_platform() {
+    let demo = files();
+    // What the real component could not do.
+    std::fs::remove_dir(demo.path("logs")).unwrap();
+    demo.write("story.lua", "deploy('deployment.yaml')\nassert_running('log')\n");
+    let run = |more: &[&str]| {
+        let args: Vec<&str> = ["run", "story.lua", "--clock", "simulated"].iter().chain(more).copied().collect();
+        demo.run(&args)
+    };
+    assert_eq!(run(&[]).code, 1, "its own platform has no such folder");
+    let ran = run(&["--platform", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let typo = run(&["--platform", "simulted"]);
+    assert!(typo.code == 2 && typo.err.contains("simulated"), "{}", typo.err);
+}
