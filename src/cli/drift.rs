@@ -27,6 +27,13 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
         let out = &context.out;
         let mut client = connect(self.name.as_deref())?;
         let limit = Duration::from_secs_f64(self.within) + ASK;

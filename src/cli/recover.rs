@@ -39,12 +39,19 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
         if self.forward {
-            return Err(Failure::no(CLI_REFUSED, NO_FORWARD, WAY_OUT).as_json(self.json));
+            return Err(Failure::no(CLI_REFUSED, NO_FORWARD, WAY_OUT));
         }
         if !self.back && !self.accept {
             let message = "it is not said how to recover";
-            return Err(Failure::usage(CLI_WHICH_WAY, message, WAY_OUT).as_json(self.json));
+            return Err(Failure::usage(CLI_WHICH_WAY, message, WAY_OUT));
         }
         let out = &context.out;
         let mut client = connect(self.name.as_deref())?;

@@ -113,7 +113,9 @@ pub struct CommitArgs {
 impl Run for CommitArgs {
     fn run(self, context: &Context) -> Answer {
         let wait = Wait { wait: true, within: self.within };
-        request(context, "commit", json!({ "force": self.force }), &Which { name: self.name }, &wait, self.json)
+        let params = json!({ "force": self.force });
+        request(context, "commit", params, &Which { name: self.name }, &wait, self.json)
+            .map_err(|failure| failure.as_json(self.json))
     }
 }
 

@@ -179,6 +179,8 @@ fn a_way_that_is_none_is_refused_in_words() {
         let unknown = deployed.0.run(&command);
         assert_eq!(unknown.code, 1, "{command:?}: {}", unknown.err);
         assert!(unknown.err.contains("`logged`"), "{command:?}: {}", unknown.err);
+        let json = deployed.0.run(&[&command[..], &["--json"]].concat());
+        assert_eq!((json.code, &json.json()["ok"]), (1, &json!(false)), "{command:?}");
     }
 }
 
