@@ -213,7 +213,7 @@ impl Rig {
         let ask = match word {
             "undo" => Ask::Undo,
             "commit" => Ask::Commit { force: false },
-            "commit --force" => Ask::Commit { force: true },
+            "commit!" => Ask::Commit { force: true },
             _ => match word.strip_suffix(".undo") {
                 Some(name) => Ask::UndoOf(id(name)),
                 None => match word.strip_prefix("to=") {
@@ -229,7 +229,7 @@ impl Rig {
         request
     }
 
-    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`.
+    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`, `commit!` (by force).
     pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), Full> {
         self.handle.submit(words.split_whitespace().map(|word| self.request(word, requester)).collect())
     }

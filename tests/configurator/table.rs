@@ -117,7 +117,7 @@ fn commit_makes_the_operators_own_frames_permanent() {
     for word in ["rewire", "burn"] {
         assert_eq!(operator(word), [format!("{word}.ok")]);
     }
-    assert_eq!(operator("commit --force"), ["commit.ok"]);
+    assert_eq!(operator("commit!"), ["commit.ok"]);
     assert_eq!(rig.frames(), ["switch", "burn"], "the coordinator's, and the floor that holds it back");
     assert_eq!(rig.ask("undo"), ["undo.failed"]);
     rig.in_step();
