@@ -206,6 +206,9 @@ pub const VIEW: Duration = Duration::from_secs(5);
 /// Steps remembered with an answer in the log; a deployment of thousands of components need not stay in memory.
 pub const STEPS_LOGGED: usize = 256;
 
+/// How long a script waits for a recovery, or for the platform to be read: a few hundred steps that take their usual time.
+pub const SCRIPT_RECOVERY: Duration = Duration::from_secs(10);
+
 /// Bytes of memory of one script.
 pub const SCRIPT_MEMORY: usize = 256 << 20;
 

@@ -14,7 +14,7 @@ use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ComponentName, ConfigId, EventName, Ident, MemberRef};
 use crate::runtime::Libraries;
-use crate::session::{Ended, Hub, NotUp, Observer, Session};
+use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Observer, Session, recovery};
 use crate::time::{Clock, Time};
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
@@ -92,6 +92,9 @@ struct Host {
 
 type Shared = Rc<RefCell<Host>>;
 
+/// How long reading the platform, or a recovery, may take, in time of the script's clock.
+const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
+
 /// Runs the script at `path`.
 pub fn run(path: &Path, options: Options) -> ScriptEnd {
     let text = match std::fs::read(path) {
@@ -143,6 +146,9 @@ pub const FUNCTIONS: &[&str] = &[
     "raise",
     "apply",
     "undo",
+    "commit",
+    "drift",
+    "recover",
     "wait",
     "wait_state",
     "wait_answer",
@@ -178,6 +184,17 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("raise", String, |h, _lua, event| raise(h, &event));
     function!("apply", String, |h, _lua, id| request(h, Some(&id), Ask::Apply));
     function!("undo", Option<String>, |h, _lua, id| request(h, id.as_deref(), Ask::UndoOf));
+    function!("commit", Option<Table>, |h, _lua, options| {
+        let session = session(h)?;
+        listen_anew(h, &session);
+        session.request(Ask::Commit { force: forced(options)? }, "operator");
+        Ok(())
+    });
+    function!("drift", (), |h, lua, ()| {
+        let drift = session(h)?.drift(RECOVERY).ok_or_else(|| error("the platform could not be read"))?;
+        values::to_lua(lua, &serde_json::to_value(drift).expect("plain data"))
+    });
+    function!("recover", String, |h, _lua, how| recover(h, &how));
     function!("wait", f64, |h, _lua, seconds| {
         let (clock, until) = (clock(h), deadline(h, seconds)?);
         clock.sleep_until(until);
@@ -208,7 +225,7 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         h.borrow_mut().faults.add(&step, &how, times)
     });
     function!("shutdown", Option<Table>, |h, _lua, options| {
-        let force = options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))?;
+        let force = forced(options)?;
         let session = session(h)?;
         let ended = session.take_down(force);
         let mut host = h.borrow_mut();
@@ -235,6 +252,11 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
 
 fn error(message: impl Into<String>) -> mlua::Error {
     mlua::Error::runtime(message.into())
+}
+
+/// `{ force = true }`
+fn forced(options: Option<Table>) -> mlua::Result<bool> {
+    options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))
 }
 
 fn clock(host: &Shared) -> Clock {
@@ -336,6 +358,25 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::R
     listen_anew(host, &session);
     session.request(ask, "operator");
     Ok(())
+}
+
+fn recover(host: &Shared, how: &str) -> mlua::Result<()> {
+    let Some(direction) = recovery(how) else {
+        return Err(error(match how {
+            "forward" => NO_FORWARD.to_owned(),
+            _ => format!("recover(\"{how}\"): {}", did_you_mean(how, "ways", ["back", "accept"].into_iter())),
+        }));
+    };
+    let recovered = session(host)?.recover(direction, "operator", RECOVERY);
+    let recovered = recovered.ok_or_else(|| error("the recovery was not over in time"))?;
+    if recovered.recovered {
+        return Ok(());
+    }
+    let mut text = format!("still broken: {}", recovered.why.unwrap_or_default());
+    for difference in &recovered.residual {
+        text.push_str(&format!("\n  {difference}"));
+    }
+    Err(error(text))
 }
 
 /// Waits until `look` finds something; tells what was there instead when the time is over.

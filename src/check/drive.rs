@@ -4,14 +4,15 @@
 //! Where nothing is waited for but events of components or operators, the shortest series of events is taken that leads
 //! to the goal.
 
+use super::beside;
 use super::coordinator;
 use super::product::{Move, Product, State};
 use super::reactions::Reactions;
 use super::world::{self, Applied, World, Worlds};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Snapshot};
+use crate::model::{Ask, Catalogue, ComponentName, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
-use crate::stack::Stack;
+use crate::stack::{Requester, Stack};
 use crate::statechart::{Chart, EventId, NodeId};
 use crate::system::System;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -23,6 +24,8 @@ use std::sync::Arc;
 pub enum Happening {
     /// An event comes from outside, or time passes.
     Event {
+        /// The coordinator that hears it.
+        coordinator: Ident,
         /// The event.
         event: String,
         /// The state the coordinator is in then.
@@ -30,6 +33,8 @@ pub enum Happening {
     },
     /// Requests made together are carried out.
     Applied {
+        /// The coordinator that asks.
+        coordinator: Ident,
         /// The requests, as they were raised.
         asks: Vec<Ask>,
         /// What is done.
@@ -48,6 +53,8 @@ pub struct Drive {
     pub happenings: Vec<Happening>,
     /// Whether it arrives.
     pub reached: bool,
+    /// The coordinator that does not arrive; when all do, the last.
+    pub coordinator: Ident,
     /// The state it ends in.
     pub state: String,
     /// The system it ends with.
@@ -210,64 +217,96 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     Some((rise, Some(fall)))
 }
 
-/// Drives a deployment that was checked, on the planner's picture of the system.
+/// Drives a deployment that was checked, on the planner's picture of the system. Several coordinators are driven one after
+/// the other, down in the opposite order, each with what the others emit among the events from outside.
 ///
-/// None when the coordinator cannot be entered, or a state that the deployment names is not there.
+/// None when a coordinator cannot be entered, or a state that the deployment names is not there.
 pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Option<Drive> {
-    let chart = crate::statechart::compile(&deployment.first_coordinator().chart).0?;
-    let mut product = product(deployment, &chart, catalogue);
-    let (rise, fall) = ways(&mut product)?;
-    let mut world =
-        World { system: System::new(Arc::new(catalogue.clone())), stack: Stack::new(deployment.limits.stack) };
-    let mut refused = None;
-    let mut happenings = replay(deployment, &chart, &rise, &mut world, &mut refused);
-    let mut end = &rise;
-    if let (Until::Down, Some(fall)) = (until, &fall) {
-        happenings = replay(deployment, &chart, fall, &mut world, &mut refused);
-        end = fall;
+    let charts: Vec<Chart> =
+        deployment.charts().map(|written| crate::statechart::compile(written).0).collect::<Option<_>>()?;
+    let charts: Vec<&Chart> = charts.iter().collect();
+    let mut each = Vec::with_capacity(charts.len());
+    for (number, chart) in charts.iter().enumerate() {
+        let alone = beside::view(deployment, &charts, number)?;
+        let (rise, fall) = ways(&mut product(&alone, chart, catalogue))?;
+        each.push((deployment.coordinators[number].name, *chart, rise, fall));
     }
-    let reached = end.reached && (until == Until::Up || fall.is_some());
-    Some(Drive {
-        happenings,
-        reached,
-        state: chart.fqn(end.end().leaf).to_string(),
-        system: world.system.snapshot(),
-        frames: world.stack.frames().iter().map(|f| f.configuration).collect(),
-        refused: refused.or_else(|| end.refused.clone()),
-    })
-}
-
-/// The same way with real values: worlds that `Worlds` takes for one may differ in them.
-fn replay(
-    deployment: &Deployment,
-    chart: &Chart,
-    way: &Way,
-    world: &mut World,
-    refused: &mut Option<(Ask, Findings)>,
-) -> Vec<Happening> {
-    let context = world::context(deployment);
-    let requester = world::requester(deployment);
-    let mut happenings = Vec::new();
-    for (by, state) in &way.moves {
-        let place = chart.fqn(state.leaf).to_string();
-        match by {
-            Move::Event(event) => happenings.push(Happening::Event { event: chart.event_text(*event), state: place }),
-            Move::Answer { asks, .. } => match world::apply(deployment, &context, requester, world, asks) {
-                Ok(change) => {
-                    *world = change.world;
-                    happenings.push(Happening::Applied {
-                        asks: asks.to_vec(),
-                        steps: change.steps,
-                        result: world.system.snapshot(),
-                        state: place,
-                    });
-                }
-                Err(refusal) => {
-                    *refused = Some((asks[0], refusal.findings));
-                    return happenings;
-                }
-            },
+    let mut driver = Driver {
+        deployment,
+        world: World { system: System::new(Arc::new(catalogue.clone())), stack: Stack::new(deployment.limits.stack) },
+        happenings: Vec::new(),
+    };
+    let mut last = None;
+    for (name, chart, rise, _) in &each {
+        let refused = driver.replay(*name, chart, rise);
+        let stops = refused.is_some() || !rise.reached;
+        last = Some((*name, *chart, rise, refused));
+        if stops {
+            return driver.ended(last, false);
         }
     }
-    happenings
+    if until == Until::Down {
+        driver.happenings.clear();
+        for (name, chart, rise, fall) in each.iter().rev() {
+            let Some(fall) = fall else { return driver.ended(Some((*name, *chart, rise, None)), false) };
+            let refused = driver.replay(*name, chart, fall);
+            let stops = refused.is_some() || !fall.reached;
+            last = Some((*name, *chart, fall, refused));
+            if stops {
+                return driver.ended(last, false);
+            }
+        }
+    }
+    driver.ended(last, true)
+}
+
+/// Ways are gone anew with real values: worlds that `Worlds` takes for one may differ in them.
+struct Driver<'a> {
+    deployment: &'a Deployment,
+    world: World,
+    happenings: Vec<Happening>,
+}
+
+impl Driver<'_> {
+    /// One coordinator's way; what is refused on it ends it.
+    fn replay(&mut self, coordinator: Ident, chart: &Chart, way: &Way) -> Option<(Ask, Findings)> {
+        let context = world::context(self.deployment);
+        let requester = Requester::Coordinator(ComponentName::new(coordinator.as_str()).expect("a plain name"));
+        for (by, state) in &way.moves {
+            let state = chart.fqn(state.leaf).to_string();
+            match by {
+                Move::Event(event) => {
+                    let event = chart.event_text(*event);
+                    self.happenings.push(Happening::Event { coordinator, event, state });
+                }
+                Move::Answer { asks, .. } => {
+                    match world::apply(self.deployment, &context, requester, &self.world, asks) {
+                        Ok(change) => {
+                            self.world = change.world;
+                            let (asks, steps) = (asks.to_vec(), change.steps);
+                            let result = self.world.system.snapshot();
+                            self.happenings.push(Happening::Applied { coordinator, asks, steps, result, state });
+                        }
+                        Err(refusal) => return Some((asks[0], refusal.findings)),
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// How it ends, with the way that came last.
+    #[allow(clippy::type_complexity)] // one coordinator's share, taken apart at once
+    fn ended(self, last: Option<(Ident, &Chart, &Way, Option<(Ask, Findings)>)>, reached: bool) -> Option<Drive> {
+        let (coordinator, chart, way, refused) = last?;
+        Some(Drive {
+            happenings: self.happenings,
+            reached,
+            coordinator,
+            state: chart.fqn(way.end().leaf).to_string(),
+            system: self.world.system.snapshot(),
+            frames: self.world.stack.frames().iter().map(|f| f.configuration).collect(),
+            refused: refused.or_else(|| way.refused.clone()),
+        })
+    }
 }

@@ -301,7 +301,7 @@ pub fn apply(
             Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Op::Undo(frame.id)),
             Ask::Undo => Some(Op::UndoTop),
             Ask::UndoTo(n) => Some(Op::UndoTo(*n)),
-            Ask::Commit => None,
+            Ask::Commit { .. } => None,
         };
         // An undo of what is not there is answered *undone*.
         if let Some(request) = request {

@@ -29,6 +29,7 @@ mod teardown;
 pub use crate::stack::{Requester, Scope, Why};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{Progress, ProgressSink, StepEnd, StepName};
+pub use crate::stack::answer::WAY_OUT;
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
 use crate::limits;

@@ -95,6 +95,9 @@ impl Engine {
                     self.world.broken.clear();
                     self.confirming.clear();
                     self.changed();
+                    if let Some(progress) = &self.progress {
+                        progress(&Progress::Recovered);
+                    }
                     Ok(())
                 }
                 _ => self.world.broken.first().map_or(Ok(()), |broken| Err(broken.residual.clone())),

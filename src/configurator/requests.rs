@@ -66,8 +66,8 @@ impl Engine {
                 continue;
             }
             if group.commits {
-                self.world.stack.make_floor();
-                self.confirming.clear();
+                self.world.stack.make_permanent(requests[0].requester);
+                self.forget_confirmations();
                 self.changed();
             }
             let Some(planned) = group.planned.take() else {

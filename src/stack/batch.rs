@@ -6,7 +6,7 @@
 //! left out, and the rest is planned anew.
 
 use super::work::{Op, Planned, Work};
-use super::{FrameId, Reason, Request, Requester, Why, World, claims, share};
+use super::{FrameId, Reason, may_commit, Request, Requester, Why, World, claims, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
@@ -52,7 +52,7 @@ pub struct Group {
     pub places: SmallVec<[usize; 2]>,
     /// What is repaired before the plan is carried out, by its place in [`World::broken`].
     pub repairs: Option<usize>,
-    /// The present state becomes the floor.
+    /// The requester's frames are made permanent.
     pub commits: bool,
     /// A coordinator has come to its *down* state.
     pub down: bool,
@@ -244,16 +244,16 @@ fn resolve<'a>(world: &World, work: &Work<'_, '_, '_>, request: &Request, rules:
                 },
             }
         }
-        Ask::Commit => {
+        Ask::Commit { force } => {
             if rules.busy {
                 return tell(failed, Reason::Busy);
             }
             if let Some(broken) = world.broken.first() {
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }
-            match foreign(&work.frames, request) {
-                Some(id) => tell(failed, Reason::NeedsForce(id)),
-                None => Resolved::Commit,
+            match may_commit(&world.stack, request.requester, force || request.force) {
+                Err(held) => tell(failed, Reason::Refused(vec![held])),
+                Ok(()) => Resolved::Commit,
             }
         }
     }

@@ -98,7 +98,7 @@ impl Claims {
                     }
                 }
                 // Whose frame is the newest is not known from the text.
-                Ask::Undo | Ask::UndoTo(_) | Ask::Commit => claim.all = true,
+                Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => claim.all = true,
             }
         }
         claim

@@ -14,6 +14,7 @@ mod batch;
 pub mod claims;
 mod desk;
 mod net;
+mod permanent;
 mod prepared;
 pub mod request;
 mod share;
@@ -27,6 +28,7 @@ pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
 pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
+pub use permanent::may_commit;
 pub use prepared::switch_frame;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::HandOver;
@@ -205,14 +207,6 @@ impl Stack {
     pub fn unscope(&mut self, frame: FrameId) {
         if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && f.scope.is_some()) {
             Arc::make_mut(frame).scope = None;
-        }
-    }
-
-    /// Makes the present state the floor: nothing that is in force now can be undone any more.
-    pub fn make_floor(&mut self) {
-        for frame in self.frames.drain(..) {
-            self.committed.insert(frame.buried());
-            self.committed.extend(frame.parts.iter().copied());
         }
     }
 

@@ -92,7 +92,7 @@ impl Bench {
         let running = [("A", Wanted::Running), ("B", Wanted::Running)];
         let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
         bench.ok(&[push(&up)]);
-        bench.stack.make_floor();
+        bench.stack.make_permanent(Requester::Operator);
         bench
     }
 
@@ -168,7 +168,7 @@ fn undo_does_not_pass_a_floor() {
     assert_eq!(bench.codes(&[Op::Undo(below)]), ["stack::floor"]);
     bench.ok(&[Op::UndoTop]);
     assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
-    bench.stack.make_floor();
+    bench.stack.make_permanent(Requester::Operator);
     assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
     assert!(bench.stack.is_buried(ConfigId::new("weld").unwrap(), None));
     bench.stack.discard();

@@ -223,7 +223,8 @@ impl Rig {
     fn request(&self, word: &str, requester: Requester) -> Request {
         let ask = match word {
             "undo" => Ask::Undo,
-            "commit" => Ask::Commit,
+            "commit" => Ask::Commit { force: false },
+            "commit!" => Ask::Commit { force: true },
             _ => match word.strip_suffix(".undo") {
                 Some(name) => Ask::UndoOf(id(name)),
                 None => match word.strip_prefix("to=") {
@@ -241,7 +242,7 @@ impl Rig {
         request
     }
 
-    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`.
+    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`, `commit!` (by force).
     pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), Full> {
         self.handle.submit(words.split_whitespace().map(|word| self.request(word, requester)).collect())
     }
