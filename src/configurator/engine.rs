@@ -95,6 +95,8 @@ pub(super) struct Engine {
     looks: Vec<Look>,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
+    /// What partial frames are left of.
+    pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
     /// Prepared switches.
     pub switches: FxHashMap<ConfigId, Box<Fast>>,
     pub confirming: Vec<Confirming>,
@@ -141,6 +143,7 @@ impl Engine {
             suspects: Vec::new(),
             looks: Vec::new(),
             returned: false,
+            partials: Vec::new(),
             switches: FxHashMap::default(),
             confirming: Vec::new(),
             heard: Vec::new(),
@@ -466,10 +469,18 @@ impl Engine {
             stack,
             busy: self.current.first().map(|(request, since)| Busy::of(request, *since)),
             waiting: self.desk.len(),
-            broken: self.world.broken.first().map(|broken| broken.residual.clone()),
+            broken: self.broken_longest(),
             residuals: self.world.broken.iter().map(|broken| broken.residual.clone()).collect(),
             quarantined: self.world.quarantined.clone(),
         })
+    }
+
+    /// What is broken longest, or left over longest in a partial frame.
+    fn broken_longest(&mut self) -> Option<Arc<super::request::Residual>> {
+        let stack = &self.world.stack;
+        self.partials.retain(|(frame, _)| stack.frame(*frame).is_some_and(|frame| frame.partial));
+        let broken = self.world.broken.first().map(|broken| &broken.residual);
+        broken.or(self.partials.first().map(|(_, residual)| residual)).cloned()
     }
 
     /// Everything that still waits is answered.

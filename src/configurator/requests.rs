@@ -218,6 +218,7 @@ impl Engine {
             (Some(frame), None) => Some(self.push_partial(frame)),
             (None, of) => of,
         };
+        self.partials.extend(frame.map(|frame| (frame, residual.clone())));
         if !residual.is_settled() {
             let components = residual.components().collect();
             let culprit = match request.ask {

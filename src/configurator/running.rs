@@ -29,7 +29,7 @@ pub(super) enum Purpose {
     /// Requests of a batch under way on the desk, by its number.
     Requests(u32, Group),
     /// A safe configuration: its request, the frame it leaves, and what it touches.
-    Safe(Box<(Request, Option<Frame>, Touched)>),
+    Safe(Box<(Request, Frame, Touched)>),
     /// Something of the configurator's own, waited for by whoever began it.
     Own,
 }

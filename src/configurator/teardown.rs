@@ -6,7 +6,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlannedStep, Stage};
-use crate::stack::{Broken, Op, Part, Planned, Requester, Residual, Why, transaction};
+use crate::stack::{Broken, Effort, Op, Part, Planned, Requester, Residual, Why, effort, transaction};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Transaction};
@@ -156,8 +156,9 @@ impl Engine {
         for id in &safe {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
-            let system = self.world.system.clone();
-            let (_, planned, troubles) = self.plan_whole(configuration, request, &system);
+            let at = self.clock.now();
+            let Effort { planned, troubles, .. } =
+                effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.context);
             down.troubles.extend(troubles);
             let machine = Transaction::new(planned, self.effort(Time::NEVER));
             let done = self.carry_out(machine);

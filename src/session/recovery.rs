@@ -70,11 +70,13 @@ impl Difference {
             (How::Unknown, &residual.unsettled),
             (How::Irreversible, &residual.irreversible),
         ];
+        let left = residual.left.iter().filter(|step| !residual.irreversible.contains(step));
+        let left = left.map(|step| Self::step(How::Differs, step));
         let steps = lists.into_iter().flat_map(|(how, steps)| steps.iter().map(move |step| Self::step(how, step)));
         let components = [(How::Faulted, &residual.faulted), (How::Quarantined, &residual.quarantined)];
         let components =
             components.into_iter().flat_map(|(how, names)| names.iter().map(move |name| Self::component(how, *name)));
-        steps.chain(components).collect()
+        left.chain(steps).chain(components).collect()
     }
 }
 

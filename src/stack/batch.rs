@@ -251,7 +251,7 @@ fn resolve<'a>(world: &World, work: &Work<'_, '_, '_>, request: &Request, rules:
             if let Some(broken) = world.broken.first() {
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }
-            match may_commit(&world.stack, request.requester, force || request.force) {
+            match may_commit(&world.stack, request.requester, force) {
                 Err(held) => tell(failed, Reason::Refused(vec![held])),
                 Ok(()) => Resolved::Commit,
             }

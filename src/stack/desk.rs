@@ -161,6 +161,19 @@ impl Desk {
         None
     }
 
+    /// A batch that could begin has not done so after all: it is the first that waits.
+    pub fn put_back(&mut self, number: u32) {
+        if let Some(at) = self.under_way.iter().position(|turn| turn.number == number) {
+            self.waiting.push_front(self.under_way.remove(at).batch);
+        }
+    }
+
+    /// Every request that waits or is under way.
+    pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
+        let waiting = self.waiting.iter_mut();
+        waiting.chain(self.under_way.iter_mut().map(|turn| &mut turn.batch)).flat_map(|batch| &mut batch.requests)
+    }
+
     /// The request at a place of a batch under way is answered. True: that was the last of it, and it is over.
     pub fn answered(&mut self, number: u32, place: usize) -> bool {
         let Some(at) = self.under_way.iter().position(|turn| turn.number == number) else { return true };

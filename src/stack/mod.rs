@@ -6,13 +6,14 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
+//!   batch come to. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
 mod batch;
 pub mod claims;
 mod desk;
+mod effort;
 mod net;
 mod permanent;
 mod prepared;
@@ -26,12 +27,13 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
+pub use effort::{Effort, effort};
 pub use desk::{Arrival, Desk, Turn};
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::switch_frame;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
-pub use share::HandOver;
+pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};
 pub use world::{Broken, World};
 

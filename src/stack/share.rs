@@ -92,6 +92,12 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
     Ok(hand)
 }
 
+/// Whether a frame cannot be popped while these lie above it.
+pub fn is_kept(frame: &Arc<Frame>, above: impl Iterator<Item = Arc<Frame>>) -> bool {
+    let frames: Vec<Arc<Frame>> = std::iter::once(frame.clone()).chain(above).collect();
+    examine(&frames, 0).is_err()
+}
+
 /// Gives the values that a popped frame leaves to their takers.
 pub(super) fn hand_over(frames: &mut [Arc<Frame>], hand: &HandOver, real: &dyn Fn(FrameId) -> FrameId) {
     for (taker, slot, value) in &hand.takers {

@@ -163,7 +163,7 @@ impl Transaction {
     pub(super) fn undo_of(&self, i: u32, part: usize) -> &Undo {
         let forward = &self.forward.as_ref().expect("something was carried out").list[i as usize];
         // The net was planned on the system before all of them.
-        let Some(place) = self.planned.place(i as usize).filter(|_| part > 0 && !self.planned.of.is_empty()) else {
+        let Some(place) = self.planned.place(i as usize).filter(|_| part > 0 && !self.planned.whole.is_empty()) else {
             return &forward.undo;
         };
         let whole = self.whole();

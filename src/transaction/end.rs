@@ -222,7 +222,7 @@ impl Transaction {
 
     /// Parts before `part` of which a step is neither done nor finished.
     fn missing(&self, part: usize) -> FxHashSet<usize> {
-        if part == 0 || self.planned.of.is_empty() {
+        if part == 0 || self.planned.whole.is_empty() {
             return FxHashSet::default();
         }
         // What the finishing script left out had nothing to do; only what it could not do is missing.

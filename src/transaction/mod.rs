@@ -207,7 +207,7 @@ impl Transaction {
 
     /// All steps, one operation after the other.
     fn whole(&self) -> &[PlannedStep] {
-        if self.planned.of.is_empty() { self.forward.as_ref().map_or(&[], |run| &run.list) } else { &self.planned.whole }
+        if self.planned.whole.is_empty() { self.forward.as_ref().map_or(&[], |run| &run.list) } else { &self.planned.whole }
     }
 
     fn in_hand(&self) -> &Run {

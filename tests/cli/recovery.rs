@@ -142,7 +142,6 @@ fn a_broken_deployment_goes_back() {
 #[test]
 fn the_undo_of_what_broke_it_recovers_as_well() {
     let deployed = Deployed::broken();
-    assert_eq!(deployed.0.run(&["apply", "thick", "--wait"]).code, 1, "nothing is applied while it is broken");
     let undo = deployed.0.run(&["undo", "swap", "--wait"]);
     assert_eq!(undo.code, 0, "{}{}", undo.out, undo.err);
     assert_eq!(deployed.status()["phase"], "up");

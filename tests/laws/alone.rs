@@ -91,15 +91,9 @@ fn mistake(conf: &mut Configuration, [at, what, more]: [u8; 3]) {
         (ChangeKind::Create { activity, ty, .. }, _) => match more % 3 {
             0 => *activity = Some(generate::ident("fats")),
             1 => *ty = TypeName::new("T.four").unwrap(),
-            _ => {
-                let entry = StateEntry { target: Target::Default, state: RunState::Faulted, origin: Origin::NONE };
-                conf.post.push(entry);
-            }
+            _ => *ty = TypeName::new("T.five").unwrap(),
         },
-        (ChangeKind::Destroy { .. }, _) => {
-            let entry = StateEntry { target: Target::Default, state: RunState::Running, origin: Origin::NONE };
-            conf.pre.extend([entry, entry]);
-        }
+        (ChangeKind::Destroy { component }, _) => *component = member(component.member(generate::ident("zz"))).component,
     }
 }
 
