@@ -112,8 +112,7 @@ fn switches(c: &mut Criterion) {
         let mut system = deployed(n);
         let mut stack = Stack::new(64);
         let context = Context::default();
-        let push =
-            |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
+        let push = |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let (eight, five) = (switch("eight", 2.0), switch("five", 3.0));
         let first = transaction(&system, &stack, &[push(&eight)], &context).expect("accepted");
         for s in &first.steps {

@@ -113,16 +113,6 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], verified: bool) -> Fin
     };
     let all: Vec<_> = charts.iter().map(|chart| of(chart)).collect();
     let mut findings = Vec::new();
-    for (chart, name) in charts.iter().zip(&names) {
-        if let Some(site) = chart.raises().iter().find(|site| site.name.as_str() == "undo") {
-            let message = format!("`undo` of `{name}` is refused when the newest frame is another coordinator's");
-            findings.push(
-                Finding::warning(COORD_SHARED, message)
-                    .at(site.origin)
-                    .help("name the configuration to undo: `ID.undo` undoes one's own newest frame of it"),
-            );
-        }
-    }
     for (a, mine) in all.iter().enumerate() {
         for (b, theirs) in all.iter().enumerate().skip(a + 1) {
             let found = mine.iter().find_map(|(one, components, everything)| {

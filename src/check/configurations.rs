@@ -10,8 +10,8 @@ use crate::limits;
 use crate::model::{
     Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
 };
-use crate::plan::meant::Meant;
 use crate::plan::Context;
+use crate::plan::meant::Meant;
 use crate::system::{System, Violation, either};
 
 /// What is wrong with each configuration by itself.

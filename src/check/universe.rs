@@ -3,8 +3,8 @@
 use crate::model::codes::UNKNOWN_COMPONENT;
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin, Step,
-    TypeName, Value,
+    Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin,
+    Step, TypeName, Value,
 };
 use crate::system::{Member, System, Violation, step};
 use smallvec::SmallVec;
@@ -57,8 +57,11 @@ impl Universe {
     /// One component of one type.
     pub fn alone(component: &str, ty: &ComponentType) -> Self {
         let name = ComponentName::new(component).expect("the name of a component");
-        let creation = Creation { ty: ty.name, description: Some(Arc::new(ty.clone())), origin: ty.origin, by: SmallVec::new() };
-        let empty = System::new(Arc::new(Catalogue::new()));
+        let creation =
+            Creation { ty: ty.name, description: Some(Arc::new(ty.clone())), origin: ty.origin, by: SmallVec::new() };
+        let mut types = Catalogue::new();
+        types.insert(ty.clone());
+        let empty = System::new(Arc::new(types));
         Self { components: BTreeMap::from([(name, vec![creation])]), empty }
     }
 

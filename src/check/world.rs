@@ -299,7 +299,10 @@ pub fn apply(
                 scope: None,
             }),
             Ask::UndoOf(id) => world.stack.newest_of(*id, Some(requester)).map(|frame| Op::Undo(frame.id)),
-            Ask::Undo => Some(Op::UndoTop),
+            Ask::Undo => {
+                let own = world.stack.frames().iter().rev().find(|frame| frame.requester == requester);
+                Some(own.map_or(Op::UndoTop, |frame| Op::Undo(frame.id)))
+            }
             Ask::UndoTo(n) => Some(Op::UndoTo(*n)),
             Ask::Commit { .. } => None,
         };

@@ -146,8 +146,7 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     let mut planned = Vec::new();
     for id in ids {
         let Some(configuration) = deployment.configuration(id) else { continue };
-        let request =
-            Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
+        let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
         let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
         for planned in &transaction.steps {
             step::effect(&planned.step, &mut system);

@@ -105,10 +105,22 @@ pub enum Recovery {
 
 /// A command, with where its answer goes.
 pub(super) enum Command {
-    View { system: bool, reply: Sender<Arc<View>> },
-    Drift { reply: Sender<Drift> },
-    Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
-    TakeDown { forced: bool, deadline: Time, reply: Sender<TakenDown> },
+    View {
+        system: bool,
+        reply: Sender<Arc<View>>,
+    },
+    Drift {
+        reply: Sender<Drift>,
+    },
+    Recover {
+        direction: Recovery,
+        reply: Sender<Result<(), Arc<Residual>>>,
+    },
+    TakeDown {
+        forced: bool,
+        deadline: Time,
+        reply: Sender<TakenDown>,
+    },
     /// A coordinator has come to its *down* state.
     Down(Requester),
     DiscardStack,

@@ -99,7 +99,13 @@ impl Engine {
     /// Carries out the acts that are ready, from `at` on, which becomes the time of the last look at the clock: a look costs
     /// as much as an act, so only those that may take time are measured. The error is the number of the step that was not
     /// done, and what came of it.
-    fn switch_over(&mut self, fast: &mut Fast, request: Request, undoing: bool, at: &mut Time) -> Result<(), (u32, Outcome)> {
+    fn switch_over(
+        &mut self,
+        fast: &mut Fast,
+        request: Request,
+        undoing: bool,
+        at: &mut Time,
+    ) -> Result<(), (u32, Outcome)> {
         let deadline = *at + self.limits.step_timeout;
         let mut sent = 0u32;
         for nth in 0..fast.switch.acts().len() {

@@ -26,10 +26,10 @@ mod running;
 mod safe;
 mod teardown;
 
+pub use crate::stack::answer::WAY_OUT;
 pub use crate::stack::{Requester, Scope, Why};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{Progress, ProgressSink, StepEnd, StepName};
-pub use crate::stack::answer::WAY_OUT;
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
 use crate::limits;

@@ -188,7 +188,9 @@ impl Engine {
         }
         let mut faulted: Vec<ComponentName> = Vec::new();
         for node in components.iter().filter_map(|name| self.world.system.component(*name)) {
-            if node.state == RunState::Faulted && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted) {
+            if node.state == RunState::Faulted
+                && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted)
+            {
                 faulted.push(node.name);
             }
         }

@@ -13,7 +13,6 @@ use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-
 impl Engine {
     /// A batch begins.
     pub(super) fn begin(&mut self, turn: Turn) {
@@ -186,11 +185,13 @@ impl Engine {
                     Verdict::Undone => (Verdict::Reverted, Some(Reason::NotConfirmed(event, within))),
                     other => (other, reason),
                 };
-                let begun = self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
+                let begun =
+                    self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
                 self.forget(request);
                 // It carries the number of the request that had pushed the frame, and is about that.
                 let Ask::UndoOf(id) = request.ask else { return };
-                let told = Request { ask: if verdict == Verdict::Reverted { Ask::Apply(id) } else { request.ask }, ..request };
+                let told =
+                    Request { ask: if verdict == Verdict::Reverted { Ask::Apply(id) } else { request.ask }, ..request };
                 self.tell_answer(told, verdict, reason.map(Arc::new), begun);
             }
             (Why::Asked, Some(verdict)) => self.answer(request, verdict, reason),
@@ -354,4 +355,3 @@ impl Engine {
         self.world.stack.frames().iter().map(view).collect()
     }
 }
-

@@ -273,7 +273,9 @@ impl Engine {
                 did |= self.advance(at);
             }
         }
-        while let Some(at) = self.running.iter().position(|running| running.over && !matches!(running.purpose, Purpose::Own)) {
+        while let Some(at) =
+            self.running.iter().position(|running| running.over && !matches!(running.purpose, Purpose::Own))
+        {
             let running = self.running.remove(at);
             self.ended(running);
             did = true;

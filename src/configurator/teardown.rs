@@ -190,10 +190,11 @@ impl Engine {
         let nothing = System::new(self.world.system.catalogue().clone());
         let quarantined = self.world.quarantined.clone();
         let steps = system::diff(&self.world.system, &nothing);
-        let work =
-            taking_apart(steps.into_iter().filter(|step| {
-                matches!(step, Step::Disconnect { .. }) || !quarantined.contains(&step.component())
-            }));
+        let work = taking_apart(
+            steps
+                .into_iter()
+                .filter(|step| matches!(step, Step::Disconnect { .. }) || !quarantined.contains(&step.component())),
+        );
         let machine = Transaction::new(own_plan(work, &self.world.system), self.effort(deadline));
         let done = self.carry_out(machine);
         down.forced = done.done_so_far().map(|(planned, _)| planned.step.clone()).collect();
@@ -272,7 +273,18 @@ fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
         };
         let undo = Undo::Nothing;
         let reversibility = Reversibility::Exact;
-        work.push(PlannedStep { id, stage: Stage::Changes, wave, after, step, reversibility, undo, moves: false, undo_moves: false, origin: Origin::NONE });
+        work.push(PlannedStep {
+            id,
+            stage: Stage::Changes,
+            wave,
+            after,
+            step,
+            reversibility,
+            undo,
+            moves: false,
+            undo_moves: false,
+            origin: Origin::NONE,
+        });
     }
     work
 }

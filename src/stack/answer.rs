@@ -132,10 +132,7 @@ impl Residual {
 
     /// Whether everything is known and as the model has it: then nothing is left but a partial frame, if that.
     pub fn is_settled(&self) -> bool {
-        self.observed
-            && self.difference.is_empty()
-            && self.unsettled.is_empty()
-            && self.faulted.is_empty()
+        self.observed && self.difference.is_empty() && self.unsettled.is_empty() && self.faulted.is_empty()
     }
 
     /// Whether nothing at all is left.

@@ -6,7 +6,7 @@
 //! left out, and the rest is planned anew.
 
 use super::work::{Op, Planned, Work};
-use super::{FrameId, Reason, may_commit, Request, Requester, Why, World, claims, share};
+use super::{FrameId, Reason, Request, Requester, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
@@ -127,7 +127,9 @@ fn no(place: usize, request: &Request, reason: Reason) -> Told {
 
 /// How many of the first requests are carried out together: undos and pushes of one batch, else one.
 fn together(world: &World, requests: &[Request]) -> usize {
-    let plain = |request: &Request| request.why == Why::Asked && matches!(request.ask, Ask::Apply(_) | Ask::UndoOf(_) | Ask::Undo);
+    let plain = |request: &Request| {
+        request.why == Why::Asked && matches!(request.ask, Ask::Apply(_) | Ask::UndoOf(_) | Ask::Undo)
+    };
     let mixed = requests.iter().any(|r| r.ask.is_undo()) && requests.iter().any(|r| !r.ask.is_undo());
     if !mixed || !requests.iter().all(plain) || !requests[0].ask.is_undo() {
         return 1;
@@ -156,7 +158,13 @@ fn tell<'a>(verdict: Verdict, reason: Reason) -> Resolved<'a> {
     Resolved::Tell(Some(verdict), Some(reason))
 }
 
-fn resolve<'a>(world: &World, work: &Work<'_, '_, '_>, request: &Request, rules: &Rules<'a>, repaired: bool) -> Resolved<'a> {
+fn resolve<'a>(
+    world: &World,
+    work: &Work<'_, '_, '_>,
+    request: &Request,
+    rules: &Rules<'a>,
+    repaired: bool,
+) -> Resolved<'a> {
     let failed = request.ask.failed();
     if request.why == Why::Down {
         return Resolved::Down;
@@ -276,7 +284,8 @@ fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Plann
     }
     let safe = world.stack.safe().next().is_some();
     let still = |request: &Request| {
-        request.still || safe && (request.requester == Requester::Operator || request.why != Why::Asked) && !request.force
+        request.still
+            || safe && (request.requester == Requester::Operator || request.why != Why::Asked) && !request.force
     };
     for (part, place) in group.places.iter().enumerate().filter(|(_, place)| still(&requests[**place])) {
         let _ = place;
@@ -293,7 +302,11 @@ fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Plann
 /// taken from any component.
 fn hindered<'a>(world: &World, steps: impl Iterator<Item = &'a PlannedStep> + Clone) -> Option<(usize, Vec<Finding>)> {
     let needs = |planned: &PlannedStep| -> SmallVec<[ComponentName; 2]> {
-        if matches!(planned.step, Step::Disconnect { .. }) { SmallVec::new() } else { crate::system::touch::components(&planned.step) }
+        if matches!(planned.step, Step::Disconnect { .. }) {
+            SmallVec::new()
+        } else {
+            crate::system::touch::components(&planned.step)
+        }
     };
     let hung = |planned: &PlannedStep| needs(planned).into_iter().any(|c| world.quarantined.contains(&c));
     let first = steps.clone().position(hung)?;
@@ -313,4 +326,3 @@ pub fn held(planned: &Planned) -> Vec<FrameId> {
     let pops = planned.parts.iter().flat_map(|part| &part.edits.pops);
     pops.flat_map(|(id, hand)| std::iter::once(*id).chain(hand.takers())).collect()
 }
-

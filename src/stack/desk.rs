@@ -147,7 +147,8 @@ impl Desk {
     }
 
     fn free(&self, claims: &Claims) -> Option<usize> {
-        let coordinator = |batch: &Batch| batch.requests.first().map(|r| r.requester).filter(|r| *r != Requester::Operator);
+        let coordinator =
+            |batch: &Batch| batch.requests.first().map(|r| r.requester).filter(|r| *r != Requester::Operator);
         let mut held = claims.of(self.under_way.iter().flat_map(|turn| &turn.batch.requests));
         let mut asking: Vec<Requester> = self.under_way.iter().filter_map(|turn| coordinator(&turn.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {

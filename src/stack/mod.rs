@@ -27,8 +27,8 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
-pub use effort::{Effort, effort};
 pub use desk::{Arrival, Desk, Turn};
+pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::switch_frame;

@@ -25,7 +25,8 @@ impl Stack {
         self.next += 1;
         let fits = |f: &Arc<Frame>| f.configuration == switch.configuration() && f.acts == switch.acts();
         let spare = self.spares.iter().position(fits).map(|i| self.spares.swap_remove(i));
-        let frame = match spare.and_then(|mut frame| refreshed(&mut frame, switch, id, requester, at, scope).then_some(frame))
+        let frame = match spare
+            .and_then(|mut frame| refreshed(&mut frame, switch, id, requester, at, scope).then_some(frame))
         {
             Some(frame) => frame,
             None => Arc::new(Frame { id, ..switch_frame(switch, requester, at, scope) }),

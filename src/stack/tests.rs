@@ -1,6 +1,6 @@
 //! What the laws leave to examples: groups, floors, hand-over, the bound, failed components.
 
-use super::{FrameId, Op, Requester, Scope, Stack, Planned, transaction};
+use super::{FrameId, Op, Planned, Requester, Scope, Stack, transaction};
 use crate::model::*;
 use crate::plan::{Context, Refusal};
 use crate::system::{System, View, step};
@@ -203,7 +203,8 @@ fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(3);
     let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
     let scoped = of(1);
-    let request = Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) };
+    let request =
+        Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) };
     let kept = bench.ok(&[request]).1[0];
     for n in 2..9 {
         bench.ok(&[push(&of(n))]);
@@ -221,7 +222,12 @@ fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(2);
     for n in 0..2 {
         let conf = of(n);
-        bench.ok(&[Op::Push { configuration: &conf, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) }]);
+        bench.ok(&[Op::Push {
+            configuration: &conf,
+            requester: Requester::Operator,
+            at: Time(0),
+            scope: Some(Scope(1)),
+        }]);
     }
     assert_eq!(bench.codes(&[push(&of(3))]), ["stack::full"]);
 }

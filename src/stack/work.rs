@@ -76,7 +76,11 @@ impl Planned {
 
     /// The place of a step in [`Self::whole`]; none: it is there for no one of them alone.
     pub fn place(&self, step: usize) -> Option<u32> {
-        if self.whole.is_empty() { u32::try_from(step).ok() } else { self.of.get(step).copied().filter(|of| *of != Item::NOWHERE) }
+        if self.whole.is_empty() {
+            u32::try_from(step).ok()
+        } else {
+            self.of.get(step).copied().filter(|of| *of != Item::NOWHERE)
+        }
     }
 
     /// The number of the operation that the step at a place of the whole belongs to.

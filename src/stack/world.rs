@@ -55,9 +55,9 @@ impl World {
         self.broken.iter().position(|broken| match (broken.frame, frame) {
             (Some(broken), Some(frame)) => broken == frame,
             (Some(_), None) => false,
-            (None, _) => {
-                broken.culprit.is_some_and(|(culprit, asked)| culprit == id && (by == Requester::Operator || by == asked))
-            }
+            (None, _) => broken
+                .culprit
+                .is_some_and(|(culprit, asked)| culprit == id && (by == Requester::Operator || by == asked)),
         })
     }
 

@@ -136,7 +136,12 @@ impl System {
         Ok(changed)
     }
 
-    fn adopt_one(&mut self, name: ComponentName, ty: Option<Arc<crate::model::ComponentType>>, seen: &Snapshot) -> bool {
+    fn adopt_one(
+        &mut self,
+        name: ComponentName,
+        ty: Option<Arc<crate::model::ComponentType>>,
+        seen: &Snapshot,
+    ) -> bool {
         let (Some(ty), Some(component)) = (ty, seen.components.get(&name)) else {
             let there = self.names.contains_key(&name);
             if there {
@@ -156,7 +161,8 @@ impl System {
                 ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
                 self.remove_component(name);
             }
-            let values = ty.properties.iter().map(|(_, declared)| declared.default.clone().unwrap_or(Value::Bool(false)));
+            let values =
+                ty.properties.iter().map(|(_, declared)| declared.default.clone().unwrap_or(Value::Bool(false)));
             let values = values.collect();
             self.insert_component(Node::new(name, ty.clone(), component.activity, values));
         }
@@ -166,7 +172,9 @@ impl System {
             changed = true;
         }
         for (index, property) in ty.properties.keys().enumerate() {
-            let (Some(value), Some(node)) = (component.properties.get(property), self.component(name)) else { continue };
+            let (Some(value), Some(node)) = (component.properties.get(property), self.component(name)) else {
+                continue;
+            };
             if node.properties.get(index) != Some(value) {
                 self.put_property(name, index, value);
                 changed = true;

@@ -177,8 +177,7 @@ impl Transaction {
     /// Adds what is missing of the parts before `part`: they were to stand whatever comes after them.
     fn finish_before(&self, part: usize, live: &System, way: &mut WayBack) {
         let forward = self.forward.as_ref().expect("something was carried out");
-        let mut done: FxHashSet<u32> =
-            forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
+        let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
         done.extend(self.finished.iter().copied());
         let mut view = Overlay::new(live);
         for step in &way.list {
@@ -186,7 +185,9 @@ impl Transaction {
         }
         // What a held part has written stands above what the parts before it would write.
         let held: FxHashSet<Slot> = (forward.done.iter())
-            .filter(|i| self.part_of(**i) >= part && !way.takes_back.contains(&Some(**i)) && !self.taken_back.contains(*i))
+            .filter(|i| {
+                self.part_of(**i) >= part && !way.takes_back.contains(&Some(**i)) && !self.taken_back.contains(*i)
+            })
             .filter_map(|i| crate::system::touch::absolute(&forward.list[*i as usize].step))
             .collect();
         let wave = way.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);

@@ -54,11 +54,8 @@ impl Transaction {
         }
         let unsettled = forward.unsettled.iter().map(|i| forward.list[*i as usize].step.clone()).collect();
         self.unsettled = unsettled;
-        let residual = Residual {
-            unsettled: self.unsettled.clone(),
-            quarantined: self.hung(can),
-            ..Residual::of(self.reason())
-        };
+        let residual =
+            Residual { unsettled: self.unsettled.clone(), quarantined: self.hung(can), ..Residual::of(self.reason()) };
         let own = self.own();
         let broken = self.broken(0, residual, live.snapshot_some(&own), false);
         self.over(vec![broken]);
@@ -82,9 +79,7 @@ impl Transaction {
         match (first, forward.unsettled.first(), &self.stopped_by) {
             (_, _, Some(reason @ (Reason::GivenUp | Reason::Interrupted(_)))) => reason.clone(),
             (Some((_, reason)), ..) => reason.clone(),
-            (None, Some(i), _) => {
-                Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout }
-            }
+            (None, Some(i), _) => Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout },
             (None, None, Some(reason)) => reason.clone(),
             (None, None, None) => Reason::Ended,
         }
@@ -143,8 +138,8 @@ impl Transaction {
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
         let observed = adopted == Some(true);
         if observed && self.phase == Phase::Looking && self.mends(part) {
-            let asked = self.asked_back
-                || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
+            let asked =
+                self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
             let steps = diff(live, &wanted);
             let steps: Vec<Step> = steps
                 .into_iter()
@@ -204,7 +199,11 @@ impl Transaction {
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if at < part {
-                if missing.contains(&at) { self.broken(at, Residual::of(self.reason()), Snapshot::default(), false) } else { PartEnd::Done }
+                if missing.contains(&at) {
+                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false)
+                } else {
+                    PartEnd::Done
+                }
             } else if at == part {
                 match (clean, self.given_up) {
                     (true, Some(_)) if matches!(self.stopped_by, Some(Reason::GivenUp)) => PartEnd::Cancelled,

@@ -6,21 +6,23 @@
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `back`: the way back.
-//! `end`: what comes of each part.
+//! `end`: what comes of each part. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
 
 mod back;
 mod end;
+mod messages;
 mod order;
 mod run;
 mod settle;
 
 pub use back::Touched;
 pub use end::{BrokenPart, End, PartEnd};
+pub use messages::{Can, Input, Poll, Spec};
 
-use crate::model::{Cause, ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
+use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
@@ -28,77 +30,6 @@ use crate::time::Time;
 use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
-use smallvec::SmallVec;
-use std::time::Duration;
-
-/// How a transaction is carried out.
-#[derive(Debug, Clone, Copy)]
-pub struct Spec {
-    /// No step of it begins later.
-    pub until: Time,
-    /// What that time is, from its beginning, for words.
-    pub timeout: Duration,
-    /// How long one step may take.
-    pub patience: Duration,
-    /// Every step is tried, past failures, and none is taken back: a safe configuration.
-    pub best_effort: bool,
-    /// Somebody asked for what a way back would do: it may move.
-    pub asked_back: bool,
-}
-
-/// What whoever drives it can do now.
-pub struct Can<'a> {
-    /// How a step is carried out on the platform.
-    pub execution: &'a dyn Fn(&Step) -> Execution,
-    /// Whether there is room for a call that takes time.
-    pub room: bool,
-    /// Components whose call has not returned.
-    pub quarantined: &'a [ComponentName],
-}
-
-/// What is to be done next.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Poll {
-    /// These steps begin now, by their numbers in the list in hand ([`Transaction::step`]).
-    Begin(SmallVec<[u32; 1]>),
-    /// The call that is out for this step is given up: it is told so.
-    Cancel(u32),
-    /// These components are read back.
-    Read(Vec<ComponentName>),
-    /// Nothing, until something comes.
-    Wait,
-    /// It is over: [`Transaction::end`].
-    Over,
-}
-
-/// What happened.
-#[derive(Debug, Clone)]
-pub enum Input {
-    /// A step that was begun is back.
-    Ended {
-        /// Its number.
-        step: u32,
-        /// How.
-        outcome: Outcome,
-    },
-    /// A step that was to begin did not.
-    NotBegun(u32),
-    /// What was read; none: nobody answered.
-    Seen(Option<Snapshot>),
-    /// A part of it is given up, by who asked for it: what was done is taken back, also what moves.
-    GiveUp {
-        /// The part.
-        part: usize,
-    },
-    /// A safe configuration goes first. Nothing further begins, and nothing is taken back before [`Input::Release`].
-    Interrupt(ConfigId),
-    /// The safe configuration has been applied, and touched this.
-    Release(Touched),
-    /// Everything is taken down: nothing further begins, and nothing is taken back.
-    TakenDown,
-    /// Nothing further begins, and what was done is taken back as after a failure.
-    Stop,
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -207,7 +138,11 @@ impl Transaction {
 
     /// All steps, one operation after the other.
     fn whole(&self) -> &[PlannedStep] {
-        if self.planned.whole.is_empty() { self.forward.as_ref().map_or(&[], |run| &run.list) } else { &self.planned.whole }
+        if self.planned.whole.is_empty() {
+            self.forward.as_ref().map_or(&[], |run| &run.list)
+        } else {
+            &self.planned.whole
+        }
     }
 
     fn in_hand(&self) -> &Run {
@@ -238,7 +173,9 @@ impl Transaction {
             Some((_, way)) => {
                 let taken = way.takes_back.get(number as usize).copied().flatten().map(|i| self.part_of(i));
                 let finished = way.finishes.get(number as usize).copied().flatten();
-                taken.or(finished.map(|place| self.planned.part_of(Some(place)))).unwrap_or(self.planned.parts.len() - 1)
+                taken
+                    .or(finished.map(|place| self.planned.part_of(Some(place))))
+                    .unwrap_or(self.planned.parts.len() - 1)
             }
         }
     }
@@ -379,7 +316,8 @@ impl Transaction {
 
     /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
     fn settle(&mut self, live: &mut System) -> Option<Poll> {
-        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over) {
+        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
+        {
             return None;
         }
         if self.reading {

@@ -33,7 +33,11 @@ pub(super) struct Order {
 
 impl Order {
     /// The order of `steps`, of which those that `over` says so of are over already.
-    pub fn new(steps: &[PlannedStep], over: &dyn Fn(usize) -> bool, execution: &dyn Fn(&PlannedStep) -> Execution) -> Self {
+    pub fn new(
+        steps: &[PlannedStep],
+        over: &dyn Fn(usize) -> bool,
+        execution: &dyn Fn(&PlannedStep) -> Execution,
+    ) -> Self {
         let n = steps.len();
         let mut waits = vec![0u32; n];
         let mut starts = vec![0u32; n + 2];

@@ -186,7 +186,13 @@ impl Run {
         items
     }
 
-    fn side_by_side(&mut self, live: &System, now: Time, room: bool, timeout: std::time::Duration) -> SmallVec<[u32; 1]> {
+    fn side_by_side(
+        &mut self,
+        live: &System,
+        now: Time,
+        room: bool,
+        timeout: std::time::Duration,
+    ) -> SmallVec<[u32; 1]> {
         loop {
             if self.stops() {
                 return smallvec![];

@@ -97,7 +97,7 @@ fn undo_to_pops_down_to_a_number_of_frames() {
 
 #[test]
 fn commit_makes_the_operators_own_frames_permanent() {
-    let mut burn = configuration("burn", "", "call A.burn", "");
+    let mut burn = configuration("burn", "", "call B.burn", "");
     burn.irreversible = true;
     let rig = Rig::new(scenario().into_iter().chain([burn]).collect::<Vec<_>>());
     let operator = |word: &str| rig.ask_as(word, Requester::Operator);

@@ -93,7 +93,9 @@ fn mistake(conf: &mut Configuration, [at, what, more]: [u8; 3]) {
             1 => *ty = TypeName::new("T.four").unwrap(),
             _ => *ty = TypeName::new("T.five").unwrap(),
         },
-        (ChangeKind::Destroy { component }, _) => *component = member(component.member(generate::ident("zz"))).component,
+        (ChangeKind::Destroy { component }, _) => {
+            *component = member(component.member(generate::ident("zz"))).component
+        }
     }
 }
 

@@ -135,8 +135,7 @@ impl StateMachineTest for Machine {
     }
 
     fn apply(mut s: Subject, _: &Types, act: Act) -> Subject {
-        let push =
-            |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
+        let push = |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let chosen = |s: &Subject, n: u8| {
             let frames = s.both.stack.frames();
             (!frames.is_empty()).then(|| frames[n as usize % frames.len()].id)

@@ -6,7 +6,7 @@ use crate::plans::{every_order, operator, show};
 use crate::settings;
 use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
 use davit::plan::{PlannedStep, Refusal, Stage};
-use davit::stack::{FrameId, Op, Scope, Stack, Planned, transaction};
+use davit::stack::{FrameId, Op, Planned, Scope, Stack, transaction};
 use davit::system::{System, View, step};
 use proptest::prelude::*;
 use std::sync::Arc;

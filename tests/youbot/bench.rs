@@ -183,7 +183,8 @@ impl Bench {
 
     /// A configuration of the deployment, step by step.
     pub fn apply(&mut self, id: &str) {
-        let context = PlanContext { activities: self.deployment.activities.keys().copied().collect(), ..Default::default() };
+        let context =
+            PlanContext { activities: self.deployment.activities.keys().copied().collect(), ..Default::default() };
         let id = ConfigId::new(id).unwrap();
         let configuration = self.deployment.configuration(id).unwrap_or_else(|| panic!("no {id}"));
         let within = configuration.timeout.unwrap_or(Duration::from_secs(1));
