@@ -70,8 +70,8 @@ impl Run for ApplyArgs {
 /// Undo the newest configuration of a running deployment, or a named one, or down to N frames.
 #[derive(Debug, clap::Args)]
 pub struct UndoArgs {
-    /// The configuration whose newest frame is undone; without one, the top of the stack. Of the very configuration that
-    /// broke the deployment: goes back to the system before it.
+    /// The configuration whose newest frame is undone; without one, the newest that was applied by hand. Of the very
+    /// configuration that broke the deployment: goes back to the system before it.
     configuration: Option<String>,
     /// Undo until so many frames are left.
     #[arg(long, value_name = "N", conflicts_with = "configuration")]

@@ -15,7 +15,7 @@ pub enum Ask {
     Apply(ConfigId),
     /// `ID.undo`: undo the newest frame of it by this requester.
     UndoOf(ConfigId),
-    /// `undo`: pop the top.
+    /// `undo`: undo the requester's newest frame.
     Undo,
     /// Pop until `n` frames are left (an operator's).
     UndoTo(usize),

@@ -15,8 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-/// What follows from types alone.
-const OF_TYPES: [Code; 17] = [
+/// What follows from types alone. (A default twice and a demanded `faulted` are found by the readers: no model holds them.)
+const OF_TYPES: [Code; 15] = [
     UNKNOWN_TYPE,
     UNKNOWN_ACTIVITY,
     UNKNOWN_PORT,
@@ -32,8 +32,6 @@ const OF_TYPES: [Code; 17] = [
     MISSING_PROPERTY,
     PORT_NOT_WRITABLE,
     BAD_ARGUMENTS,
-    DEFAULT_TWICE,
-    FAULTED_DEMANDED,
 ];
 
 /// A deployment with nothing in it.
