@@ -306,9 +306,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     pub(super) fn finish(self, system: &System) -> Result<Planned, Refusal> {
         let Self { mut script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
-        // Of several parts the first must stand when a later one fails: from their net the way back to between them cannot
-        // always be told.
-        let mixed = replaced && parts.len() == 1;
+        let undone = parts.iter().any(|part| part.pushes.is_none());
+        let mixed = replaced || undone && parts.iter().any(|part| part.pushes.is_some());
         let end = mixed.then(|| script.view().clone());
         let whole = script.finish().map_err(|found| drifted(&found))?;
         let net = end.and_then(|end| shorter(system, &end, &whole));

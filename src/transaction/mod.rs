@@ -61,6 +61,9 @@ pub struct Transaction {
     partly: FxHashMap<u32, usize>,
     /// Places of the whole that were finished on the way back.
     finished: FxHashSet<u32>,
+    /// Where the net of several parts is carried out: the system that the parts before the failed one lead to, and what a
+    /// held part has added to it.
+    between: Option<Box<System>>,
     withheld: Option<Step>,
     /// Steps of unknown outcome, of ways back too.
     unsettled: Vec<Step>,
@@ -97,6 +100,7 @@ impl Transaction {
             taken_back: FxHashSet::default(),
             partly: FxHashMap::default(),
             finished: FxHashSet::default(),
+            between: None,
             withheld: None,
             unsettled: Vec::new(),
             faulted: Vec::new(),
@@ -385,6 +389,9 @@ impl Transaction {
             failed = self.took_back(&run, &way);
         }
         let part = self.failed_part();
+        if self.between.is_none() && part > 0 && !self.planned.whole.is_empty() {
+            self.between = Some(Box::new(self.led_to(part, live)));
+        }
         let way = self.way_back(part, live);
         self.withheld.clone_from(&way.withheld);
         self.taken_back.extend(way.superseded.iter().copied());
@@ -408,9 +415,8 @@ impl Transaction {
     fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
         for i in &run.done {
             if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
-                let done = self.partly.entry(*taken).or_default();
-                *done += 1;
-                if *done >= way.takes_back.iter().filter(|t| **t == Some(*taken)).count() {
+                *self.partly.entry(*taken).or_default() += 1;
+                if self.steps_back(*taken, self.failed_part()).is_empty() {
                     self.taken_back.insert(*taken);
                 }
             }

@@ -49,6 +49,9 @@ fn judge(rig: &Rig, catalogue: &Catalogue, word: &str, faults: Faults, say: &str
     }
     let answer = rig.answers.lock().unwrap()[answered].clone();
     let seen = rig.see();
+    let told = || -> Vec<String> {
+        rig.progress.lock().unwrap().iter().rev().take(30).map(|told| format!("{told:?}")).collect()
+    };
     match answer.verdict {
         Verdict::Ok | Verdict::Undone => {
             if !lies {
@@ -59,9 +62,6 @@ fn judge(rig: &Rig, catalogue: &Catalogue, word: &str, faults: Faults, say: &str
             }
         }
         Verdict::Failed | Verdict::UndoFailed => {
-            let told = || -> Vec<String> {
-                rig.progress.lock().unwrap().iter().rev().take(30).map(|told| format!("{told:?}")).collect()
-            };
             assert!(seen == before, "{say}: failed, and as before: {:#?} is {seen:?}, was {before:?}", told());
             rig.in_step();
         }
@@ -76,7 +76,7 @@ fn judge(rig: &Rig, catalogue: &Catalogue, word: &str, faults: Faults, say: &str
             for component in &residual.faulted {
                 assert!(there.set_state(*component, RunState::Faulted), "{say}");
             }
-            assert_eq!(there.snapshot(), seen, "{say}: the residual is exact: {residual}");
+            assert_eq!(there.snapshot(), seen, "{say}: the residual is exact: {residual}: {:#?}", told());
             assert!(!residual.is_empty(), "{say}: broken for a reason: {residual}");
             rig.in_step();
             if !rig.platform_quarantined().is_empty() {
