@@ -76,7 +76,7 @@ fn deployment(n: usize) -> Configuration {
             conf.changes.push(change(ChangeKind::Connect { from, to, policy: Policy::Data }));
         }
     }
-    conf.post.push(StateEntry { target: Target::Default, state: RunState::Running, origin: Origin::NONE });
+    conf.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
     conf
 }
 
@@ -93,11 +93,11 @@ fn deployed(n: usize) -> System {
 fn switch(id: &str, gain: f64) -> Configuration {
     let mut conf = Configuration::new(ConfigId::new(id).expect("a name"));
     let target = Target::Component(name(3));
-    conf.pre.push(StateEntry { target, state: RunState::Stopped, origin: Origin::NONE });
+    conf.pre.push(StateEntry { target, state: Wanted::Stopped, origin: Origin::NONE }).unwrap();
     let property = name(3).member(ident("gain"));
     conf.changes.push(change(ChangeKind::PropertySet { property, value: Value::floats(&[gain; 3]) }));
     conf.changes.push(change(ChangeKind::PortWrite { port: name(3).member(ident("mode")), value: Value::Float(gain) }));
-    conf.post.push(StateEntry { target, state: RunState::Running, origin: Origin::NONE });
+    conf.post.push(StateEntry { target, state: Wanted::Running, origin: Origin::NONE }).unwrap();
     conf
 }
 

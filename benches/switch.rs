@@ -61,14 +61,14 @@ fn configurations(others: usize) -> Vec<Configuration> {
             properties: BTreeMap::new(),
         }));
     }
-    make.post.push(StateEntry { target: Target::Default, state: RunState::Running, origin: Origin::NONE });
+    make.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
     let mut switch = Configuration::new(ConfigId::new("switch").expect("a name"));
-    switch.pre.push(entry("N0", RunState::Stopped));
+    switch.pre.push(entry("N0", Wanted::Stopped)).unwrap();
     switch
         .changes
         .push(change(ChangeKind::PropertySet { property: member("N0.gain"), value: Value::floats(&[0.1, 0.2, 0.3]) }));
     switch.changes.push(change(ChangeKind::PortWrite { port: member("N0.mode"), value: Value::Bool(true) }));
-    switch.post.push(entry("N0", RunState::Running));
+    switch.post.push(entry("N0", Wanted::Running)).unwrap();
     vec![make, switch]
 }
 

@@ -187,6 +187,13 @@ pub const EVENT_PAUSE: Duration = Duration::from_millis(1);
 /// Operations that may wait for an activity. They are called one after the other by a few workers.
 pub const ACTIVITY_REQUESTS: usize = 64;
 
+/// How often one fault of the simulated platform may happen at most: what is to go wrong more often is a slip of the pen.
+pub const FAULT_TIMES: u32 = 1_000_000;
+
+/// How long after its deadline a call that is to come back late does so on the simulated platform: long enough that whoever
+/// waited has settled what became of it.
+pub const FAULT_LATE: Duration = Duration::from_secs(5);
+
 /// How long taking down the embedded runtime waits for each thread of it; one that hangs is left behind.
 pub const RUNTIME_END: Duration = Duration::from_secs(1);
 /// Blocking platform calls one session makes at the same time: enough to configure the components of a robot side by
@@ -198,6 +205,9 @@ pub const VIEW: Duration = Duration::from_secs(5);
 
 /// Steps remembered with an answer in the log; a deployment of thousands of components need not stay in memory.
 pub const STEPS_LOGGED: usize = 256;
+
+/// How long a script waits for a recovery, or for the platform to be read: a few hundred steps that take their usual time.
+pub const SCRIPT_RECOVERY: Duration = Duration::from_secs(10);
 
 /// Bytes of memory of one script.
 pub const SCRIPT_MEMORY: usize = 256 << 20;
@@ -304,6 +314,11 @@ pub const CHECK_DRIVEN: usize = 10_000;
 
 /// Circles of answers that are told; more of them say nothing new.
 pub const CHECK_TOLD: usize = 4;
+
+/// Types as which configurations create one component, up to which `check` judges each configuration by them: a hot swap
+/// has a few. A connection is looked at for every pair of them.
+pub const CHECK_TYPES: usize = 16;
+
 
 /// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
 pub const CHECK_INBOX: usize = 6;

@@ -82,7 +82,7 @@ fn arm() -> System {
         properties: std::collections::BTreeMap::new(),
     };
     up.changes.push(Change { kind: create, origin: Origin::NONE });
-    up.post.push(StateEntry { target: Target::Default, state: RunState::Running, origin: Origin::NONE });
+    up.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
     for s in plan(&system, &up, &Context::default()).unwrap().steps {
         step::apply(&s.step, &mut system).unwrap();
     }
@@ -93,14 +93,14 @@ fn switch(gain: f64) -> Configuration {
     let mut conf = Configuration::new(ConfigId::new("switch").unwrap());
     let component = ComponentName::new("arm").unwrap();
     let target = Target::Component(component);
-    conf.pre.push(StateEntry { target, state: RunState::Stopped, origin: Origin::NONE });
+    conf.pre.push(StateEntry { target, state: Wanted::Stopped, origin: Origin::NONE }).unwrap();
     let set = ChangeKind::PropertySet {
         property: MemberRef::new("arm.gain").unwrap(),
         value: Value::floats(&[gain, gain, gain]),
     };
     let write = ChangeKind::PortWrite { port: MemberRef::new("arm.mode").unwrap(), value: Value::floats(&[gain, 1.0]) };
     conf.changes.extend([set, write].map(|kind| Change { kind, origin: Origin::NONE }));
-    conf.post.push(StateEntry { target, state: RunState::Running, origin: Origin::NONE });
+    conf.post.push(StateEntry { target, state: Wanted::Running, origin: Origin::NONE }).unwrap();
     conf
 }
 

@@ -58,14 +58,14 @@ fn configurations() -> Vec<Configuration> {
         activity: Some(Ident::new("loop").unwrap()),
         properties: BTreeMap::new(),
     }));
-    make.post.push(entry(Target::Default, RunState::Running));
+    make.post.push(entry(Target::Default, Wanted::Running)).unwrap();
     let mut switch = Configuration::new(ConfigId::new("switch").unwrap());
-    switch.pre.push(entry(Target::Component(component), RunState::Stopped));
+    switch.pre.push(entry(Target::Component(component), Wanted::Stopped)).unwrap();
     let gain = MemberRef::new("node.gain").unwrap();
     switch.changes.push(change(ChangeKind::PropertySet { property: gain, value: Value::floats(&[0.1, 0.2, 0.3]) }));
     let mode = MemberRef::new("node.mode").unwrap();
     switch.changes.push(change(ChangeKind::PortWrite { port: mode, value: Value::Bool(true) }));
-    switch.post.push(entry(Target::Component(component), RunState::Running));
+    switch.post.push(entry(Target::Component(component), Wanted::Running)).unwrap();
     vec![make, switch]
 }
 

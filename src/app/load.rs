@@ -27,7 +27,7 @@ pub struct Read {
 }
 
 /// A deployment in which nothing was found that refuses it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Checked {
     /// The deployment.
     pub deployment: check::Checked<Deployment>,

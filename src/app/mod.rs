@@ -6,4 +6,4 @@ pub mod script;
 mod start;
 
 pub use load::{Checked, Read, Refused, check, read, read_but_for};
-pub use start::{PLATFORMS, StartError, reactions, start, start_on};
+pub use start::{PLATFORMS, StartError, faults, reactions, start, start_on};

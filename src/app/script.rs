@@ -3,6 +3,7 @@
 //! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
+mod faults;
 mod sandbox;
 mod values;
 
@@ -11,9 +12,9 @@ use crate::functions::message_within;
 use crate::lang::LoadOptions;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ComponentName, ConfigId, EventName, MemberRef};
+use crate::model::{Ask, ComponentName, ConfigId, EventName, Ident, MemberRef};
 use crate::runtime::Libraries;
-use crate::session::{Ended, Hub, NotUp, Observer, Session};
+use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Observer, Session, recovery};
 use crate::time::{Clock, Time};
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
@@ -30,6 +31,8 @@ pub struct Options {
     pub libraries: Libraries,
     /// Parameters for the deployments it loads (`--set`).
     pub load: LoadOptions,
+    /// The platform they run on, one of [`PLATFORMS`](super::PLATFORMS), instead of the one they name.
+    pub platform: Option<Ident>,
     /// Hears everything that happens.
     pub observer: Option<Observer>,
     /// Where `say` goes.
@@ -78,6 +81,8 @@ struct Host {
     options: Options,
     folder: PathBuf,
     session: Option<Arc<Session>>,
+    /// What goes wrong, and where it does.
+    faults: faults::Faults,
     /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
     mark: u64,
     taken: Vec<u64>,
@@ -86,6 +91,9 @@ struct Host {
 }
 
 type Shared = Rc<RefCell<Host>>;
+
+/// How long reading the platform, or a recovery, may take, in time of the script's clock.
+const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
 
 /// Runs the script at `path`.
 pub fn run(path: &Path, options: Options) -> ScriptEnd {
@@ -102,6 +110,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         options,
         folder,
         session: None,
+        faults: faults::Faults::default(),
         mark: 0,
         taken: Vec::new(),
         refused: None,
@@ -137,6 +146,9 @@ pub const FUNCTIONS: &[&str] = &[
     "raise",
     "apply",
     "undo",
+    "commit",
+    "drift",
+    "recover",
     "wait",
     "wait_state",
     "wait_answer",
@@ -150,6 +162,7 @@ pub const FUNCTIONS: &[&str] = &[
     "active",
     "now",
     "say",
+    "fault",
     "shutdown",
 ];
 
@@ -171,6 +184,17 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("raise", String, |h, _lua, event| raise(h, &event));
     function!("apply", String, |h, _lua, id| request(h, Some(&id), Ask::Apply));
     function!("undo", Option<String>, |h, _lua, id| request(h, id.as_deref(), Ask::UndoOf));
+    function!("commit", Option<Table>, |h, _lua, options| {
+        let session = session(h)?;
+        listen_anew(h, &session);
+        session.request(Ask::Commit { force: forced(options)? }, "operator");
+        Ok(())
+    });
+    function!("drift", (), |h, lua, ()| {
+        let drift = session(h)?.drift(RECOVERY).ok_or_else(|| error("the platform could not be read"))?;
+        values::to_lua(lua, &serde_json::to_value(drift).expect("plain data"))
+    });
+    function!("recover", String, |h, _lua, how| recover(h, &how));
     function!("wait", f64, |h, _lua, seconds| {
         let (clock, until) = (clock(h), deadline(h, seconds)?);
         clock.sleep_until(until);
@@ -197,12 +221,16 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         (h.borrow().options.say)(&text);
         Ok(())
     });
+    function!("fault", (String, String, Option<f64>), |h, _lua, (step, how, times)| {
+        h.borrow_mut().faults.add(&step, &how, times)
+    });
     function!("shutdown", Option<Table>, |h, _lua, options| {
-        let force = options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))?;
+        let force = forced(options)?;
         let session = session(h)?;
         let ended = session.take_down(force);
         let mut host = h.borrow_mut();
         host.session = None;
+        host.faults.down();
         let clean = ended.is_clean();
         let left = ended.left.join(", ");
         host.ended = Some(ended);
@@ -224,6 +252,11 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
 
 fn error(message: impl Into<String>) -> mlua::Error {
     mlua::Error::runtime(message.into())
+}
+
+/// `{ force = true }`
+fn forced(options: Option<Table>) -> mlua::Result<bool> {
+    options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))
 }
 
 fn clock(host: &Shared) -> Clock {
@@ -248,7 +281,11 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
     let (path, checked) = {
         let host = host.borrow();
         let path = host.folder.join(file);
-        let checked = super::read(&path, &host.options.load, &host.options.libraries).and_then(super::check);
+        let read = super::read(&path, &host.options.load, &host.options.libraries);
+        let checked = read.and_then(|mut read| {
+            read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
+            super::check(read)
+        });
         (path, checked)
     };
     let checked = checked.map_err(|refused| {
@@ -256,7 +293,10 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
         error(format!("{file} is refused"))
     })?;
     let clock = clock(host);
-    let session = super::start(&checked, &clock).map_err(|e: StartError| error(e.to_string()))?;
+    host.borrow().faults.fit(&checked)?;
+    let started = super::start::start_open(&checked, &clock, true);
+    let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
+    host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {
         session.hub().observe(observer.clone());
     }
@@ -274,7 +314,9 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
                 text.push_str("\n  ");
                 text.push_str(reason);
             }
-            host.borrow_mut().ended = Some(ended);
+            let mut host = host.borrow_mut();
+            host.ended = Some(ended);
+            host.faults.down();
             Err(error(text))
         }
     }
@@ -316,6 +358,25 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::R
     listen_anew(host, &session);
     session.request(ask, "operator");
     Ok(())
+}
+
+fn recover(host: &Shared, how: &str) -> mlua::Result<()> {
+    let Some(direction) = recovery(how) else {
+        return Err(error(match how {
+            "forward" => NO_FORWARD.to_owned(),
+            _ => format!("recover(\"{how}\"): {}", did_you_mean(how, "ways", ["back", "accept"].into_iter())),
+        }));
+    };
+    let recovered = session(host)?.recover(direction, "operator", RECOVERY);
+    let recovered = recovered.ok_or_else(|| error("the recovery was not over in time"))?;
+    if recovered.recovered {
+        return Ok(());
+    }
+    let mut text = format!("still broken: {}", recovered.why.unwrap_or_default());
+    for difference in &recovered.residual {
+        text.push_str(&format!("\n  {difference}"));
+    }
+    Err(error(text))
 }
 
 /// Waits until `look` finds something; tells what was there instead when the time is over.

@@ -2,11 +2,12 @@
 
 use super::Checked;
 use crate::functions::Opener;
+use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Coordinator, Deployment, SimulatedReaction};
+use crate::model::{Coordinator, Deployment, FaultKind, SimulatedReaction, StepFault};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
-use crate::platform::simulated::{self, Simulated, StepPattern};
+use crate::platform::simulated::{self, Fault, FaultRule, Simulated, StepPattern};
 use crate::session::{Session, Setup};
 use crate::statechart;
 use crate::time::Clock;
@@ -45,21 +46,53 @@ pub fn reactions(deployment: &Deployment) -> Vec<simulated::Reaction> {
     deployment.reactions.iter().map(one).collect()
 }
 
+/// What the deployment says that goes wrong, for a simulated platform of one's own making.
+pub fn faults(deployment: &Deployment) -> simulated::Faults {
+    simulated::Faults::new(deployment.faults.iter().map(rule))
+}
+
+/// What a fault in a deployment or script means to the platform.
+pub(super) fn rule(fault: &StepFault) -> FaultRule {
+    let what = match fault.how {
+        FaultKind::Fail => Fault::Fail,
+        FaultKind::Hang => Fault::Hang { returns: None },
+        FaultKind::Late => Fault::Hang { returns: Some(limits::FAULT_LATE) },
+        FaultKind::Lost => Fault::LostRequest,
+        FaultKind::Lie => Fault::FalseDone,
+    };
+    FaultRule::on(&fault.step, what).times(fault.times)
+}
+
 /// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
 ///
 /// # Errors
 /// When the deployment names a platform that this program does not have.
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
+    start_open(checked, clock, false).map(|(session, _)| session)
+}
+
+/// The same, with the platform too, if it is the simulated one. `steered`: somebody may add faults while it runs.
+pub(super) fn start_open(
+    checked: &Checked,
+    clock: &Clock,
+    steered: bool,
+) -> Result<(Arc<Session>, Option<Simulated>), StartError> {
     let deployment = &checked.deployment;
     // Once here, to say what is wrong; then on each coordinator's own thread, from the same text.
     for opener in openers(checked).into_iter().flatten() {
         opener.open(None).map_err(|failure| StartError::Functions { why: failure.to_string() })?;
     }
-    let platform: Arc<dyn Platform> = match deployment.platform.as_str() {
-        "embedded" => Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)),
+    let (platform, simulated): (Arc<dyn Platform>, _) = match deployment.platform.as_str() {
+        "embedded" => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
         "simulated" => {
-            let options = simulated::Options { reactions: reactions(deployment), ..simulated::Options::default() };
-            Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), options))
+            let options = simulated::Options {
+                faults: faults(deployment),
+                reactions: reactions(deployment),
+                blocking: steered,
+                ..simulated::Options::default()
+            };
+            let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
+            (Arc::new(platform.clone()), Some(platform))
         }
         other => {
             return Err(StartError::UnknownPlatform {
@@ -68,7 +101,7 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
             });
         }
     };
-    Ok(start_on(checked, platform, clock))
+    Ok((start_on(checked, platform, clock), simulated))
 }
 
 /// The same, on a platform of the caller's.

@@ -31,7 +31,7 @@ pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option
 
 /// Components that a configuration names, and whether it may touch all by `_default`.
 fn touched(configuration: &Configuration) -> (BTreeSet<ComponentName>, bool) {
-    let mut entries = configuration.pre.iter().chain(&configuration.post);
+    let mut entries = configuration.pre.iter().chain(configuration.post.iter());
     (claims::components(configuration), entries.any(|entry| entry.target == Target::Default))
 }
 

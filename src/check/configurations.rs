@@ -1,366 +1,190 @@
 //! Each configuration by itself, against everything that any configuration creates: names, types, units, limits.
 //!
-//! What depends on the system it meets (is the component there, in which run state, what drives the port) is found where
-//! it is requested: see `explore`.
+//! The preconditions are those of `system::step`, looked at on a picture of what may be there: for each name every type
+//! that some configuration creates under it, and of those what one configuration leaves of it (see [`Universe::during`]).
+//! What holds in every case is wrong. What depends on the system it meets (is the component there, in which run state, what
+//! drives the port) is found where it is requested: see `explore`.
 
 use super::universe::{Creation, Universe};
-use crate::model::codes::{
-    BAD_ARGUMENTS, BAD_VALUE, BUFFER_SIZE, DEFAULT_TWICE, FAULTED_DEMANDED, MISSING_PROPERTY, NEEDS_BUFFER,
-    NOT_AN_IN_PORT, NOT_AN_OUT_PORT, PORT_NOT_WRITABLE, PORT_TYPES, PORT_UNITS, UNKNOWN_ACTIVITY, UNKNOWN_OPERATION,
-    UNKNOWN_PORT, UNKNOWN_PROPERTY, UNKNOWN_TYPE,
-};
-use crate::model::finding::did_you_mean;
+use crate::limits;
 use crate::model::{
-    Call, Catalogue, Change, ChangeKind, Code, ComponentName, ComponentType, ConfigId, Configuration, Deployment,
-    Direction, Finding, Findings, Ident, MemberRef, Origin, Policy, PortType, RunState, StateEntry, Target, TypeName,
-    Value,
+    Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
 };
-use std::collections::BTreeMap;
+use crate::plan::Context;
+use crate::plan::meant::Meant;
+use crate::system::{System, Violation, either};
 
 /// What is wrong with each configuration by itself.
-pub fn check(deployment: &Deployment, catalogue: &Catalogue, universe: &Universe) -> Findings {
+pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     let all: Vec<ConfigId> = deployment.configurations.iter().map(|c| c.id).collect();
-    some(deployment, catalogue, universe, &all)
+    some(deployment, universe, &all)
 }
 
 /// What is wrong with these configurations by themselves.
-pub fn some(deployment: &Deployment, catalogue: &Catalogue, universe: &Universe, ids: &[ConfigId]) -> Findings {
-    let mut check = Check { deployment, catalogue, universe, path: String::new(), findings: Vec::new() };
+pub fn some(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> Findings {
+    let mut check = Check { universe, context: Context::of(deployment), findings: Vec::new() };
     for configuration in deployment.configurations.iter().filter(|c| ids.contains(&c.id)) {
         check.configuration(configuration);
     }
     check.findings
 }
 
+/// A component of a change, and one of the ways in which it may have been created.
+type Part<'a> = (ComponentName, &'a Creation);
+
+/// A combination of such ways, and the violations that a change then has.
+struct Case<'a> {
+    parts: Vec<Part<'a>>,
+    picture: System,
+    found: Vec<Violation>,
+}
+
 struct Check<'a> {
-    deployment: &'a Deployment,
-    catalogue: &'a Catalogue,
     universe: &'a Universe,
-    path: String,
+    context: Context,
     findings: Findings,
 }
 
-/// Which of a component's members is meant.
-#[derive(Debug, Clone, Copy)]
-pub enum Member {
-    /// A port.
-    Port,
-    /// A property.
-    Property,
-    /// An operation.
-    Operation,
-}
-
-impl Member {
-    /// What it is called, one and several, and the code of one that is not there.
-    pub fn words(self) -> (&'static str, &'static str, Code) {
-        match self {
-            Self::Port => ("port", "ports", UNKNOWN_PORT),
-            Self::Property => ("property", "properties", UNKNOWN_PROPERTY),
-            Self::Operation => ("operation", "operations", UNKNOWN_OPERATION),
-        }
-    }
-
-    /// The names of those that a type has.
-    pub fn of(self, ty: &ComponentType) -> Vec<&'static str> {
-        match self {
-            Self::Port => ty.ports.keys().map(Ident::as_str).collect(),
-            Self::Property => ty.properties.keys().map(Ident::as_str).collect(),
-            Self::Operation => ty.operations.keys().map(Ident::as_str).collect(),
-        }
-    }
-}
-
 impl<'a> Check<'a> {
-    fn add(&mut self, finding: Finding) {
-        self.findings.push(finding.path(self.path.clone()));
-    }
-
     fn configuration(&mut self, configuration: &Configuration) {
         for (list, entries) in [("pre_conf_state", &configuration.pre), ("post_conf_state", &configuration.post)] {
-            self.states(configuration, list, entries);
+            let path = |i: usize| format!("configurations.{}.{list}[{i}]", configuration.id);
+            for (i, entry) in entries.iter().enumerate() {
+                if let Target::Component(component) = entry.target
+                    && self.universe.of(component).is_empty()
+                {
+                    self.findings.push(self.universe.unknown(component, entry.origin).path(path(i)));
+                }
+            }
         }
         for (i, change) in configuration.changes.iter().enumerate() {
-            self.path = format!("configurations.{}.changes[{i}]", configuration.id);
-            self.change(change);
+            let found = self.change(configuration.id, change);
+            let path = format!("configurations.{}.changes[{i}]", configuration.id);
+            self.findings.extend(found.into_iter().map(|f| f.at(change.origin).path(path.clone())));
         }
     }
 
-    fn states(&mut self, configuration: &Configuration, list: &str, entries: &[StateEntry]) {
-        let mut default: Option<Origin> = None;
-        for (i, entry) in entries.iter().enumerate() {
-            self.path = format!("configurations.{}.{list}[{i}]", configuration.id);
-            match entry.target {
-                Target::Component(component) => {
-                    self.component(component, entry.origin);
-                }
-                Target::Default => {
-                    if let Some(first) = default {
-                        self.add(
-                            Finding::error(DEFAULT_TWICE, format!("`_default` stands twice in {list}"))
-                                .at(entry.origin)
-                                .labelled("the second one")
-                                .also(first, "the first one")
-                                .help("keep one of them: it stands for every component that the list does not name"),
-                        );
-                    }
-                    default = Some(entry.origin);
-                }
+    fn change(&self, id: ConfigId, change: &Change) -> Findings {
+        let (mut findings, mut ways) = (Findings::new(), Vec::new());
+        // A create is judged by what is written in it, whatever bore the name before.
+        let named =
+            if matches!(change.kind, ChangeKind::Create { .. }) { None } else { Some(change.kind.components()) };
+        let old = matches!(change.kind, ChangeKind::Disconnect { .. } | ChangeKind::Destroy { .. });
+        for component in named.into_iter().flatten() {
+            let creations = self.universe.during(component, id, old);
+            if creations.is_empty() {
+                findings.push(self.universe.unknown(component, change.origin));
             }
-            if entry.state == RunState::Faulted {
-                self.add(
-                    Finding::error(
-                        FAULTED_DEMANDED,
-                        format!("{}: the state `faulted` cannot be demanded", entry.target),
-                    )
-                    .at(entry.origin)
-                    .help("demand unconfigured, stopped or running: components fault by themselves"),
-                );
+            // What may be anything is not judged; that a type is unknown is said where it is created.
+            let judged = creations.len() <= limits::CHECK_TYPES && creations.iter().all(|c| c.description.is_some());
+            if judged && !creations.is_empty() {
+                ways.push((component, creations));
             }
         }
-    }
-
-    fn change(&mut self, change: &Change) {
-        let at = change.origin;
-        match &change.kind {
-            ChangeKind::Create { component, ty, activity, properties } => {
-                self.create(*component, *ty, *activity, properties, at);
+        let mut cases = Vec::new();
+        for parts in combinations(&ways) {
+            let picture = self.universe.picture(&parts);
+            let mut found = Meant::of(&change.kind, &picture, &self.context).violations(&picture);
+            found.retain(Violation::is_of_types);
+            if found.is_empty() {
+                return findings;
             }
-            ChangeKind::Destroy { component } => {
-                self.component(*component, at);
-            }
-            ChangeKind::Connect { from, to, policy } => self.connect(*from, *to, *policy, at),
-            ChangeKind::Disconnect { from, to } => {
-                self.member(*from, Member::Port, at);
-                self.member(*to, Member::Port, at);
-            }
-            ChangeKind::PropertySet { property, value } => {
-                let Some(creation) = self.member(*property, Member::Property, at) else { return };
-                let slot = creation.description.as_ref().and_then(|ty| ty.properties.get(&property.member));
-                if let Some(slot) = slot
-                    && let Err(error) = slot.fit(value.clone())
-                {
-                    let found = Finding::error(BAD_VALUE, format!("{property} cannot be {value}: {error}"));
-                    self.add(with_slot(found.at(at), &slot.ty.to_string(), slot.unit.as_deref(), slot.origin));
-                }
-            }
-            ChangeKind::PortWrite { port, value } => self.port_write(*port, value, at),
-            ChangeKind::OperationCall { call, undo } => {
-                self.call(call, at);
-                if let Some(undo) = undo {
-                    self.call(undo, at);
-                }
-            }
+            cases.push(Case { parts, picture, found });
         }
-    }
-
-    /// How a component may have been created; a finding when nothing creates one of that name.
-    fn component(&mut self, component: ComponentName, at: Origin) -> &'a [Creation] {
-        let creations = self.universe.of(component);
-        if creations.is_empty() {
-            self.add(self.universe.unknown(component, at));
-        }
-        creations
-    }
-
-    /// A creation of the component that has the member; a finding when none has. None also when the type is unknown,
-    /// which is said where it is created.
-    fn member(&mut self, member: MemberRef, kind: Member, at: Origin) -> Option<&'a Creation> {
-        let creations = self.component(member.component, at);
-        let known: Vec<(&Creation, Vec<&'static str>)> =
-            creations.iter().filter_map(|c| c.description.as_ref().map(|ty| (c, kind.of(ty)))).collect();
-        if known.len() < creations.len() || known.is_empty() {
-            return None;
-        }
-        let found = known.iter().find(|(_, names)| names.contains(&member.member.as_str())).map(|(c, _)| *c);
-        if found.is_none() {
-            let (creation, names) = &known[0];
-            let (what, plural, code) = kind.words();
-            let elsewhere = [Member::Port, Member::Property, Member::Operation].into_iter().find(|other| {
-                creation.description.as_ref().is_some_and(|ty| other.of(ty).contains(&member.member.as_str()))
-            });
-            let help = match elsewhere {
-                Some(other) => format!("`{}` is a {} of {}", member.member, other.words().0, creation.ty),
-                None => did_you_mean(member.member.as_str(), plural, names.iter().copied()),
-            };
-            self.add(
-                Finding::error(code, format!("{} has no {what} `{}`", member.component, member.member))
-                    .at(at)
-                    .labelled(format!("no such {what}"))
-                    .also(creation.origin, format!("{} is created here as {}", member.component, creation.ty))
-                    .help(help),
-            );
-        }
-        found
-    }
-
-    fn create(
-        &mut self,
-        component: ComponentName,
-        ty: TypeName,
-        activity: Option<Ident>,
-        properties: &BTreeMap<Ident, Value>,
-        at: Origin,
-    ) {
-        if let Some(activity) = activity
-            && !self.deployment.activities.contains_key(&activity)
-        {
-            let known = self.deployment.activities.keys().map(Ident::as_str);
-            self.add(
-                Finding::error(UNKNOWN_ACTIVITY, format!("there is no activity `{activity}` for {component}"))
-                    .at(at)
-                    .labelled("runs in an activity that the deployment does not declare")
-                    .help(did_you_mean(activity.as_str(), "activities", known)),
-            );
-        }
-        let Some(description) = self.catalogue.get(ty) else {
-            let known: Vec<&str> = self.catalogue.iter().map(|ty| ty.name.as_str()).collect();
-            // A library's prefix too many or too few is the likeliest slip.
-            let own = |name: &str| name.rsplit('.').next().map(str::to_owned);
-            let help = match known.iter().find(|name| own(name) == own(ty.as_str())) {
-                Some(name) => format!("did you mean `{name}`?"),
-                None => did_you_mean(ty.as_str(), "types", known),
-            };
-            self.add(
-                Finding::error(UNKNOWN_TYPE, format!("there is no component type `{ty}`"))
-                    .at(at)
-                    .labelled(format!("{component} would be one"))
-                    .help(help),
-            );
-            return;
-        };
-        for (name, value) in properties {
-            let Some(slot) = description.properties.get(name) else {
-                let known = description.properties.keys().map(Ident::as_str);
-                self.add(
-                    Finding::error(UNKNOWN_PROPERTY, format!("{component} has no property `{name}`"))
-                        .at(at)
-                        .labelled(format!("given to a {ty}"))
-                        .also(description.origin, format!("{ty} is declared here"))
-                        .help(did_you_mean(name.as_str(), "properties", known)),
-                );
-                continue;
-            };
-            if let Err(error) = slot.fit(value.clone()) {
-                let found = Finding::error(BAD_VALUE, format!("{component}.{name} cannot be {value}: {error}"));
-                self.add(with_slot(found.at(at), &slot.ty.to_string(), slot.unit.as_deref(), slot.origin));
-            }
-        }
-        for (name, slot) in &description.properties {
-            if slot.default.is_none() && !properties.contains_key(name) {
-                self.add(
-                    Finding::error(MISSING_PROPERTY, format!("{component}.{name} has no default and is not given"))
-                        .at(at)
-                        .also(slot.origin, "declared here without a default")
-                        .help(format!("add `{name} = …` ({}) to the properties of this create", slot.ty)),
-                );
-            }
-        }
-    }
-
-    fn connect(&mut self, from: MemberRef, to: MemberRef, policy: Policy, at: Origin) {
-        if policy == Policy::Buffer(0) {
-            self.add(
-                Finding::error(BUFFER_SIZE, format!("the buffer from {from} to {to} has room for nothing"))
-                    .at(at)
-                    .help("a buffer holds at least one sample"),
-            );
-        }
-        let a = self.port(from, Direction::Out, at);
-        let b = self.port(to, Direction::In, at);
-        let (Some(a), Some(b)) = (a, b) else { return };
-        if a.ty != b.ty {
-            self.add(
-                Finding::error(PORT_TYPES, format!("{from} carries {}, {to} takes {}", a.ty, b.ty))
-                    .at(at)
-                    .also(a.origin, format!("{from} is declared here"))
-                    .also(b.origin, format!("{to} is declared here"))
-                    .help("connect ports of the same type; nothing is converted on the way"),
-            );
-        } else if let (Some(x), Some(y)) = (&a.unit, &b.unit)
-            && x != y
-        {
-            self.add(
-                Finding::error(PORT_UNITS, format!("{from} is in {x}, {to} in {y}"))
-                    .at(at)
-                    .also(a.origin, format!("{from} is declared here"))
-                    .also(b.origin, format!("{to} is declared here"))
-                    .help("put a component between them that converts, or correct the unit of one"),
-            );
-        }
-        if b.buffered && policy == Policy::Data && !b.is_event() {
-            self.add(
-                Finding::error(NEEDS_BUFFER, format!("{to} takes only buffered connections"))
-                    .at(at)
-                    .also(b.origin, "declared here as buffered")
-                    .help("write the connection with `buffer = n`"),
-            );
-        }
-    }
-
-    fn port(&mut self, port: MemberRef, direction: Direction, at: Origin) -> Option<&'a PortType> {
-        let creation = self.member(port, Member::Port, at)?;
-        let description = creation.description.as_ref()?.ports.get(&port.member)?;
-        if description.direction != direction {
-            let (code, is, rule) = match direction {
-                Direction::Out => (NOT_AN_OUT_PORT, "an in-port", "a connection begins at an out-port"),
-                Direction::In => (NOT_AN_IN_PORT, "an out-port", "only an in-port can be connected to or written"),
-            };
-            self.add(
-                Finding::error(code, format!("{port} is {is}: {rule}"))
-                    .at(at)
-                    .also(description.origin, "declared here")
-                    .help("are the two ends the wrong way round? the first is the out-port"),
-            );
-            return None;
-        }
-        Some(description)
-    }
-
-    fn port_write(&mut self, port: MemberRef, value: &Value, at: Origin) {
-        let Some(slot) = self.port(port, Direction::In, at) else { return };
-        if slot.buffered || slot.is_event() {
-            self.add(
-                Finding::error(PORT_NOT_WRITABLE, format!("{port} is read as a queue and cannot be written"))
-                    .at(at)
-                    .also(slot.origin, "declared here")
-                    .help("connect a component that sends what you want to write"),
-            );
-        } else if let Err(error) = value.clone().fit(&slot.ty) {
-            let found = Finding::error(BAD_VALUE, format!("{port} cannot be {value}: {error}"));
-            self.add(with_slot(found.at(at), &slot.ty.to_string(), slot.unit.as_deref(), slot.origin));
-        }
-    }
-
-    fn call(&mut self, call: &Call, at: Origin) {
-        let Some(creation) = self.member(call.operation, Member::Operation, at) else { return };
-        let Some(operation) = creation.description.as_ref().and_then(|ty| ty.operations.get(&call.operation.member))
-        else {
-            return;
-        };
-        let wanted: Vec<String> = operation.args.iter().map(ToString::to_string).collect();
-        let problem = if call.args.len() == operation.args.len() {
-            call.args.iter().zip(&operation.args).enumerate().find_map(|(i, (value, ty))| {
-                value.clone().fit(ty).err().map(|error| format!("argument {} is {value}: {error}", i + 1))
-            })
-        } else {
-            Some(format!("it is given {}", call.args.len()))
-        };
-        if let Some(problem) = problem {
-            self.add(
-                Finding::error(
-                    BAD_ARGUMENTS,
-                    format!("{} takes {} argument(s); {problem}", call.operation, operation.args.len()),
-                )
-                .at(at)
-                .also(operation.origin, "declared here")
-                .help(format!("call it as {}({})", call.operation, wanted.join(", "))),
-            );
-        }
+        findings.extend(in_every(&cases));
+        findings
     }
 }
 
-fn with_slot(finding: Finding, ty: &str, unit: Option<&str>, origin: Origin) -> Finding {
-    let unit = unit.map_or_else(String::new, |u| format!(" in {u}"));
-    finding.also(origin, "declared here").help(format!("give it a value of type {ty}{unit}"))
+/// Every combination of the ways in which the components may have been created; of no components the one of nothing.
+fn combinations<'a>(ways: &[(ComponentName, Vec<&'a Creation>)]) -> Vec<Vec<Part<'a>>> {
+    let mut all: Vec<Vec<Part<'a>>> = vec![Vec::new()];
+    for (component, creations) in ways {
+        let with = |parts: &Vec<Part<'a>>, creation: &&'a Creation| {
+            let mut parts = parts.clone();
+            parts.push((*component, *creation));
+            parts
+        };
+        all = all.iter().flat_map(|parts| creations.iter().map(move |creation| with(parts, creation))).collect();
+    }
+    all
+}
+
+/// The violations that hold in every case; where each case has others, the first of each.
+fn in_every(cases: &[Case<'_>]) -> Findings {
+    let Some((first, others)) = cases.split_first() else { return Vec::new() };
+    let several = several(cases);
+    let mut findings = Vec::new();
+    for violation in &first.found {
+        let like = |case: &Case<'_>| case.found.iter().find(|other| other.is_like(violation)).cloned();
+        let Some(same) = others.iter().map(like).collect::<Option<Vec<_>>>() else { continue };
+        let whole = same.iter().fold(violation.clone(), |whole, other| whole.or(other));
+        let mut finding = whole.finding(&first.picture);
+        let told = matches!(whole, Violation::UnknownMember { .. });
+        let about: Vec<&(ComponentName, Vec<&Creation>)> =
+            several.iter().filter(|(component, _)| whole.is_about(*component)).collect();
+        if !told && !about.is_empty() {
+            let whichever: Vec<String> = about
+                .iter()
+                .map(|(component, creations)| {
+                    let types: Vec<TypeName> = creations.iter().map(|creation| creation.ty).collect();
+                    format!("`{component}` is {}", either(&types))
+                })
+                .collect();
+            finding.message.push_str(&format!(", whether {}", whichever.join(" and ")));
+        }
+        if told && about.is_empty() {
+            let created = first.parts.iter().filter(|(component, _)| whole.is_about(*component));
+            finding = created.fold(finding, |finding, part| finding.also(part.1.origin, created_as(part)));
+        }
+        for (component, creations) in about {
+            for creation in creations {
+                finding = finding.also(creation.origin, created_as(&(*component, creation)));
+            }
+        }
+        findings.push(finding);
+    }
+    if let (true, Some(violation)) = (findings.is_empty(), first.found.first()) {
+        let mut finding = violation.finding(&first.picture);
+        finding.message.push_str(&format!(", if {}", as_what(first, &several).1));
+        for case in others {
+            let (origin, what) = as_what(case, &several);
+            if let Some(found) = case.found.first() {
+                finding = finding.also(origin, format!("if {what}: {found}"));
+            }
+        }
+        findings.push(finding);
+    }
+    findings
+}
+
+/// The components that may be of several types, with the ways in which they are created.
+fn several<'a>(cases: &[Case<'a>]) -> Vec<(ComponentName, Vec<&'a Creation>)> {
+    let mut all: Vec<(ComponentName, Vec<&'a Creation>)> = Vec::new();
+    for (component, creation) in cases.iter().flat_map(|case| &case.parts) {
+        match all.iter_mut().find(|(name, _)| name == component) {
+            None => all.push((*component, vec![creation])),
+            Some((_, creations)) if creations.iter().all(|c| c.ty != creation.ty) => creations.push(creation),
+            Some(_) => {}
+        }
+    }
+    all.retain(|(_, creations)| creations.len() > 1);
+    all
+}
+
+fn created_as((component, creation): &Part<'_>) -> String {
+    format!("`{component}` is created here as {}", creation.ty)
+}
+
+/// What the components that may be of several types are in this case, and where the last of them is created so.
+fn as_what(case: &Case<'_>, several: &[(ComponentName, Vec<&Creation>)]) -> (Origin, String) {
+    let parts = case.parts.iter().filter(|(component, _)| several.iter().any(|(name, _)| name == component));
+    let mut at = Origin::NONE;
+    let told: Vec<String> = parts
+        .map(|(component, creation)| {
+            at = creation.origin;
+            format!("`{component}` is {}", creation.ty)
+        })
+        .collect();
+    (at, told.join(" and "))
 }

@@ -30,7 +30,7 @@ mod world;
 
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Findings};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Findings, StepFault};
 use crate::statechart::Chart;
 pub use drive::{Drive, Happening, Until, drive};
 use explore::Bound;
@@ -114,7 +114,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
-    findings.extend(configurations::check(deployment, catalogue, &universe));
+    findings.extend(configurations::check(deployment, &universe));
     findings.extend(monitors::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
     findings.extend(declared::check(deployment, &universe));
@@ -229,10 +229,15 @@ pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> 
     findings
 }
 
+/// What is wrong with the step of a fault, where the deployment runs on the simulated platform.
+pub fn fault(fault: &StepFault, deployment: &Deployment, catalogue: &Catalogue) -> Findings {
+    simulated::fault(fault, deployment, &universe::Universe::new(deployment, catalogue))
+}
+
 /// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
 pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
     let universe = universe::Universe::new(deployment, catalogue);
-    let mut findings = configurations::some(deployment, catalogue, &universe, ids);
+    let mut findings = configurations::some(deployment, &universe, ids);
     findings.extend(declared::holds(deployment, &universe, ids));
     findings
 }

@@ -3,8 +3,7 @@
 use super::coordinator::{is_internal, looks_like_answer};
 use super::universe::Universe;
 use crate::model::codes::{
-    MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD,
-    UNKNOWN_ACTIVITY, UNKNOWN_PORT,
+    MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
@@ -12,6 +11,7 @@ use crate::model::{
     Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
 use crate::statechart::Chart;
+use crate::system::Member;
 use std::collections::BTreeSet;
 
 /// What is wrong with the conditions.
@@ -131,23 +131,13 @@ impl Check<'_> {
         if !self.component(port.component, at) {
             return Vec::new();
         }
-        let creations = self.universe.of(port.component);
-        let types: Vec<_> = creations.iter().filter_map(|c| c.description.as_ref()).collect();
-        // That a type is unknown is said where it is created.
-        if types.len() < creations.len() {
+        if let Some(finding) = self.universe.lacks(Member::Port, port, at) {
+            self.add(finding);
             return Vec::new();
         }
-        let found: Vec<PortType> = types.iter().filter_map(|ty| ty.port(port.member).cloned()).collect();
-        if found.is_empty() {
-            let names: BTreeSet<&str> = types.iter().flat_map(|ty| ty.ports.keys()).map(Ident::as_str).collect();
-            self.add(
-                Finding::error(UNKNOWN_PORT, format!("{} has no port `{}`", port.component, port.member))
-                    .at(at)
-                    .labelled("no such port")
-                    .help(did_you_mean(port.member.as_str(), "ports", names)),
-            );
-        }
-        found
+        let types: Option<Vec<_>> = self.universe.of(port.component).iter().map(|c| c.description.as_ref()).collect();
+        // That a type is unknown is said where it is created.
+        types.into_iter().flatten().filter_map(|ty| ty.port(port.member).cloned()).collect()
     }
 
     fn number(&mut self, signal: &PortSignal, at: Origin) {

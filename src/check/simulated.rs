@@ -1,12 +1,14 @@
 //! What the deployment says that simulated components raise by themselves, and what goes wrong there: do the steps and
 //! components exist, does somebody listen.
 
-use super::configurations::Member;
 use super::universe::Universe;
 use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP};
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction};
+use crate::model::{
+    ChangeKind, ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction, StepFault,
+};
 use crate::statechart::Chart;
+use crate::system::Member;
 use std::collections::BTreeSet;
 
 /// The steps that are done to a component as a whole.
@@ -32,7 +34,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("simulated.reactions[{i}]"))));
     }
     for (i, fault) in deployment.faults.iter().enumerate() {
-        let wrong = step(&fault.step, fault.origin, universe);
+        let wrong = self::fault(fault, deployment, universe);
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("faults[{i}]"))));
     }
     if deployment.platform.as_str() != "simulated" && !deployment.faults.is_empty() {
@@ -55,6 +57,59 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         );
     }
     findings
+}
+
+/// What is wrong with the step that is to go wrong. What no configuration does never comes, and a test that waits for it
+/// would test nothing. (States, properties and in-ports are also moved and set by other hands: operators, a teardown.)
+pub fn fault(fault: &StepFault, deployment: &Deployment, universe: &Universe) -> Findings {
+    let wrong = step(&fault.step, fault.origin, universe);
+    if !wrong.is_empty() {
+        return wrong;
+    }
+    never_done(fault, deployment, universe).into_iter().collect()
+}
+
+fn never_done(fault: &StepFault, deployment: &Deployment, universe: &Universe) -> Option<Finding> {
+    let (verb, rest) = fault.step.split_once(' ').unwrap_or((&fault.step, ""));
+    let changes = || deployment.configurations.iter().flat_map(|c| &c.changes);
+    let connects = matches!(verb, "connect" | "disconnect");
+    let (operand, done): (&str, BTreeSet<String>) = if connects {
+        // Each is the other's undo.
+        let ends = |kind: &ChangeKind| match kind {
+            ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
+                Some(format!("{from} -> {to}"))
+            }
+            _ => None,
+        };
+        (rest.split_once(" (").map_or(rest, |(ends, _)| ends), changes().filter_map(|c| ends(&c.kind)).collect())
+    } else if verb == "operation_call" {
+        let calls = changes().filter_map(|change| match &change.kind {
+            ChangeKind::OperationCall { call, undo } => Some((call, undo)),
+            _ => None,
+        });
+        let called = calls.flat_map(|(call, undo)| {
+            let own = [Some(call.operation), undo.as_ref().map(|undo| undo.operation)];
+            own.into_iter().flatten().chain(universe.undone_by(call.operation))
+        });
+        (rest.split('(').next().unwrap_or(rest), called.map(|operation| operation.to_string()).collect())
+    } else {
+        return None;
+    };
+    // As the platform compares: the text begins so, and a word ends there.
+    let fits = |text: &str| text.strip_prefix(operand).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '));
+    if operand.is_empty() && !done.is_empty() || done.iter().any(|text| fits(text)) {
+        return None;
+    }
+    let message = if connects {
+        format!("no configuration connects or disconnects `{operand}`")
+    } else {
+        format!("no configuration calls `{operand}`, nor is it what undoes a call")
+    };
+    Some(Finding::error(SIMULATED_UNKNOWN_STEP, message).at(fault.origin).labelled("never done").help(did_you_mean(
+        operand,
+        "steps",
+        done.iter().map(String::as_str),
+    )))
 }
 
 /// Events that nobody waits for.
@@ -149,21 +204,8 @@ fn member(at: Origin, verb: &str, part: Member, operand: &str, universe: &Univer
     let Ok(member) = MemberRef::new(operand) else {
         return vec![unreadable(at, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };
-    let creations = universe.of(member.component);
-    if creations.is_empty() {
+    if universe.of(member.component).is_empty() {
         return vec![universe.unknown(member.component, at)];
     }
-    let types = || creations.iter().filter_map(|creation| creation.description.as_ref());
-    // That a type is unknown is said where it is created.
-    if types().count() < creations.len() || types().any(|ty| part.of(ty).contains(&member.member.as_str())) {
-        return Vec::new();
-    }
-    let (what, plural, code) = part.words();
-    let known: BTreeSet<&str> = types().flat_map(|ty| part.of(ty)).collect();
-    vec![
-        Finding::error(code, format!("{} has no {what} `{}`", member.component, member.member))
-            .at(at)
-            .labelled(format!("no such {what}"))
-            .help(did_you_mean(member.member.as_str(), plural, known)),
-    ]
+    universe.lacks(part, member, at).into_iter().collect()
 }

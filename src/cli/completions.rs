@@ -1,8 +1,7 @@
 //! `davit completions SHELL`
 
 use super::exit::Exit;
-use super::{Answer, Cli, Context, Run};
-use clap::CommandFactory;
+use super::{Answer, Context, Run};
 
 /// Print a completion script for a shell.
 ///
@@ -17,7 +16,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "davit", &mut script);
+        clap_complete::generate(self.shell, &mut super::command(), "davit", &mut script);
         context.out.text(String::from_utf8_lossy(&script));
         Ok(Exit::Done)
     }

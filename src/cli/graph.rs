@@ -1,7 +1,7 @@
 //! `davit graph`
 
 use super::exit::Exit;
-use super::input::{Coordinator, Input, Parameters, coordinator, is_deployment};
+use super::input::{Coordinator, Input, Parameters, coordinators, is_deployment, which};
 use super::plan::{asked, drive, driven, of_others};
 use super::remote::{ASK, ask};
 use super::{Answer, Context, Failure, Run, write_output};
@@ -15,7 +15,7 @@ use crate::model::program::Beside;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Draw a deployment: its components as they are when up, its coordinator, or its bring-up plan.
+/// Draw a deployment: its components as they are when up, its coordinators, or its bring-up plan.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The deployment file (for a coordinator alone, its own file serves as well).
@@ -30,7 +30,7 @@ pub struct Args {
     /// The format.
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
-    /// Which coordinator, of a deployment with several.
+    /// Which coordinator, of a deployment with several; without it, all of them in one picture.
     #[arg(long, value_name = "NAME")]
     of: Option<String>,
     /// Mark the states that are active in the running deployment.
@@ -80,14 +80,16 @@ impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
         let picture = if what == What::Coordinator {
-            let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &[])?;
+            let mut all = coordinators(&self.file, &self.parameters, self.of.as_deref(), &[])?;
+            if all.len() > 1 {
+                return self.several(context, &all);
+            }
+            let Some(read) = all.pop() else { return Ok(Exit::Done) };
             let active = if self.live { self.active(&read)? } else { Vec::new() };
             context.out.findings(&read.findings, &read.sources);
-            let asks = |beside: &Beside| beside.plugin.as_deref() != Some("checkevents");
-            let hidden = read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks));
-            // What is drawn says so itself of functions in the chart.
-            let hidden = hidden || (self.format == Format::Plantuml && !read.chart.is_pure());
-            let mark = if hidden { " (functions are not verified)" } else { "" };
+            // A picture says so itself of functions in the chart.
+            let hidden = asks_beside(&read) || (self.format == Format::Plantuml && !read.chart.is_pure());
+            let mark = if hidden { UNVERIFIED } else { "" };
             let title = format!("{}: coordinator{mark}", read.name);
             let text = match self.format {
                 Format::Plantuml => draw::coordinator_plantuml(&title, &read.chart, &active),
@@ -117,7 +119,11 @@ impl Run for Args {
                     let plans: Vec<_> = plans
                         .map_err(refused)?
                         .into_iter()
-                        .map(|p| (p.asks.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "), p.steps))
+                        .map(|p| {
+                            let asks: Vec<String> = p.asks.iter().map(ToString::to_string).collect();
+                            let of = p.coordinator.map_or_else(String::new, |name| format!("{name}: "));
+                            (format!("{of}{}", asks.join(", ")), p.steps)
+                        })
                         .collect();
                     draw::plan(&format!("{name}: plan"), &plans)
                 }
@@ -145,7 +151,38 @@ impl Run for Args {
     }
 }
 
+/// What stands behind the name of a coordinator whose functions a picture does not show.
+const UNVERIFIED: &str = " (functions are not verified)";
+
+/// Whether functions beside a chart without any are asked for something.
+fn asks_beside(read: &Coordinator) -> bool {
+    let asks = |beside: &Beside| beside.plugin.as_deref() != Some("checkevents");
+    read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks))
+}
+
 impl Args {
+    /// All coordinators of a deployment in one picture.
+    fn several(&self, context: &Context, all: &[Coordinator]) -> Answer {
+        if matches!(self.format, Format::Plantuml | Format::Json | Format::Scxml) {
+            // These languages write one statechart.
+            return Err(which(all.iter()));
+        }
+        if let Some(first) = all.first() {
+            context.out.findings(&first.findings, &first.sources);
+        }
+        let (mut names, mut charts) = (Vec::with_capacity(all.len()), Vec::with_capacity(all.len()));
+        for one in all {
+            let active = if self.live { self.active(one)? } else { Vec::new() };
+            let mark = if asks_beside(one) { UNVERIFIED } else { "" };
+            names.push(format!("{}{mark}", one.of.as_deref().unwrap_or_default()));
+            charts.push((&one.chart, active));
+        }
+        let charts: Vec<_> =
+            names.iter().zip(charts).map(|(name, (chart, active))| (name.as_str(), chart, active)).collect();
+        let name = all.first().map_or("", |one| one.name.as_str());
+        self.write(context, &draw::coordinators(&format!("{name}: coordinators"), &charts))
+    }
+
     fn write(&self, context: &Context, picture: &draw::Picture) -> Answer {
         let text = match self.format {
             Format::Svg => picture.svg(),

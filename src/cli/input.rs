@@ -8,7 +8,7 @@ use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::model::codes::{CLI_BAD_SET, CLI_WHICH_COORDINATOR};
 use crate::model::finding::did_you_mean;
-use crate::model::{Deployment, Findings, Ident, Program, Statechart};
+use crate::model::{Findings, Ident, Program, Statechart};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -104,65 +104,79 @@ pub struct Coordinator {
     pub findings: Findings,
 }
 
-/// Reads a coordinator. A file given by hand is trusted to have functions (nothing is open to them); in a deployment
-/// `trusted:` says so. `host` are files that stand in for its host.
+/// Reads a coordinator, the only one or the one that `of` names. A file given by hand is trusted to have functions (nothing
+/// is open to them); in a deployment `trusted:` says so. `host` are files that stand in for its host.
 ///
 /// # Errors
-/// What is wrong with the texts.
-///
-/// `of`: which one of a deployment with several.
+/// What is wrong with the texts; and when there are several and none is named.
 pub fn coordinator(
     path: &Path,
     parameters: &Parameters,
     of: Option<&str>,
     host: &[PathBuf],
 ) -> Result<Coordinator, Failure> {
+    let mut all = coordinators(path, parameters, of, host)?;
+    match (all.pop(), all.is_empty()) {
+        (Some(only), true) => Ok(only),
+        (last, _) => Err(which(all.iter().chain(&last))),
+    }
+}
+
+/// That it is to be said which of several coordinators is meant.
+pub fn which<'a>(all: impl Iterator<Item = &'a Coordinator>) -> Failure {
+    let names: Vec<&str> = all.filter_map(|one| one.of.as_deref()).collect();
+    Failure::usage(
+        CLI_WHICH_COORDINATOR,
+        format!("the deployment has {} coordinators", names.len()),
+        format!("say which one: `--of NAME`, with one of {}", names.join(", ")),
+    )
+}
+
+/// The same, but all of them when none is named.
+///
+/// # Errors
+/// What is wrong with the texts; and when there is none of that name.
+pub fn coordinators(
+    path: &Path,
+    parameters: &Parameters,
+    of: Option<&str>,
+    host: &[PathBuf],
+) -> Result<Vec<Coordinator>, Failure> {
     let options = LoadOptions { trusted: true, host: host.to_vec(), ..parameters.options()? };
     let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     if is_deployment(path) {
         let loaded = lang::load(path, &options);
-        return match loaded.deployment {
-            Some(d) => {
-                let deployment = Some(d.name.to_string());
-                let (of, chart, program) = chosen(d, of)?;
-                let (sources, findings) = (loaded.sources, loaded.findings);
-                Ok(Coordinator { name, deployment, of: Some(of), chart, program, sources, findings })
-            }
-            None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
+        let Some(d) = loaded.deployment else {
+            return Err(unread(loaded.findings, loaded.sources, loaded.unreadable));
         };
+        let named = d.name.to_string();
+        let known: Vec<Ident> = d.coordinators.iter().map(|own| own.name).collect();
+        if let Some(of) = of.filter(|of| known.iter().all(|name| name.as_str() != *of)) {
+            let help = did_you_mean(of, "coordinators", known.iter().map(Ident::as_str));
+            return Err(Failure::usage(CLI_WHICH_COORDINATOR, format!("there is no coordinator `{of}`"), help));
+        }
+        let wanted = |own: &crate::model::Coordinator| of.is_none_or(|of| own.name.as_str() == of);
+        let mut programs = d.programs;
+        let one = |own: crate::model::Coordinator| Coordinator {
+            name: name.clone(),
+            deployment: Some(named.clone()),
+            of: Some(own.name.to_string()),
+            program: programs.remove(&own.name),
+            chart: own.chart,
+            sources: loaded.sources.clone(),
+            findings: loaded.findings.clone(),
+        };
+        return Ok(d.coordinators.into_iter().filter(wanted).map(one).collect());
     }
     let loaded = lang::load_coordinator(&Sources::Disk, path, &options);
     match loaded.coordinator {
         Some(chart) => {
             let (program, sources, findings) = (loaded.program, loaded.sources, loaded.findings);
-            Ok(Coordinator { name, deployment: None, of: of.map(str::to_owned), chart, program, sources, findings })
+            let of = of.map(str::to_owned);
+            Ok(vec![Coordinator { name, deployment: None, of, chart, program, sources, findings }])
         }
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }
-}
-
-/// The coordinator of that name; without one, the only one.
-fn chosen(deployment: Deployment, of: Option<&str>) -> Result<(String, Statechart, Option<Arc<Program>>), Failure> {
-    let names: Vec<Ident> = deployment.coordinators.iter().map(|c| c.name).collect();
-    let number = match of {
-        None if names.len() == 1 => Some(0),
-        None => None,
-        Some(name) => names.iter().position(|n| n.as_str() == name),
-    };
-    let Some(number) = number else {
-        let known = || names.iter().map(Ident::as_str);
-        let (message, help) = match of {
-            None => (
-                format!("the deployment has {} coordinators", names.len()),
-                format!("say which one: `--of NAME`, with one of {}", known().collect::<Vec<_>>().join(", ")),
-            ),
-            Some(name) => (format!("there is no coordinator `{name}`"), did_you_mean(name, "coordinators", known())),
-        };
-        return Err(Failure::usage(CLI_WHICH_COORDINATOR, message, help));
-    };
-    let mut deployment = deployment;
-    let own = deployment.coordinators.swap_remove(number);
-    Ok((own.name.to_string(), own.chart, deployment.programs.remove(&own.name)))
 }
 
 fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {

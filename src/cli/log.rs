@@ -88,6 +88,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             entry["seconds"].as_f64().unwrap_or_default()
         ),
         "said" => format!("{:<10} {}", text(&entry["by"]), text(&entry["text"])),
+        "recovered" => out.paint(Style::Good, "recovered"),
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),
     };

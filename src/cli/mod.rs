@@ -10,6 +10,7 @@ mod completions;
 mod convert;
 mod deploy;
 mod detach;
+mod drift;
 pub mod exit;
 mod explain;
 mod graph;
@@ -20,6 +21,7 @@ pub mod output;
 mod plan;
 mod plan_view;
 mod progress;
+mod recover;
 mod remote;
 mod request;
 mod run;
@@ -44,7 +46,9 @@ use std::process::ExitCode;
 
 /// Brings component-based robot systems up, switches them while they run, undoes what it did, and takes them down again.
 ///
-/// Exit status: 0 done; 1 the answer is no (findings, failed and rolled back); 2 usage or unreadable input; 3 broken.
+/// Exit status: 0 done; 1 the answer is no (findings, failed and rolled back); 2 usage or unreadable input; 3 broken:
+/// `davit status` names what is left, `davit undo ID` of the very configuration that broke it goes back, and so does `davit
+/// recover --back`; `davit recover --accept` takes what is there as the state.
 #[derive(Debug, Parser)]
 #[command(name = "davit", version, max_term_width = 100)]
 struct Cli {
@@ -89,6 +93,9 @@ commands! {
     Event = request::EventArgs,
     Apply = request::ApplyArgs,
     Undo = request::UndoArgs,
+    Drift = drift::Args,
+    Recover = recover::Args,
+    Commit = request::CommitArgs,
     Explain = explain::Args,
     Completions = completions::Args,
 }
@@ -170,6 +177,11 @@ pub fn write_output(context: &Context, file: Option<&Path>, text: &str) -> Resul
     })
 }
 
+/// The commands with their flags and help texts, for whoever compares, documents or completes them.
+pub fn command() -> clap::Command {
+    <Cli as clap::CommandFactory>::command()
+}
+
 /// The whole command line, with the component libraries a program has: parses the arguments, runs the command, prints what it has to say.
 pub fn main(libraries: Libraries) -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -204,6 +216,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        <Cli as clap::CommandFactory>::command().debug_assert();
+        command().debug_assert();
     }
 }

@@ -9,18 +9,19 @@ use crate::app::Read;
 use crate::check::{self, Drive, Happening, Until};
 use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::finding::{configuration, did_you_mean, has_errors};
-use crate::model::{Ask, ConfigId, Finding, Findings, Snapshot};
+use crate::model::{Ask, ConfigId, Finding, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
 use crate::stack::{Op, Requester, Stack, transaction};
 use crate::system::{Reversibility, System, step};
 use crate::time::Time;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Show what configurations mean: their steps, in which order, what runs in parallel, what can be undone and how.
 ///
-/// The configurations are planned one after the other, beginning with nothing deployed; without names, all of them in
-/// the order they are written. A mistake in a configuration that is not asked for is told and refuses nothing. `--bringup` and `--shutdown` drive the coordinator instead, with every request answered
-/// `ok`.
+/// Without names, the bring-up: the coordinators are driven from nothing to up, with every request answered `ok`. With
+/// names, these configurations one after the other, beginning with nothing deployed. A mistake in a configuration that is
+/// not asked for is told and refuses nothing. Of several coordinators each is driven in turn, and its name is shown.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -28,10 +29,10 @@ pub struct Args {
     /// Configurations, in the order to be applied.
     #[arg(value_name = "ID")]
     ids: Vec<String>,
-    /// Drive the coordinator from nothing to up.
+    /// Drive the coordinators from nothing to up (what is shown without names).
     #[arg(long, conflicts_with_all = ["ids", "shutdown"])]
     bringup: bool,
-    /// Drive the coordinator from up to down.
+    /// Drive the coordinators from up to down.
     #[arg(long, conflicts_with = "ids")]
     shutdown: bool,
     /// Print JSON: one object for each configuration.
@@ -41,6 +42,8 @@ pub struct Args {
 
 /// One planned application.
 pub struct Planned {
+    /// The coordinator that asks, of several.
+    pub coordinator: Option<String>,
     /// What was asked for.
     pub asks: Vec<Ask>,
     /// Events that come before it.
@@ -63,8 +66,8 @@ impl Run for Args {
 impl Args {
     fn show(self, context: &Context) -> Answer {
         let read = self.input.read_but_for(context)?;
-        let planned = if self.bringup || self.shutdown {
-            driven(&read, if self.bringup { Until::Up } else { Until::Down })
+        let planned = if self.ids.is_empty() {
+            driven(&read, if self.shutdown { Until::Down } else { Until::Up })
         } else {
             asked(&read, &self.ids)
         };
@@ -129,9 +132,6 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     if !unknown.is_empty() {
         return Err(unknown);
     }
-    if names.is_empty() {
-        ids = deployment.configurations.iter().map(|c| c.id).collect();
-    }
     let unread = of_texts(read, &ids);
     if !unread.is_empty() {
         return Err(unread);
@@ -140,29 +140,19 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     if has_errors(&wrong) {
         return Err(wrong);
     }
-    let context =
-        crate::plan::Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
+    let context = crate::plan::Context::of(deployment);
     let mut system = System::new(Arc::new(read.catalogue.clone()));
     let mut stack = Stack::new(deployment.limits.stack);
     let mut planned = Vec::new();
     for id in ids {
         let Some(configuration) = deployment.configuration(id) else { continue };
         let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
-        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| {
-            let mut findings = refusal.findings;
-            if let Some(first) = findings.first_mut().filter(|_| names.is_empty()) {
-                let help = first.help.take().map_or_else(String::new, |help| format!("{help}; "));
-                first.help = Some(format!(
-                    "{help}without names, all configurations are planned in the order they are written: name those you \
-                     mean, or follow the coordinator with `--bringup`"
-                ));
-            }
-            findings
-        })?;
+        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
         for planned in &transaction.steps {
             step::effect(&planned.step, &mut system);
         }
         planned.push(Planned {
+            coordinator: None,
             asks: vec![Ask::Apply(id)],
             events: Vec::new(),
             state: None,
@@ -174,27 +164,34 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
     Ok(planned)
 }
 
-/// What the coordinator asks for on its way, every request answered *ok*.
+/// What the coordinators ask for on their way, every request answered *ok*.
 ///
 /// # Errors
 /// Findings of the coordinator, and why it does not arrive.
 pub fn driven(read: &Read, until: Until) -> Result<Vec<Planned>, Findings> {
     let (drive, arrived) = drive(read, until)?;
     arrived?;
-    let mut events = Vec::new();
+    let several = read.deployment.coordinators.len() > 1;
+    // What each has heard since it last asked for something: with several, in between others may ask.
+    let mut heard: BTreeMap<Ident, Vec<String>> = BTreeMap::new();
     let mut planned = Vec::new();
     for happening in drive.happenings {
         match happening {
-            Happening::Event { event, .. } => events.push(event),
-            Happening::Applied { asks, steps, result, state, .. } => {
-                planned.push(Planned { asks, events: std::mem::take(&mut events), state: Some(state), steps, result });
-            }
+            Happening::Event { coordinator, event, .. } => heard.entry(coordinator).or_default().push(event),
+            Happening::Applied { coordinator, asks, steps, result, state } => planned.push(Planned {
+                events: heard.remove(&coordinator).unwrap_or_default(),
+                coordinator: several.then(|| coordinator.to_string()),
+                asks,
+                state: Some(state),
+                steps,
+                result,
+            }),
         }
     }
     Ok(planned)
 }
 
-/// Drives the coordinator; with what is wrong when it does not arrive.
+/// Drives the coordinators; with what is wrong when one does not arrive.
 ///
 /// # Errors
 /// When it cannot be driven at all.
@@ -203,10 +200,15 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
     let Some(drive) = check::drive(deployment, &read.catalogue, until) else {
         return Err(check::run(deployment.clone(), &read.catalogue).findings);
     };
+    let own = deployment.coordinator_named(drive.coordinator).unwrap_or(deployment.first_coordinator());
     let (code, what, key, goal) = match until {
-        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &deployment.first_coordinator().up),
-        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &deployment.first_coordinator().down),
+        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &own.up),
+        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &own.down),
     };
+    let of = |state: &str| {
+        if deployment.coordinators.len() > 1 { format!("{}:{state}", own.name) } else { state.to_owned() }
+    };
+    let stops = format!("{what} stops at `{}`", of(&drive.state));
     let on_the_way = drive.happenings.iter().flat_map(|happening| match happening {
         Happening::Applied { asks, .. } => asks.as_slice(),
         Happening::Event { .. } => &[],
@@ -218,7 +220,7 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
         Err(unread)
     } else if let Some((ask, findings)) = &drive.refused {
         let mut all = vec![
-            Finding::error(code, format!("{what} stops at `{}`: `{ask}` is refused", drive.state))
+            Finding::error(code, format!("{stops}: `{ask}` is refused"))
                 .at(deployment.key_origin(key))
                 .help("see the findings below for the reason"),
         ];
@@ -228,7 +230,7 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
         Ok(())
     } else {
         Err(vec![
-            Finding::error(code, format!("{what} stops at `{}` and never reaches `{goal}`", drive.state))
+            Finding::error(code, format!("{stops} and never reaches `{}`", of(goal)))
                 .at(deployment.key_origin(key))
                 .help("`davit check` shows the way there"),
         ])
@@ -238,11 +240,12 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
 
 fn show(out: &Output, planned: &Planned) {
     let names: Vec<String> = planned.asks.iter().map(ToString::to_string).collect();
+    let of = planned.coordinator.as_ref().map_or_else(String::new, |name| format!("{name}: "));
     for event in &planned.events {
-        out.line(out.paint(Style::Dim, format!("-- {event}")));
+        out.line(out.paint(Style::Dim, format!("-- {of}{event}")));
     }
     let state = planned.state.as_ref().map_or_else(String::new, |s| out.paint(Style::Dim, format!("  → {s}")));
-    out.line(format!("{}{state}", out.paint(Style::Bold, names.join(", "))));
+    out.line(format!("{of}{}{state}", out.paint(Style::Bold, names.join(", "))));
     if planned.steps.is_empty() {
         out.line("  nothing to do");
     }
@@ -256,12 +259,20 @@ fn show(out: &Output, planned: &Planned) {
             Reversibility::Irreversible => Style::Bad,
         };
         let undo: Vec<String> = step.undo.steps().iter().map(ToString::to_string).collect();
+        let moving = if step.undo_moves { " (moves)" } else { "" };
         table.row([
             format!("{:>3}", step.id),
             out.paint(Style::Dim, shown.stage),
             step.step.to_string(),
-            out.paint(style, format!("{:?}", step.reversibility).to_lowercase()),
-            if undo.is_empty() { String::new() } else { out.paint(Style::Dim, format!("undo: {}", undo.join("; "))) },
+            out.paint(
+                style,
+                format!("{:?}", step.reversibility).to_lowercase() + if step.moves { ", moves" } else { "" },
+            ),
+            if undo.is_empty() {
+                String::new()
+            } else {
+                out.paint(Style::Dim, format!("undo: {}{moving}", undo.join("; ")))
+            },
             match after.len() {
                 0 => String::new(),
                 n if n > 6 => out.paint(Style::Dim, format!("after {} … ({n})", after[..4].join(" "))),

@@ -1,7 +1,7 @@
 //! Plans as other programs see them (design §16).
 
 use super::plan::Planned;
-use crate::model::{Ask, Snapshot, Step, Value};
+use crate::model::{Ask, Snapshot};
 use crate::plan::{PlannedStep, Stage};
 use crate::system::{Reversibility, Undo};
 use serde::Serialize;
@@ -12,6 +12,8 @@ use std::collections::BTreeSet;
 #[derive(Serialize)]
 pub struct PlanView<'a> {
     configuration: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    coordinator: Option<&'a str>,
     requests: Vec<String>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     events: &'a [String],
@@ -37,6 +39,7 @@ impl<'a> PlanView<'a> {
         };
         Self {
             configuration: applied.or_else(undone).unwrap_or_default(),
+            coordinator: planned.coordinator.as_deref(),
             requests: planned.asks.iter().map(ToString::to_string).collect(),
             events: &planned.events,
             state: planned.state.as_deref(),
@@ -109,9 +112,11 @@ impl Iterator for SystemSteps<'_> {
 impl Shown {
     fn view(&self, steps: &[PlannedStep]) -> Map<String, Json> {
         let step = &steps[self.index];
-        let mut view = Map::new();
+        let mut view = match json!(step.step) {
+            Json::Object(fields) => fields,
+            _ => Map::new(),
+        };
         view.insert("id".to_owned(), json!(step.id));
-        describe(&step.step, &mut view);
         view.insert("after".to_owned(), json!(self.after));
         view.insert("stage".to_owned(), json!(self.stage));
         let reversibility = match step.reversibility {
@@ -120,61 +125,19 @@ impl Shown {
             Reversibility::Irreversible => "irreversible",
         };
         view.insert("reversibility".to_owned(), json!(reversibility));
-        view.insert("undo".to_owned(), undo(&step.undo));
+        view.insert("moves".to_owned(), json!(step.moves));
+        let mut back = undo(&step.undo);
+        back["moves"] = json!(step.undo_moves);
+        view.insert("undo".to_owned(), back);
         view
     }
 }
 
 fn undo(undo: &Undo) -> Json {
-    let one = |step: &Step| {
-        let mut view = Map::new();
-        describe(step, &mut view);
-        Json::Object(view)
-    };
     match undo {
-        Undo::One(step) => one(step),
-        Undo::Many(steps) => json!({ "do": "steps", "steps": steps.iter().map(one).collect::<Vec<_>>() }),
+        Undo::One(step) => json!(step),
+        Undo::Many(steps) => json!({ "do": "steps", "steps": steps }),
         Undo::Nothing => json!({ "do": "nothing" }),
         Undo::Irreversible(reason) => json!({ "do": "impossible", "reason": reason }),
-    }
-}
-
-/// `do`, `target` and what else a step has.
-fn describe(step: &Step, view: &mut Map<String, Json>) {
-    let mut put = |key: &str, value: Json| _ = view.insert(key.to_owned(), value);
-    put("do", json!(step.verb()));
-    match step {
-        Step::State { component, .. } | Step::Destroy { component } => put("target", json!(component)),
-        Step::Create { component, ty, activity, properties } => {
-            put("target", json!(component));
-            put("type", json!(ty));
-            put("activity", json!(activity));
-            put("value", json!(properties));
-        }
-        Step::Connect { from, to, policy } => {
-            put("target", json!(to));
-            put("from", json!(from));
-            put("to", json!(to));
-            put("policy", json!(policy));
-        }
-        Step::Disconnect { from, to } => {
-            put("target", json!(to));
-            put("from", json!(from));
-            put("to", json!(to));
-        }
-        Step::PropertySet { property, value } => {
-            put("target", json!(property));
-            put("value", json!(value));
-        }
-        Step::PortWrite { port, value } => {
-            put("target", json!(port));
-            put("value", json!(value));
-        }
-        Step::Operation(call) => {
-            put("target", json!(call.operation));
-            let args: &[Value] = &call.args;
-            put("args", json!(args));
-            put("value", json!(args));
-        }
     }
 }

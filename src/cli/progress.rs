@@ -67,6 +67,8 @@ impl Progress {
         let out = &self.out;
         let time = out.paint(Style::Dim, format!("{:>9.3} s", at.as_secs_f64()));
         match what {
+            // A recovery is answered where it was asked: no answer ends its bar.
+            Happening::Requested { request: None, ask, by } => self.line(format!("{time}  {ask} (asked by {by})")),
             Happening::Requested { ask, by, .. } => {
                 self.bar.reset();
                 self.bar.set_message(format!("{ask} (asked by {by})"));
@@ -96,6 +98,7 @@ impl Progress {
                 self.line(format!("{time}  {}  {component}: {reason}", out.paint(Style::Bad, "fault")));
             }
             Happening::Returned { component } => self.line(format!("{time}  {component} returned and was cleaned up")),
+            Happening::Recovered => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");

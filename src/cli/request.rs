@@ -1,4 +1,4 @@
-//! `davit event`, `davit apply`, `davit undo`: what is asked of a running deployment.
+//! `davit event`, `davit apply`, `davit undo`, `davit commit`: what is asked of a running deployment.
 
 use super::exit::Exit;
 use super::log::{count, duration};
@@ -6,6 +6,7 @@ use super::output::Style;
 use super::remote::{ASK, Wait, Which, ask};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
+use crate::configurator::WAY_OUT;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
 
@@ -69,7 +70,8 @@ impl Run for ApplyArgs {
 /// Undo the newest configuration of a running deployment, or a named one, or down to N frames.
 #[derive(Debug, clap::Args)]
 pub struct UndoArgs {
-    /// The configuration whose newest frame is undone; without one, the top of the stack.
+    /// The configuration whose newest frame is undone; without one, the newest that was applied by hand. Of the very
+    /// configuration that broke the deployment: goes back to the system before it.
     configuration: Option<String>,
     /// Undo until so many frames are left.
     #[arg(long, value_name = "N", conflicts_with = "configuration")]
@@ -87,6 +89,33 @@ impl Run for UndoArgs {
     fn run(self, context: &Context) -> Answer {
         let params = json!({ "configuration": self.configuration, "to": self.to });
         request(context, "undo", params, &self.which, &self.wait, self.json)
+    }
+}
+
+/// Make what an operator applied permanent: it can no longer be undone.
+///
+/// Refused while a coordinator's frame is in force: its undo may write over what was to stay.
+#[derive(Debug, clap::Args)]
+pub struct CommitArgs {
+    /// The running deployment's name; not needed while only one runs.
+    name: Option<String>,
+    /// Also while a coordinator's frame is in force. That frame stays, and can be undone as far as that then goes.
+    #[arg(long)]
+    force: bool,
+    /// How long to wait for the answer at most, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::remote::seconds)]
+    within: f64,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for CommitArgs {
+    fn run(self, context: &Context) -> Answer {
+        let wait = Wait { wait: true, within: self.within };
+        let params = json!({ "force": self.force });
+        request(context, "commit", params, &Which { name: self.name }, &wait, self.json)
+            .map_err(|failure| failure.as_json(self.json))
     }
 }
 
@@ -120,6 +149,9 @@ fn request(
         ));
         for reason in answer["reasons"].as_array().into_iter().flatten() {
             out.line(format!("  {}", text(reason)));
+        }
+        if verdict.ends_with(".broken") {
+            out.error(format!("note: it is broken; {WAY_OUT}\n"));
         }
     } else {
         out.line(format!("request {} accepted; `davit log` shows its answer", answer["request"]));

@@ -6,7 +6,9 @@ use super::input::Parameters;
 use super::output::Style;
 use super::progress::Progress;
 use super::{Answer, Context, Failure, Run};
+use crate::app::PLATFORMS;
 use crate::app::script::{self, Options, ScriptFailure};
+use crate::model::Ident;
 use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX, TEXT_NO_FILE};
 use std::path::PathBuf;
 
@@ -21,6 +23,10 @@ pub struct Args {
     /// Which clock it runs on; simulated time passes as fast as the machine, and the same way every time.
     #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
     clock: ClockKind,
+    /// Run its deployments on this platform instead of the one they name. `simulated` needs no components and injects what
+    /// `faults:` and the script's `fault` say.
+    #[arg(long, value_name = "PLATFORM", value_parser = clap::builder::PossibleValuesParser::new(PLATFORMS))]
+    platform: Option<String>,
     #[command(flatten)]
     parameters: Parameters,
     /// Tell only what the script says, and failures.
@@ -46,6 +52,7 @@ impl Run for Args {
                 clock: clock.clone(),
                 libraries: context.libraries.clone(),
                 load: self.parameters.options()?,
+                platform: self.platform.map(|name| Ident::new(&name).expect("the name of a platform is one")),
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
             },

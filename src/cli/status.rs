@@ -1,5 +1,6 @@
 //! `davit status`
 
+use super::drift::listed;
 use super::exit::Exit;
 use super::output::{Output, Style, Table};
 use super::remote::{ASK, ask};
@@ -109,6 +110,11 @@ fn print(out: &Output, status: &Json) {
     if !table.is_empty() {
         out.line(out.paint(Style::Bold, "components"));
         out.text(table.to_string());
+    }
+    let residual = status["residual"].as_array().unwrap_or(&empty);
+    if !residual.is_empty() {
+        out.line(out.paint(Style::Bad, "what remains of what broke it"));
+        out.text(listed(residual));
     }
     for fault in status["faults"].as_array().unwrap_or(&empty) {
         out.line(format!(

@@ -4,8 +4,11 @@ use super::exit::Exit;
 use super::input::{Input, Parameters};
 use super::output::{Output, Style, Table};
 use super::{Answer, Context, Failure, Run};
+use crate::diagnostics::Language;
+use crate::lang;
 use crate::model::codes::CLI_UNKNOWN_TYPE;
 use crate::model::finding::did_you_mean;
+use crate::model::monitor::Condition;
 use crate::model::{Catalogue, ComponentType, Direction, Effect, Tunable};
 use std::path::PathBuf;
 
@@ -64,7 +67,7 @@ impl Args {
         };
         let out = &context.out;
         match wanted {
-            None if self.json => out.json(&catalogue.iter().collect::<Vec<_>>()),
+            None if self.json => out.json(&catalogue.iter().map(|ty| view(ty)).collect::<Vec<_>>()),
             None => list(out, &catalogue),
             Some(name) => {
                 let mut by_last = catalogue.iter().filter(|ty| ty.name.as_str().rsplit('.').next() == Some(&name));
@@ -77,11 +80,26 @@ impl Args {
                         did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
                     ));
                 };
-                if self.json { out.json(ty) } else { one(out, ty) }
+                if self.json { out.json(&view(ty)) } else { one(out, ty) }
             }
         }
         Ok(Exit::Done)
     }
+}
+
+/// A condition as it is written in Lua.
+fn settling(condition: &Condition) -> String {
+    lang::print::condition(condition, Language::Lua)
+}
+
+/// A type as JSON, with the conditions of its operations as they are written.
+fn view(ty: &ComponentType) -> serde_json::Value {
+    let mut view = serde_json::json!(ty);
+    for (name, operation) in &ty.operations {
+        let settled = operation.settled_by.as_ref().map(settling);
+        view["operations"][name.as_str()]["settled_by"] = serde_json::json!(settled);
+    }
+    view
 }
 
 fn list(out: &Output, catalogue: &Catalogue) {
@@ -107,6 +125,11 @@ fn one(out: &Output, ty: &ComponentType) {
     let mut facts = Vec::new();
     if ty.actuator {
         facts.push("moves something (actuator)".to_owned());
+    }
+    for (flag, what) in [(ty.moves.start, "starting"), (ty.moves.stop, "stopping")] {
+        if flag {
+            facts.push(format!("{what} moves hardware: no automatic rollback does it unasked"));
+        }
     }
     for (flag, what) in [
         (ty.irreversible.configure, "configuring"),
@@ -169,11 +192,17 @@ fn one(out: &Output, ty: &ComponentType) {
     for (name, operation) in &ty.operations {
         let args: Vec<String> = operation.args.iter().map(ToString::to_string).collect();
         let returns = operation.returns.as_ref().map_or_else(String::new, |ty| format!(" -> {ty}"));
-        let effect = match &operation.effect {
+        let mut effect = match &operation.effect {
             Effect::None => "leaves nothing behind".to_owned(),
             Effect::Undo(undo) => format!("undone by {undo}"),
             Effect::Irreversible => "irreversible".to_owned(),
         };
+        if operation.moves {
+            effect += ", moves hardware";
+        }
+        if let Some(condition) = &operation.settled_by {
+            effect += &format!(", settled by {}", settling(condition));
+        }
         table.row([
             format!("{}({}){returns}", out.paint(Style::Name, name), args.join(", ")),
             effect,

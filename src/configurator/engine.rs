@@ -34,6 +34,15 @@ pub(super) struct Confirming {
     pub until: Time,
 }
 
+/// A look at a component that was reported faulted.
+struct Look {
+    ticket: Ticket,
+    component: ComponentName,
+    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
+    generation: Option<u64>,
+    until: Time,
+}
+
 /// What a configurator is made of.
 pub(super) struct Parts {
     pub clock: Clock,
@@ -83,9 +92,11 @@ pub(super) struct Engine {
     given_up: FxHashSet<Ticket>,
     /// Components that were reported faulted and not looked at since, and looks that are under way.
     pub suspects: Vec<ComponentName>,
-    looks: Vec<(Ticket, ComponentName, Time)>,
+    looks: Vec<Look>,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
+    /// What partial frames are left of.
+    pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
     /// Prepared switches.
     pub switches: FxHashMap<ConfigId, Box<Fast>>,
     pub confirming: Vec<Confirming>,
@@ -132,6 +143,7 @@ impl Engine {
             suspects: Vec::new(),
             looks: Vec::new(),
             returned: false,
+            partials: Vec::new(),
             switches: FxHashMap::default(),
             confirming: Vec::new(),
             heard: Vec::new(),
@@ -189,7 +201,7 @@ impl Engine {
                 continue;
             }
             let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
-            let looks = self.looks.iter().map(|(.., until)| *until).min().unwrap_or(Time::NEVER);
+            let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
             self.pump(confirm.min(looks).min(self.running_until()));
         }
     }
@@ -380,7 +392,7 @@ impl Engine {
     fn look_at_suspects(&mut self) {
         let mut at = 0;
         while at < self.looks.len() {
-            let (ticket, component, until) = self.looks[at];
+            let Look { ticket, component, generation, until } = self.looks[at];
             let seen = match self.take_reply(ticket) {
                 Some(Reply::ObservedComponent(Ok(seen))) => seen,
                 Some(_) => None,
@@ -395,29 +407,46 @@ impl Engine {
             };
             self.looks.remove(at);
             let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
-            if faulted && self.world.system.set_state(component, RunState::Faulted) {
+            let stale = self.generation(component) != generation;
+            if faulted && stale {
+                self.suspects.push(component);
+            } else if faulted && self.world.system.set_state(component, RunState::Faulted) {
                 self.changed();
             }
         }
-        while self.pool.has_room_beside(1)
-            && let Some(component) = self.suspects.pop()
-        {
-            if self.looks.iter().any(|(_, looked, _)| *looked == component) {
+        if self.suspects.is_empty() {
+            return;
+        }
+        // What is being worked on is looked at by whoever works on it, or afterwards.
+        let busy: FxHashSet<ComponentName> = self.running.iter().flat_map(|r| r.machine.components()).collect();
+        let mut later = Vec::new();
+        while let Some(component) = self.suspects.pop() {
+            if self.looks.iter().any(|look| look.component == component) {
+                continue;
+            }
+            if busy.contains(&component) || !self.pool.has_room_beside(1) {
+                later.push(component);
                 continue;
             }
             let deadline = self.clock.now() + self.limits.step_timeout;
             let ticket = self.pool.start(super::pool::Call::ObserveComponent(component), deadline);
-            self.looks.push((ticket, component, deadline + crate::limits::PLATFORM_GRACE));
+            let until = deadline + crate::limits::PLATFORM_GRACE;
+            self.looks.push(Look { ticket, component, generation: self.generation(component), until });
         }
+        self.suspects = later;
+    }
+
+    fn generation(&self, component: ComponentName) -> Option<u64> {
+        use crate::system::View as _;
+        self.world.system.component(component).map(|node| node.generation)
     }
 
     /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
     pub fn settle_suspects(&mut self) {
-        while !self.suspects.is_empty() || !self.looks.is_empty() {
+        loop {
             self.look_at_suspects();
-            if let Some(until) = self.looks.iter().map(|(.., until)| *until).min() {
-                self.pump(until);
-            }
+            let Some(until) = self.looks.iter().map(|look| look.until).min() else { return };
+            self.pump(until);
             if self.stopping {
                 return;
             }
@@ -440,10 +469,18 @@ impl Engine {
             stack,
             busy: self.current.first().map(|(request, since)| Busy::of(request, *since)),
             waiting: self.desk.len(),
-            broken: self.world.broken.first().map(|broken| broken.residual.clone()),
+            broken: self.broken_longest(),
             residuals: self.world.broken.iter().map(|broken| broken.residual.clone()).collect(),
             quarantined: self.world.quarantined.clone(),
         })
+    }
+
+    /// What is broken longest, or left over longest in a partial frame.
+    fn broken_longest(&mut self) -> Option<Arc<super::request::Residual>> {
+        let stack = &self.world.stack;
+        self.partials.retain(|(frame, _)| stack.frame(*frame).is_some_and(|frame| frame.partial));
+        let broken = self.world.broken.first().map(|broken| &broken.residual);
+        broken.or(self.partials.first().map(|(_, residual)| residual)).cloned()
     }
 
     /// Everything that still waits is answered.

@@ -142,7 +142,12 @@ impl Engine {
     /// What goes wrong in the middle of a switch is taken over by an ordinary transaction.
     fn go_on_from(&mut self, number: u32, switch: &Switch, request: Request, undoing: bool, ended: (u32, Outcome)) {
         let (sent, outcome) = ended;
-        let steps = switch.steps(switch.acts());
+        let mut steps = switch.steps(switch.acts());
+        for step in &mut steps {
+            // Their order is that of the acts; the stages of an undo run the other way.
+            step.wave = 0;
+            step.after = step.id.checked_sub(1).into_iter().collect();
+        }
         let (edits, frame) = if undoing {
             let top = self.world.stack.top().cloned();
             let pops = top.iter().map(|top| (top.id, crate::stack::HandOver::default())).collect();

@@ -26,6 +26,7 @@ mod running;
 mod safe;
 mod teardown;
 
+pub use crate::stack::answer::WAY_OUT;
 pub use crate::stack::{Requester, Scope, Why};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{Progress, ProgressSink, StepEnd, StepName};

@@ -54,12 +54,17 @@ impl Engine {
         Ok(())
     }
 
-    /// The system as it should be: the model, with what is broken as it was meant.
+    /// The system as it should be: the model, with what is broken as it was meant, and without what is partial.
     fn wanted(&self) -> System {
         let mut wanted = self.world.system.clone();
         for broken in &self.world.broken {
             let components: Vec<ComponentName> = broken.components.iter().copied().collect();
             let _ = wanted.adopt(&components, &broken.expected);
+        }
+        for frame in self.world.stack.frames().iter().rev().filter(|frame| frame.partial) {
+            if let crate::stack::Inverse::List(items) = &frame.inverse {
+                items.iter().for_each(|item| drop(step::apply(&item.step, &mut wanted)));
+            }
         }
         wanted
     }
@@ -95,6 +100,9 @@ impl Engine {
                     self.world.broken.clear();
                     self.confirming.clear();
                     self.changed();
+                    if let Some(progress) = &self.progress {
+                        progress(&Progress::Recovered);
+                    }
                     Ok(())
                 }
                 _ => self.world.broken.first().map_or(Ok(()), |broken| Err(broken.residual.clone())),
@@ -122,8 +130,16 @@ impl Engine {
                     self.world.stack.apply([&edits], &[]);
                     self.changed();
                 }
-                Some(PartEnd::Failed(reason)) => return Err(Arc::new(Residual::of(reason))),
-                Some(PartEnd::Broken(part)) => return Err(part.residual),
+                Some(PartEnd::Failed(reason)) => {
+                    let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
+                    return Err(Arc::new(Residual { cause: reason.clone(), ..left.unwrap_or(Residual::of(reason)) }));
+                }
+                Some(PartEnd::Broken(part)) => {
+                    let residual = part.residual.clone();
+                    let ask = crate::model::Ask::UndoOf(frame.configuration);
+                    self.left_broken(&Request::new(crate::model::RequestId(0), ask, frame.requester), *part);
+                    return Err(residual);
+                }
                 Some(PartEnd::Cancelled | PartEnd::Anew) => return Err(Arc::new(Residual::of(Reason::Busy))),
             }
         }
@@ -213,10 +229,7 @@ impl Engine {
         self.note_quarantine();
         let mut at = 0;
         while at < self.world.broken.len() {
-            if self.world.broken[at].mendable
-                && self.world.broken[at].residual.unsettled.is_empty()
-                && self.repair(at, false).is_ok()
-            {
+            if self.world.broken[at].mendable && self.repair(at, false).is_ok() {
                 if let Some(progress) = &self.progress {
                     progress(&Progress::Recovered);
                 }

@@ -65,8 +65,8 @@ impl Engine {
                 continue;
             }
             if group.commits {
-                self.world.stack.make_floor();
-                self.confirming.clear();
+                self.world.stack.make_permanent(requests[0].requester);
+                self.forget_confirmations();
                 self.changed();
             }
             let Some(planned) = group.planned.take() else {
@@ -217,8 +217,9 @@ impl Engine {
                 Some(of)
             }
             (Some(frame), None) => Some(self.push_partial(frame)),
-            (None, _) => None,
+            (None, of) => of,
         };
+        self.partials.extend(frame.map(|frame| (frame, residual.clone())));
         if !residual.is_settled() {
             let components = residual.components().collect();
             let culprit = match request.ask {

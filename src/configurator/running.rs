@@ -29,7 +29,7 @@ pub(super) enum Purpose {
     /// Requests of a batch under way on the desk, by its number.
     Requests(u32, Group),
     /// A safe configuration: its request, the frame it leaves, and what it touches.
-    Safe(Box<(Request, Option<Frame>, Touched)>),
+    Safe(Box<(Request, Frame, Touched)>),
     /// Something of the configurator's own, waited for by whoever began it.
     Own,
 }
@@ -62,6 +62,11 @@ impl Running {
         flights.chain(self.read.map(|(_, until)| until)).min().unwrap_or(Time::NEVER)
     }
 
+    /// No further one of the brief steps that are out is to be begun.
+    pub fn stop_brief(&self) {
+        self.flights.iter().for_each(|flight| flight.stop.store(true, Ordering::Release));
+    }
+
     fn serves(&self, step: u32) -> RequestId {
         let part = self.machine.part_of_step(step);
         self.serves.get(part).or(self.serves.last()).copied().unwrap_or(RequestId(0))
@@ -90,7 +95,7 @@ impl Engine {
         let mut inline = 0;
         loop {
             if !running.is_safe() && self.urgent() {
-                self.stop_brief(running);
+                running.stop_brief();
                 // Steps that are begun one by one in this thread stop here; what is out is told by whoever is urgent.
                 if inline > 0 {
                     return true;
@@ -181,11 +186,6 @@ impl Engine {
             flight.stop.store(true, Ordering::Release);
             self.platform.cancel(&running.machine.step(step).step);
         }
-    }
-
-    /// No further one of the brief steps that are out is to be begun.
-    fn stop_brief(&self, running: &Running) {
-        running.flights.iter().for_each(|flight| flight.stop.store(true, Ordering::Release));
     }
 
     /// Takes in the calls that are back, and those given up. True: there were some.

@@ -6,10 +6,9 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, Change, ConfigId, Configuration, Target, Verdict};
-use crate::plan::{PlannedStep, plan_on};
-use crate::stack::{Edits, Frame, Op, Planned, transaction};
-use crate::system::{Overlay, System, step};
+use crate::model::{Ask, ConfigId, Target, Verdict};
+use crate::stack::{Edits, Effort, Frame, effort};
+use crate::system::{System, step};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
@@ -41,22 +40,19 @@ impl Engine {
         let configurations = self.configurations.clone();
         let Some(configuration) = configurations.get(&id) else { return };
         let before = self.interrupt(id);
-        let frame = match before {
-            // The frame as it would be if what is interrupted had never been.
-            Some(before) => self.plan_safe(configuration, request, &before).0,
-            None => None,
-        };
-        let system = self.world.system.clone();
-        let (own, planned, troubles) = self.plan_whole(configuration, request, &system);
-        let frame = frame.or(own);
+        let at = self.clock.now();
+        let plan = |system: &System| effort(system, &self.world.stack, configuration, &request, at, &self.context);
+        let Effort { planned, frame, troubles } = plan(&self.world.system);
+        // The frame as it would be if what is interrupted had never been.
+        let frame = before.map_or(frame, |before| plan(&before).frame);
         let mut touched = Touched::default();
-        for entry in configuration.pre.iter().chain(&configuration.post) {
+        for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
                 touched.add_state(component);
             }
         }
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
-        for planned in frame.iter().flat_map(|frame| frame.steps()) {
+        for planned in frame.steps() {
             touched.add(&planned.step);
         }
         self.troubles.push((request.id, troubles));
@@ -94,103 +90,15 @@ impl Engine {
                 }
             }
             // Calls that are out are told first.
+            self.running[at].stop_brief();
             self.advance(at);
         }
         before
     }
 
-    /// A safe configuration planned as a frame on a system, if it can be.
-    fn plan_safe(
-        &self,
-        configuration: &Configuration,
-        request: Request,
-        system: &System,
-    ) -> (Option<Frame>, Option<Planned>) {
-        let Request { requester, scope, .. } = request;
-        let op = Op::Push { configuration, requester, at: self.clock.now(), scope };
-        match transaction(system, &self.world.stack, &[op], &self.context) {
-            Ok(planned) => {
-                let frame = planned.parts[0].edits.push.as_deref().cloned();
-                (frame, Some(planned))
-            }
-            Err(_) => (None, None),
-        }
-    }
-
-    /// A safe configuration as far as it can be planned, whole or piece by piece, with why pieces cannot.
-    pub(super) fn plan_whole(
-        &self,
-        configuration: &Configuration,
-        request: Request,
-        system: &System,
-    ) -> (Option<Frame>, Planned, Vec<Reason>) {
-        if let (frame, Some(planned)) = self.plan_safe(configuration, request, system) {
-            return (frame, planned, Vec::new());
-        }
-        let mut view = Overlay::new(system);
-        let mut steps: Vec<PlannedStep> = Vec::new();
-        let mut troubles = Vec::new();
-        let (mut footprint, mut saved) = (crate::plan::footprint::Footprint::default(), Vec::new());
-        for piece in pieces(configuration) {
-            let mut trial = view.clone();
-            match plan_on(&mut trial, &piece, &self.context) {
-                Ok(plan) => {
-                    view = trial;
-                    let base = steps.len() as u32;
-                    let wave = steps.last().map_or(0, |step| step.wave + 1);
-                    footprint.touches.extend(plan.footprint.touches);
-                    saved.extend(plan.saved.into_iter().map(|mut value| {
-                        value.at += base;
-                        value
-                    }));
-                    for mut planned in plan.steps {
-                        planned.id += base;
-                        planned.wave += wave;
-                        planned.after.iter_mut().for_each(|id| *id += base);
-                        steps.push(planned);
-                    }
-                }
-                Err(refusal) => troubles.push(Reason::Refused(refusal.findings)),
-            }
-        }
-        let frame = Frame {
-            id: crate::stack::FrameId(u64::MAX),
-            configuration: configuration.id,
-            group: configuration.group,
-            requester: request.requester,
-            at: self.clock.now(),
-            inverse: crate::stack::Inverse::Steps(steps.clone()),
-            footprint,
-            saved,
-            floor: crate::plan::irreversible(&steps).map(str::to_owned),
-            parts: std::collections::BTreeSet::new(),
-            acts: Vec::new(),
-            scope: request.scope,
-            partial: !troubles.is_empty(),
-            safe: true,
-        };
-        let part = crate::stack::Part {
-            range: 0..steps.len() as u32,
-            edits: Edits::default(),
-            pushes: Some(configuration.id),
-            on_failure: configuration.on_failure,
-            frame: Some(std::sync::Arc::new(frame.clone())),
-        };
-        let planned = Planned {
-            steps,
-            of: Vec::new(),
-            whole: Vec::new(),
-            parts: vec![part],
-            revision: system.revision(),
-            warnings: Vec::new(),
-            popped: Vec::new(),
-        };
-        (Some(frame), planned, troubles)
-    }
-
     /// A safe configuration has been applied as far as it goes: its frame is pushed, it is answered, and what it interrupted
     /// goes back.
-    pub(super) fn safe_ended(&mut self, safe: (Request, Option<Frame>, Touched), machine: Transaction) {
+    pub(super) fn safe_ended(&mut self, safe: (Request, Frame, Touched), machine: Transaction) {
         let (request, frame, touched) = safe;
         let edits = machine.planned().parts[0].edits.pops.clone();
         let end = machine.end();
@@ -203,10 +111,10 @@ impl Engine {
         self.world.stack.apply([&Edits { pops: edits, push: None }], &[]);
         let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
         let frame = match (&broken, interrupted) {
-            (Some(part), false) => part.frame.clone().map(|part| Frame { partial: true, ..part }),
-            _ => frame.map(|frame| Frame { partial: frame.partial || broken.is_some(), ..frame }),
+            (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
+            _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
         };
-        let pushed = frame.map(|frame| self.world.stack.push(Frame { safe: true, ..frame }));
+        let pushed = self.world.stack.push(Frame { safe: true, ..frame });
         let (verdict, reason) = match broken {
             None if troubles.is_empty() => (Verdict::Ok, None),
             None => {
@@ -218,17 +126,15 @@ impl Engine {
                 let part = crate::transaction::BrokenPart { frame: None, instead: None, ..*part };
                 self.left_broken(&request, part);
                 if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
-                    last.frame = pushed;
+                    last.frame = Some(pushed);
                 }
                 (Verdict::Broken, Some(Reason::Broken(residual)))
             }
         };
         self.forget_confirmations();
         self.changed();
-        if verdict == Verdict::Ok
-            && let Some(frame) = pushed
-        {
-            self.await_confirmation(request, frame);
+        if verdict == Verdict::Ok {
+            self.await_confirmation(request, pushed);
         }
         self.answer(request, verdict, reason);
         self.release(touched);
@@ -245,14 +151,4 @@ impl Engine {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
         }
     }
-}
-
-/// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.
-fn pieces(whole: &Configuration) -> Vec<Configuration> {
-    let empty = || Configuration::new(whole.id);
-    let pre = whole.pre.iter().map(|entry| Configuration { pre: vec![*entry], ..empty() });
-    let changes =
-        whole.changes.iter().map(|change: &Change| Configuration { changes: vec![change.clone()], ..empty() });
-    let post = whole.post.iter().map(|entry| Configuration { post: vec![*entry], ..empty() });
-    pre.chain(changes).chain(post).collect()
 }

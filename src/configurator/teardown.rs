@@ -6,7 +6,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlannedStep, Stage};
-use crate::stack::{Broken, Op, Part, Planned, Requester, Residual, Why, transaction};
+use crate::stack::{Broken, Effort, Op, Part, Planned, Requester, Residual, Why, effort, transaction};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Transaction};
@@ -44,7 +44,7 @@ impl Engine {
 
     fn take_down(&mut self, forced: bool, deadline: Time) -> TakenDown {
         let mut down = TakenDown::default();
-        self.refuse_waiting();
+        self.glance();
         self.confirming.clear();
         if forced {
             // Not after what is out has come in: now.
@@ -52,6 +52,7 @@ impl Engine {
             self.apply_all_safe(&mut down);
         }
         self.end_running(forced);
+        self.refuse_waiting();
         if !forced && self.world.broken.is_empty() {
             self.pop_all(&mut down, deadline);
         }
@@ -155,8 +156,9 @@ impl Engine {
         for id in &safe {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
-            let system = self.world.system.clone();
-            let (_, planned, troubles) = self.plan_whole(configuration, request, &system);
+            let at = self.clock.now();
+            let Effort { planned, troubles, .. } =
+                effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.context);
             down.troubles.extend(troubles);
             let machine = Transaction::new(planned, self.effort(Time::NEVER));
             let done = self.carry_out(machine);
@@ -279,6 +281,8 @@ fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
             step,
             reversibility,
             undo,
+            moves: false,
+            undo_moves: false,
             origin: Origin::NONE,
         });
     }

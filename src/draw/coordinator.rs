@@ -19,12 +19,39 @@ const ANY: &str = "any event";
 /// so). Transitions with the same ends are one edge with the events of all; one without events says *any event*, but for the
 /// only way between a connector and a node. A priority number other than 0 stands in parentheses.
 pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Picture {
-    let title = if chart.is_pure() { title.to_owned() } else { format!("{title} (functions are not verified)") };
+    let title = if chart.is_pure() { title.to_owned() } else { format!("{title} ({UNVERIFIED})") };
     let mut picture = Picture::new(Subject::Statechart, Direction::Down, &title);
-    let mut drawing = Drawing { picture: &mut picture, index: BTreeMap::new(), active };
-    drawing.state_content(&chart.root, ROOT, None);
-    drawing.transitions(&chart.root, ROOT);
+    draw(&mut picture, chart, active, "", None);
     picture
+}
+
+/// What stands beside the name of a coordinator with functions.
+const UNVERIFIED: &str = "functions are not verified";
+
+/// Several coordinators side by side, each in a box with its name: name, statechart and active states of each.
+pub fn coordinators(title: &str, all: &[(&str, &Statechart, Vec<String>)]) -> Picture {
+    let mut picture = Picture::new(Subject::Statechart, Direction::Down, title);
+    for (name, chart, active) in all {
+        let mut group = Node::new(*name, *name);
+        group.shape = Shape::Group;
+        if !chart.is_pure() {
+            group.lines.push(UNVERIFIED.to_owned());
+        }
+        let group = picture.add(group);
+        draw(&mut picture, chart, active, &format!("{name}:"), Some(group));
+    }
+    picture
+}
+
+/// One coordinator inside `parent`; the names of its nodes begin with `prefix`.
+fn draw(picture: &mut Picture, chart: &Statechart, active: &[String], prefix: &str, parent: Option<usize>) {
+    let first = picture.edges.len();
+    let mut drawing = Drawing { picture, index: BTreeMap::new(), active, prefix };
+    drawing.state_content(&chart.root, ROOT, parent);
+    drawing.transitions(&chart.root, ROOT);
+    for edge in &mut picture.edges[first..] {
+        edge.label = fold(&edge.label);
+    }
 }
 
 struct Drawing<'a> {
@@ -32,6 +59,7 @@ struct Drawing<'a> {
     /// Nodes by their full name; the root has none.
     index: BTreeMap<String, usize>,
     active: &'a [String],
+    prefix: &'a str,
 }
 
 impl Drawing<'_> {
@@ -46,14 +74,14 @@ impl Drawing<'_> {
             match child {
                 Child::Connector(c) if c.name.as_str() == INITIAL => self.dot(&name, parent),
                 Child::Connector(c) => {
-                    let mut node = Node::new(&name, c.name.as_str());
+                    let mut node = Node::new(self.id(&name), c.name.as_str());
                     node.shape = Shape::Connector;
                     node.parent = parent;
                     let at = self.picture.add(node);
                     self.index.insert(name, at);
                 }
                 Child::State(inner) => {
-                    let mut node = Node::new(&name, inner.name.as_str());
+                    let mut node = Node::new(self.id(&name), inner.name.as_str());
                     node.parent = parent;
                     node.shape = if inner.children.is_empty() && inner.transitions.is_empty() {
                         Shape::Box
@@ -72,8 +100,13 @@ impl Drawing<'_> {
         }
     }
 
+    /// The name of a node among those of all coordinators.
+    fn id(&self, fqn: &str) -> String {
+        format!("{}{fqn}", self.prefix)
+    }
+
     fn dot(&mut self, name: &str, parent: Option<usize>) {
-        let mut node = Node::new(name, INITIAL);
+        let mut node = Node::new(self.id(name), INITIAL);
         node.shape = Shape::Dot;
         node.parent = parent;
         let at = self.picture.add(node);
@@ -103,11 +136,6 @@ impl Drawing<'_> {
         for child in &state.children {
             if let Child::State(inner) = child {
                 self.transitions(inner, &format!("{fqn}.{}", inner.name));
-            }
-        }
-        if fqn == ROOT {
-            for edge in &mut self.picture.edges {
-                edge.label = fold(&edge.label);
             }
         }
     }

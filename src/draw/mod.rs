@@ -14,7 +14,7 @@ mod svg;
 mod text;
 
 pub use components::components;
-pub use coordinator::coordinator;
+pub use coordinator::{coordinator, coordinators};
 pub use exchange::{coordinator_json, coordinator_plantuml};
 pub use picture::Picture;
 pub use plan::plan;

@@ -64,7 +64,8 @@ fn lanes(picture: &mut Picture, group: usize, steps: &[PlannedStep]) {
         if step.reversibility == Reversibility::Irreversible {
             node.lines.push("cannot be undone".to_owned());
         } else if !undo.is_empty() {
-            node.lines.push(short(&format!("undo: {}", undo.join("; ")), 54));
+            let moving = if step.undo_moves { " (moves)" } else { "" };
+            node.lines.push(short(&format!("undo: {}", undo.join("; ")), 54 - moving.len()) + moving);
         }
         nodes.insert(step.id, picture.add(node));
         for after in &step.after {

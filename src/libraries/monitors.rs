@@ -7,7 +7,7 @@
 use crate::model::monitor::{Counter, MONITORS_TYPE, Part};
 use crate::model::{Monitor, RunState};
 use crate::monitor::{Bank, Input, Sample, Troubles, state_value};
-use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Wanted};
+use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Observed, Out, Probes, Prop};
 use std::sync::Arc;
 
 /// The library with the component type that evaluates `monitors`.
@@ -26,7 +26,7 @@ pub fn added_to(libraries: Libraries, monitors: &[Monitor]) -> Libraries {
 struct Plan {
     monitors: Vec<Monitor>,
     bank: Bank,
-    wanted: Arc<[Wanted]>,
+    wanted: Arc<[Observed]>,
     /// The inputs of the bank that each probe serves.
     served: Vec<Vec<(usize, What)>>,
 }
@@ -43,14 +43,14 @@ enum What {
 impl Plan {
     fn new(monitors: &[Monitor]) -> Self {
         let bank = Bank::new(monitors);
-        let mut wanted: Vec<Wanted> = Vec::new();
+        let mut wanted: Vec<Observed> = Vec::new();
         let mut served: Vec<Vec<(usize, What)>> = Vec::new();
         for (i, input) in bank.inputs().iter().enumerate() {
             let (of, what) = match input {
-                Input::Port(signal) => (Wanted::Port(signal.member), What::Number(signal.path.clone())),
-                Input::State(component) => (Wanted::Component(*component), What::State),
-                Input::Faulted(component) => (Wanted::Component(*component), What::Faulted),
-                Input::Activity { activity, counter } => (Wanted::Activity(*activity), What::Counter(*counter)),
+                Input::Port(signal) => (Observed::Port(signal.member), What::Number(signal.path.clone())),
+                Input::State(component) => (Observed::Component(*component), What::State),
+                Input::Faulted(component) => (Observed::Component(*component), What::Faulted),
+                Input::Activity { activity, counter } => (Observed::Activity(*activity), What::Counter(*counter)),
             };
             let place = wanted.iter().position(|w| *w == of).unwrap_or_else(|| {
                 wanted.push(of);

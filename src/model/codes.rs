@@ -332,10 +332,12 @@ codes! {
         "Past its bound the stack squashes its oldest frames into one, but frames of states that are active are never squashed, and here no two others lie side by side. Undo or commit something, or raise `limits: { stack: … }` in the deployment.";
     STACK_SQUASHED = "stack::squashed", "the frame was squashed together with others",
         "The stack is bounded: its oldest frames were squashed into one, which can be undone as one only. Undo down to it, or raise `limits: { stack: … }` in the deployment so that more frames stay single.";
+    STACK_HELD = "stack::held", "a coordinator's frame is in force",
+        "`davit commit` makes the operator's own frames permanent. While a coordinator has a frame in force this is refused: its undo may write over what was made permanent, or need what the operator changed. Commit when the coordinator has undone it, or say `davit commit --force`: the operator's frames are given up and the coordinator's stay, to be undone as far as that goes.";
     STACK_NO_FRAME = "stack::no_frame", "there is no such frame",
         "The frame that is to be undone is not on the stack (any more): it was undone, replaced by another of its group, or never pushed. `davit stack` shows the frames.";
     STACK_DRIFTED = "stack::drifted", "the system is not as the frame left it",
-        "An inverse of this frame meets a false precondition: the system changed by itself since the frame was pushed (a component failed, or somebody else changed it). `davit drift` shows the difference; repair it or use `davit recover`.";
+        "An inverse of this frame meets a false precondition: the system changed by itself since the frame was pushed (a component failed, or somebody else changed it). `davit status` shows the components as they are, `davit drift` whether they differ from what is known of them. Mend the component and ask again, or apply a configuration that leads to the wanted state.";
     // ---- coordinators (statecharts) --------------------------------------------------------------------------------
     CHART_NO_INITIAL = "chart::no_initial",
         "The chart does not say where it begins",
@@ -592,12 +594,16 @@ codes! {
          without a name lists all of them; types of a deployment are listed with `davit types FILE`.";
     CLI_UNKNOWN_CONFIGURATION = "cli::unknown_configuration", "the deployment has no such configuration",
         "`davit plan FILE ID…` plans configurations of the deployment, one after the other. There is none of this name in \
-         the files that the deployment lists under `configurations`. Correct the name; without names, all are planned.";
+         the files that the deployment lists under `configurations`. Correct the name; without names, the bring-up is planned.";
     CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
          a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
+    CLI_WHICH_WAY = "cli::which_way", "it is not said how to recover",
+        "`davit recover` leads a broken deployment out, and there are two ways: `--back` undoes what remains, to the system \
+         before the interrupted application; `--accept` takes what is there as the state and gives the stack up. Which is \
+         right is for a person to decide. Say one of them; `davit drift` shows what differs.";
     CLI_FORMAT_OF_COORDINATORS = "cli::format_of_coordinators", "the format is one of coordinators only",
         "PlantUML, SCXML and rFSM's JSON have a form for statecharts and none for components or plans. Ask for `--what coordinator`, or for a picture.";
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",

@@ -3,7 +3,7 @@
 use super::finding::Origin;
 use super::monitor::Condition;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
-use super::run_state::RunState;
+use super::state_list::StateList;
 use super::value::Value;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
@@ -17,11 +17,11 @@ pub struct Configuration {
     /// Its name.
     pub id: ConfigId,
     /// Run states to bring components to first, in this order.
-    pub pre: Vec<StateEntry>,
+    pub pre: StateList,
     /// The set of changes. Kept in written order for messages; the order means nothing.
     pub changes: Vec<Change>,
     /// Run states to bring components to last, in this order.
-    pub post: Vec<StateEntry>,
+    pub post: StateList,
     /// For the whole application; none: each step's own limit holds.
     pub timeout: Option<Duration>,
     /// Alternatives: applying one of a group replaces the group's frame.
@@ -47,9 +47,9 @@ impl Configuration {
     pub fn new(id: ConfigId) -> Self {
         Self {
             id,
-            pre: Vec::new(),
+            pre: StateList::default(),
             changes: Vec::new(),
-            post: Vec::new(),
+            post: StateList::default(),
             timeout: None,
             group: None,
             safe: false,
@@ -83,35 +83,6 @@ pub struct Confirm {
     pub event: EventName,
     /// How long to wait for it.
     pub within: Duration,
-}
-
-/// One entry of a pre- or post-state list.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StateEntry {
-    /// Whom it concerns.
-    pub target: Target,
-    /// The state demanded; never `faulted`.
-    pub state: RunState,
-    /// Where it was written.
-    pub origin: Origin,
-}
-
-/// Whom an entry of a state list concerns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Target {
-    /// One component.
-    Component(ComponentName),
-    /// `_default`: every component of the (sub)system that the same list does not name.
-    Default,
-}
-
-impl fmt::Display for Target {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Component(name) => write!(f, "{name}"),
-            Self::Default => f.write_str("_default"),
-        }
-    }
 }
 
 /// One change.

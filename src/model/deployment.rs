@@ -120,15 +120,17 @@ pub struct StepFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultKind {
-    /// It is not done, and that is answered.
+    /// It is not done, and that is answered at once.
     Fail,
-    /// Its call never comes back.
+    /// Its call never comes back, also when it is given up: nothing is answered by the deadline, and the component is in
+    /// quarantine for good.
     Hang,
-    /// Its call comes back after the deadline; what it had done is taken back then.
+    /// The same, but its call comes back [`FAULT_LATE`](crate::limits::FAULT_LATE) after the deadline; what it had done is
+    /// taken back then, and the component leaves quarantine.
     Late,
-    /// It is done, and nothing is answered.
+    /// The request is lost: it is not done, and nothing is answered by the deadline. The component is well.
     Lost,
-    /// It is not done, and the answer says that it was.
+    /// It is not done, and the answer says at once that it was.
     Lie,
 }
 

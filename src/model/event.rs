@@ -15,12 +15,15 @@ pub enum Ask {
     Apply(ConfigId),
     /// `ID.undo`: undo the newest frame of it by this requester.
     UndoOf(ConfigId),
-    /// `undo`: pop the top.
+    /// `undo`: undo the requester's newest frame.
     Undo,
     /// Pop until `n` frames are left (an operator's).
     UndoTo(usize),
-    /// Make the present state the floor (an operator's).
-    Commit,
+    /// Make the operator's own frames permanent.
+    Commit {
+        /// Also while a coordinator's frame is in force.
+        force: bool,
+    },
 }
 
 impl fmt::Display for Ask {
@@ -30,7 +33,7 @@ impl fmt::Display for Ask {
             Self::UndoOf(id) => write!(f, "{id}.undo"),
             Self::Undo => f.write_str("undo"),
             Self::UndoTo(n) => write!(f, "undo --to {n}"),
-            Self::Commit => f.write_str("commit"),
+            Self::Commit { .. } => f.write_str("commit"),
         }
     }
 }
@@ -92,7 +95,7 @@ impl Ask {
         use Verdict::{Broken, Cancelled, Failed, Lost, Ok, Reverted, UndoBroken, UndoFailed, Undone};
         match self {
             Self::Apply(_) => &[Ok, Failed, Broken, Cancelled, Reverted, Lost],
-            Self::Commit => &[Ok, Failed],
+            Self::Commit { .. } => &[Ok, Failed],
             _ => &[Undone, UndoFailed, UndoBroken],
         }
     }
@@ -136,7 +139,7 @@ impl Verdict {
         let subject = match ask {
             Ask::Apply(id) | Ask::UndoOf(id) => id.as_str(),
             Ask::Undo | Ask::UndoTo(_) => "undo",
-            Ask::Commit => "commit",
+            Ask::Commit { .. } => "commit",
         };
         let plain = matches!(ask, Ask::Undo | Ask::UndoTo(_));
         let suffix = match self {

@@ -2,6 +2,7 @@
 
 pub mod codes;
 pub mod component_type;
+mod condition_walk;
 pub mod configuration;
 pub mod deployment;
 pub mod event;
@@ -14,6 +15,7 @@ pub mod outline;
 pub mod program;
 pub mod run_state;
 pub mod snapshot;
+pub mod state_list;
 pub mod statechart;
 pub mod step;
 pub mod value;
@@ -21,7 +23,7 @@ pub mod value;
 pub use component_type::{
     Catalogue, ComponentType, Direction, Effect, Irreversible, Moves, OperationType, PortType, PropertyType, Tunable,
 };
-pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy, StateEntry, Target};
+pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy};
 pub use deployment::{
     Activity, BringUp, Coordinator, Deployment, DeploymentLimits, FaultKind, OperatorMay, SimulatedReaction, StepFault,
     TakeDown, Written,
@@ -32,8 +34,9 @@ pub use monitor::Monitor;
 pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
 pub use outcome::{Cause, Execution, Outcome};
 pub use program::{Openings, Program};
-pub use run_state::{RunState, Transition};
+pub use run_state::{RunState, Transition, Wanted};
 pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};
+pub use state_list::{DefaultTwice, StateEntry, StateList, Target};
 pub use statechart::Statechart;
 pub use step::Step;
 pub use value::{Value, ValueType};

@@ -17,6 +17,33 @@ pub enum RunState {
     Faulted,
 }
 
+/// A run state that can be demanded: nobody brings a component to `faulted`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Wanted {
+    /// Created, or cleaned up.
+    Unconfigured,
+    /// Configured, not updated.
+    Stopped,
+    /// Updated by its activity.
+    Running,
+}
+
+impl From<Wanted> for RunState {
+    fn from(wanted: Wanted) -> Self {
+        match wanted {
+            Wanted::Unconfigured => Self::Unconfigured,
+            Wanted::Stopped => Self::Stopped,
+            Wanted::Running => Self::Running,
+        }
+    }
+}
+
+impl fmt::Display for Wanted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        RunState::from(*self).fmt(f)
+    }
+}
+
 /// A move between run states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -34,10 +61,15 @@ pub enum Transition {
 impl Transition {
     /// The state it leads to.
     pub fn target(self) -> RunState {
+        self.wanted().into()
+    }
+
+    /// The same, as one that can be demanded.
+    pub fn wanted(self) -> Wanted {
         match self {
-            Self::Configure | Self::Stop => RunState::Stopped,
-            Self::Start => RunState::Running,
-            Self::Cleanup => RunState::Unconfigured,
+            Self::Configure | Self::Stop => Wanted::Stopped,
+            Self::Start => Wanted::Running,
+            Self::Cleanup => Wanted::Unconfigured,
         }
     }
 
@@ -73,20 +105,30 @@ impl Transition {
 }
 
 impl RunState {
-    /// The legal path from `self` to `target`, empty when already there; `target` is never `faulted`.
-    pub fn path_to(self, target: Self) -> &'static [Transition] {
+    /// The legal path from `self` to `target`, empty when already there.
+    pub fn path_to(self, target: Wanted) -> &'static [Transition] {
         use RunState::{Faulted, Running, Stopped, Unconfigured};
         use Transition::{Cleanup, Configure, Start, Stop};
         match (self, target) {
-            (Unconfigured, Stopped) => &[Configure],
-            (Unconfigured, Running) => &[Configure, Start],
-            (Stopped, Unconfigured) | (Faulted, Unconfigured) => &[Cleanup],
-            (Stopped, Running) => &[Start],
-            (Running, Stopped) => &[Stop],
-            (Running, Unconfigured) => &[Stop, Cleanup],
-            (Faulted, Stopped) => &[Cleanup, Configure],
-            (Faulted, Running) => &[Cleanup, Configure, Start],
-            (Unconfigured, Unconfigured) | (Stopped, Stopped) | (Running, Running) | (_, Faulted) => &[],
+            (Unconfigured, Wanted::Stopped) => &[Configure],
+            (Unconfigured, Wanted::Running) => &[Configure, Start],
+            (Stopped | Faulted, Wanted::Unconfigured) => &[Cleanup],
+            (Stopped, Wanted::Running) => &[Start],
+            (Running, Wanted::Stopped) => &[Stop],
+            (Running, Wanted::Unconfigured) => &[Stop, Cleanup],
+            (Faulted, Wanted::Stopped) => &[Cleanup, Configure],
+            (Faulted, Wanted::Running) => &[Cleanup, Configure, Start],
+            (Unconfigured, Wanted::Unconfigured) | (Stopped, Wanted::Stopped) | (Running, Wanted::Running) => &[],
+        }
+    }
+
+    /// The same as a state that can be demanded; none of `faulted`.
+    pub fn wanted(self) -> Option<Wanted> {
+        match self {
+            Self::Unconfigured => Some(Wanted::Unconfigured),
+            Self::Stopped => Some(Wanted::Stopped),
+            Self::Running => Some(Wanted::Running),
+            Self::Faulted => None,
         }
     }
 
@@ -147,13 +189,14 @@ mod tests {
     fn every_path_is_legal_and_arrives() {
         use RunState::{Faulted, Running, Stopped, Unconfigured};
         for from in [Unconfigured, Stopped, Running, Faulted] {
-            for to in [Unconfigured, Stopped, Running] {
+            for to in [Wanted::Unconfigured, Wanted::Stopped, Wanted::Running] {
                 let mut state = from;
                 for t in from.path_to(to) {
                     assert!(t.allowed_in(state), "{from}→{to}: {t} in {state}");
                     state = t.target();
                 }
-                assert_eq!(state, to);
+                assert_eq!(state, to.into());
+                assert_eq!(state.wanted(), Some(to));
             }
         }
     }

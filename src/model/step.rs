@@ -4,6 +4,8 @@ use super::configuration::{Call, Policy};
 use super::names::{ComponentName, Ident, MemberRef, TypeName};
 use super::run_state::Transition;
 use super::value::Value;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use std::fmt;
 
 /// One primitive, resolved: every value is of the type its slot has, every property of a created component has a value.
@@ -110,4 +112,46 @@ impl fmt::Display for Step {
             Self::Operation(call) => write!(f, "operation_call {call}"),
         }
     }
+}
+
+/// `do`, `target` and what else belongs to it: `{"do": "property_set", "target": "B.k", "value": 2.0}`.
+impl Serialize for Step {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        let mut view = s.serialize_map(None)?;
+        view.serialize_entry("do", self.verb())?;
+        match self {
+            Self::State { component, .. } | Self::Destroy { component } => view.serialize_entry("target", component)?,
+            Self::Create { component, ty, activity, properties } => {
+                view.serialize_entry("target", component)?;
+                view.serialize_entry("type", ty)?;
+                view.serialize_entry("activity", activity)?;
+                view.serialize_entry("value", properties)?;
+            }
+            Self::Connect { from, to, policy } => {
+                ends(&mut view, from, to)?;
+                view.serialize_entry("policy", policy)?;
+            }
+            Self::Disconnect { from, to } => ends(&mut view, from, to)?,
+            Self::PropertySet { property, value } => {
+                view.serialize_entry("target", property)?;
+                view.serialize_entry("value", value)?;
+            }
+            Self::PortWrite { port, value } => {
+                view.serialize_entry("target", port)?;
+                view.serialize_entry("value", value)?;
+            }
+            Self::Operation(call) => {
+                view.serialize_entry("target", &call.operation)?;
+                view.serialize_entry("args", &call.args)?;
+                view.serialize_entry("value", &call.args)?;
+            }
+        }
+        view.end()
+    }
+}
+
+fn ends<M: SerializeMap>(view: &mut M, from: &MemberRef, to: &MemberRef) -> Result<(), M::Error> {
+    view.serialize_entry("target", to)?;
+    view.serialize_entry("from", from)?;
+    view.serialize_entry("to", to)
 }

@@ -3,8 +3,8 @@
 use super::footprint::{Footprint, Saved};
 use super::{Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order};
 use crate::model::codes;
-use crate::model::{Call, ComponentName, Configuration, Finding, Findings, MemberRef, Origin, Step};
-use crate::system::{Overlay, Reversibility, Undo, View, Violation, step};
+use crate::model::{Call, ComponentName, Configuration, Finding, Findings, Origin, Step};
+use crate::system::{Overlay, Reversibility, Undo, Violation, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
@@ -75,7 +75,7 @@ impl Builder<'_, '_, '_> {
             found.extend(step::precondition(&Step::Operation(undo.clone()), self.view));
         }
         if !found.is_empty() {
-            self.refuse(&what, found, origin);
+            self.refuse(found, origin);
             return None;
         }
         Some(self.allowed(what, undo, origin, after))
@@ -85,6 +85,7 @@ impl Builder<'_, '_, '_> {
     pub(super) fn allowed(&mut self, what: Step, undo: Option<&Call>, origin: Origin, after: &[StepId]) -> StepId {
         let inverse = step::inverse(&what, undo, self.view);
         self.record(&what, undo, &inverse, true);
+        let (moves, undo_moves) = (step::moves(&what, self.view), step::undo_moves(&inverse, self.view));
         step::effect(&what, self.view);
         let id = self.next();
         self.steps.push(PlannedStep {
@@ -94,54 +95,21 @@ impl Builder<'_, '_, '_> {
             after: SmallVec::from_slice(after),
             reversibility: step::reversibility(&what, &inverse),
             undo: inverse,
+            moves,
+            undo_moves,
             step: what,
             origin,
         });
         id
     }
 
-    pub(super) fn refuse(&mut self, what: &Step, found: Vec<Violation>, origin: Origin) {
+    pub(super) fn refuse(&mut self, found: Vec<Violation>, origin: Origin) {
         for violation in found {
-            if let Violation::UnknownComponent(name) = &violation
-                && self.blamed.contains(name)
-            {
-                continue;
+            if !matches!(&violation, Violation::UnknownComponent(name) if self.blamed.contains(name)) {
+                let finding = violation.finding(self.view).at(origin);
+                self.findings.push(finding);
             }
-            let mut finding = Finding::error(violation.code(), violation.to_string()).at(origin);
-            finding.help = violation.help(self.view);
-            if let Some(declared) = self.declaration(&violation, what) {
-                finding = finding.also(declared, "declared here");
-            }
-            self.findings.push(finding);
         }
-    }
-
-    /// Where the type's member at fault was declared, if in a text.
-    fn declaration(&self, violation: &Violation, what: &Step) -> Option<Origin> {
-        let ty = |component: ComponentName| self.view.component(component).map(|n| &n.ty);
-        let port = |m: &MemberRef| ty(m.component)?.ports.get(&m.member).map(|p| p.origin);
-        let property = |m: &MemberRef| ty(m.component)?.properties.get(&m.member).map(|p| p.origin);
-        let origin = match violation {
-            Violation::UnknownPort { port: m, .. }
-            | Violation::UnknownProperty { property: m, .. }
-            | Violation::UnknownOperation { operation: m, .. } => ty(m.component).map(|t| t.origin),
-            Violation::NotOut(m)
-            | Violation::NotIn(m)
-            | Violation::NeedsBuffer(m)
-            | Violation::NotWritable { port: m, .. }
-            | Violation::PortTypes { to: m, .. }
-            | Violation::PortUnits { to: m, .. } => port(m),
-            Violation::NotTunable { property: m, .. } => property(m),
-            Violation::BadValue { slot, .. } => match what {
-                Step::PortWrite { .. } => port(slot),
-                _ => property(slot),
-            },
-            Violation::ArgumentCount { operation: m, .. } | Violation::Argument { operation: m, .. } => {
-                ty(m.component).and_then(|t| t.operations.get(&m.member)).map(|o| o.origin)
-            }
-            _ => None,
-        };
-        origin.filter(|o| o.is_some())
     }
 
     /// Records a demand that is true already: it needs no step, and counts as a write of the value that is there.

@@ -7,15 +7,11 @@
 use super::StepId;
 use super::builder::Builder;
 use super::conflicts::{Sorted, Use, clash};
-use crate::model::codes;
-use crate::model::finding::did_you_mean;
-use crate::model::{
-    Call, Change, ChangeKind, ComponentName, Finding, Ident, MemberRef, Origin, RunState, Step, TypeName, Value,
-};
+use super::meant::Meant;
+use crate::model::{Change, ChangeKind, ComponentName, MemberRef, Origin, RunState, Step, Wanted};
 use crate::system::{View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
 
 type After = SmallVec<[StepId; 4]>;
 
@@ -72,20 +68,18 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
     waits.create.reserve(classes[2].len());
     for i in classes.iter().flatten() {
         let change = &changes[*i as usize];
+        let meant = Meant::of(&change.kind, b.view, b.context);
         match &change.kind {
             ChangeKind::Disconnect { from, to } => disconnect(b, &mut waits, *from, *to, change.origin, sorted),
             ChangeKind::Destroy { component } => destroy(b, &mut waits, *component, change.origin),
-            ChangeKind::Create { component, ty, activity, properties } => {
-                create(b, &mut waits, (*component, *ty, *activity), properties, change.origin);
+            ChangeKind::Create { component, .. } => create(b, &mut waits, *component, meant, change.origin),
+            ChangeKind::PropertySet { property, .. } => {
+                set(b, &waits, *property, meant.step, change, sorted, *i as usize);
             }
-            ChangeKind::PropertySet { property, value } => {
-                set(b, &waits, *property, value, change, sorted, *i as usize);
-            }
-            ChangeKind::PortWrite { port, value } => write(b, &waits, *port, value, change, sorted.uses[*i as usize]),
-            ChangeKind::OperationCall { call, undo } => operation(b, &waits, call, undo.as_ref(), change.origin),
-            ChangeKind::Connect { from, to, policy } => {
-                let what = Step::Connect { from: *from, to: *to, policy: *policy };
-                connect(b, &waits, *from, *to, what, change, &classes[4]);
+            ChangeKind::PortWrite { port, .. } => write(b, &waits, *port, meant.step, change, sorted.uses[*i as usize]),
+            ChangeKind::OperationCall { .. } => operation(b, &waits, meant, change),
+            ChangeKind::Connect { from, to, .. } => {
+                connect(b, &waits, *from, *to, meant.step, change, &classes[4]);
             }
         }
     }
@@ -116,7 +110,7 @@ fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName,
     if let Some(state) = b.view.component(component).map(|n| n.state)
         && state != RunState::Faulted
     {
-        for transition in state.path_to(RunState::Unconfigured) {
+        for transition in state.path_to(Wanted::Unconfigured) {
             let step = Step::State { component, transition: *transition };
             let id = b.step(step, None, origin, &after);
             after = id.into_iter().collect();
@@ -129,77 +123,19 @@ fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName,
     }
 }
 
-fn create(
-    b: &mut Builder<'_, '_, '_>,
-    w: &mut Waits,
-    (component, ty, activity): (ComponentName, TypeName, Option<Ident>),
-    given: &BTreeMap<Ident, Value>,
-    origin: Origin,
-) {
-    if let Some(name) = activity
-        && !b.context.activities.contains(&name)
-    {
-        let known = b.context.activities.iter().map(|a| a.as_str());
-        let help = did_you_mean(name.as_str(), "activities", known);
-        let message = format!("`{component}` is to run in `{name}`, which is no activity of the deployment");
-        b.findings.push(Finding::error(codes::UNKNOWN_ACTIVITY, message).at(origin).help(help));
-    }
-    let Some(declared) = b.view.types().get(ty).cloned() else {
-        let what = Step::Create { component, ty, activity, properties: Vec::new() };
-        b.refuse(&what, vec![Violation::UnknownType(ty)], origin);
-        b.blamed.insert(component);
-        return;
-    };
-    let wrong_before = b.findings.len();
-    let mut properties = Vec::with_capacity(declared.properties.len());
-    let mut used = 0;
-    for (name, property) in &declared.properties {
-        let slot = component.member(*name);
-        let value = match (given.get(name), &property.default) {
-            (Some(value), _) => {
-                used += 1;
-                property.fit(value.clone()).unwrap_or_else(|error| {
-                    let message = format!("the value of `{slot}`: {error}");
-                    let finding = Finding::error(codes::BAD_VALUE, message).at(origin);
-                    b.findings.push(if property.origin.is_some() {
-                        finding.also(property.origin, "declared here")
-                    } else {
-                        finding
-                    });
-                    value.clone()
-                })
-            }
-            (None, Some(default)) => default.clone(),
-            (None, None) => {
-                let message = format!("`{component}` is created without a value for `{name}`, which has no default");
-                let finding = Finding::error(codes::MISSING_PROPERTY, message)
-                    .at(origin)
-                    .help(format!("add properties = {{ {name} = … }} to the create"));
-                b.findings.push(if property.origin.is_some() {
-                    finding.also(property.origin, "declared here")
-                } else {
-                    finding
-                });
-                Value::Bool(false)
-            }
-        };
-        properties.push(value);
-    }
-    if used < given.len() {
-        for name in given.keys().filter(|name| !declared.properties.contains_key(*name)) {
-            let known = declared.properties.keys().map(|n| n.as_str());
-            let help = did_you_mean(name.as_str(), "properties", known);
-            let message = format!("`{component}` ({ty}) has no property `{name}`");
-            b.findings.push(Finding::error(codes::UNKNOWN_PROPERTY, message).at(origin).help(help));
-        }
-    }
-    let what = Step::Create { component, ty, activity, properties };
-    if b.findings.len() > wrong_before {
-        // Told already; the component stands in the picture all the same, so that what concerns it is checked too.
-        if b.view.component(component).is_none() {
+fn create(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, meant: Meant, origin: Origin) {
+    let Meant { step: what, wrong, .. } = meant;
+    let Step::Create { ty, .. } = &what else { return };
+    let known = b.view.types().get(*ty).is_some();
+    if !wrong.is_empty() {
+        b.refuse(wrong, origin);
+        if !known {
+            b.blamed.insert(component);
+        } else if b.view.component(component).is_none() {
+            // It stands in the picture all the same, so that what concerns it is checked too.
             step::effect(&what, b.view);
         } else if !b.blamed.contains(&component) {
-            b.refuse(&what, vec![Violation::Exists(component)], origin);
+            b.refuse(vec![Violation::Exists(component)], origin);
         }
         return;
     }
@@ -219,43 +155,22 @@ fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
     let configuration = b.configuration;
     let Use::Rival(first) = usage else { return None };
     let first = &configuration.changes[first];
-    let what = match &first.kind {
-        ChangeKind::PropertySet { property, value } => {
-            Step::PropertySet { property: *property, value: fit_set(b, *property, value) }
-        }
-        ChangeKind::PortWrite { port, value } => {
-            Step::PortWrite { port: *port, value: Some(fit_write(b, *port, value)) }
-        }
-        _ => return Some(first),
-    };
-    step::precondition(&what, b.view).is_empty().then_some(first)
-}
-
-fn fit_set(b: &Builder<'_, '_, '_>, property: MemberRef, value: &Value) -> Value {
-    let declared = b.view.component(property.component).and_then(|n| n.property(property.member));
-    declared.and_then(|(_, p)| p.fit(value.clone()).ok()).unwrap_or_else(|| value.clone())
-}
-
-fn fit_write(b: &Builder<'_, '_, '_>, port: MemberRef, value: &Value) -> Value {
-    let declared = b.view.component(port.component).and_then(|n| n.port(port.member));
-    declared.and_then(|(_, p)| value.clone().fit(&p.ty).ok()).unwrap_or_else(|| value.clone())
+    Meant::of(&first.kind, b.view, b.context).violations(b.view).is_empty().then_some(first)
 }
 
 fn set(
     b: &mut Builder<'_, '_, '_>,
     w: &Waits,
     property: MemberRef,
-    value: &Value,
+    what: Step,
     change: &Change,
     sorted: &Sorted,
     index: usize,
 ) {
     let mut after = After::new();
     w.created(property.component, &mut after);
-    let fitted = fit_set(b, property, value);
-    let what = Step::PropertySet { property, value: fitted.clone() };
     let present = b.view.component(property.component).and_then(|n| n.value(property.member));
-    let fulfilled = present == Some(&fitted);
+    let fulfilled = matches!(&what, Step::PropertySet { value, .. } if present == Some(value));
     let create = sorted.created.get(&property.component).map(|i| &b.configuration.changes[*i]);
     let initial = create.filter(|c| match &c.kind {
         ChangeKind::Create { properties, .. } => properties.contains_key(&property.member) && present.is_some(),
@@ -265,7 +180,7 @@ fn set(
     if fulfilled || rival.is_some() || initial.is_some() {
         let found = step::precondition(&what, b.view);
         if !found.is_empty() {
-            b.refuse(&what, found, change.origin);
+            b.refuse(found, change.origin);
             return;
         }
     }
@@ -281,17 +196,16 @@ fn set(
     }
 }
 
-fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, value: &Value, change: &Change, usage: Use) {
+fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, change: &Change, usage: Use) {
     let mut after = After::new();
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
-    let fitted = fit_write(b, port, value);
-    let fulfilled = matches!(step::written(port, b.view), Some(Some(present)) if present == fitted);
-    let what = Step::PortWrite { port, value: Some(fitted.clone()) };
+    let present = step::written(port, b.view).flatten();
+    let fulfilled = matches!(&what, Step::PortWrite { value, .. } if present.is_some() && *value == present);
     if let Some(first) = rival(b, usage) {
         let found = step::precondition(&what, b.view);
         if !found.is_empty() {
-            b.refuse(&what, found, change.origin);
+            b.refuse(found, change.origin);
         } else if !fulfilled {
             b.findings.push(clash(first, change));
         }
@@ -300,33 +214,19 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, value: &Value,
         if found.is_empty() {
             b.fulfilled(&what);
         } else {
-            b.refuse(&what, found, change.origin);
+            b.refuse(found, change.origin);
         }
     } else {
         b.step(what, None, change.origin, &after);
     }
 }
 
-/// A call with its arguments fitted where they can be; the precondition tells what is wrong with the others.
-fn fit(b: &Builder<'_, '_, '_>, call: &Call) -> Call {
-    let node = b.view.component(call.operation.component);
-    let declared = node.and_then(|n| n.ty.operations.get(&call.operation.member));
-    let args = call.args.iter().enumerate().map(|(i, value)| {
-        let ty = declared.and_then(|o| o.args.get(i));
-        ty.and_then(|ty| value.clone().fit(ty).ok()).unwrap_or_else(|| value.clone())
-    });
-    Call { operation: call.operation, args: args.collect() }
-}
-
-fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, call: &Call, undo: Option<&Call>, origin: Origin) {
+fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Change) {
     let mut after = After::new();
-    w.created(call.operation.component, &mut after);
-    if let Some(undo) = undo {
-        w.created(undo.operation.component, &mut after);
+    for component in change.kind.components() {
+        w.created(component, &mut after);
     }
-    let undo = undo.map(|u| fit(b, u));
-    let what = Step::Operation(fit(b, call));
-    b.step(what, undo.as_ref(), origin, &after);
+    b.step(meant.step, meant.undo.as_ref(), change.origin, &after);
 }
 
 fn connect(
@@ -356,13 +256,13 @@ fn connect(
             if found.is_empty() {
                 b.findings.push(clash(other, change));
             }
-            b.refuse(&what, found, change.origin);
+            b.refuse(found, change.origin);
             return;
         }
     }
     if found.is_empty() {
         b.allowed(what, None, change.origin, &after);
     } else {
-        b.refuse(&what, found, change.origin);
+        b.refuse(found, change.origin);
     }
 }

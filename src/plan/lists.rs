@@ -6,39 +6,17 @@ use super::footprint::{Access, Slot};
 use super::order::{self, Move};
 use super::{Stage, StepId};
 use crate::model::codes;
-use crate::model::{ComponentName, Finding, Origin, RunState, StateEntry, Step, Target, Transition};
+use crate::model::{ComponentName, Finding, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
 use crate::system::{View, Violation};
 use rustc_hash::FxHashSet;
 
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], stage: Stage, sorted: &Sorted) {
+pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage, sorted: &Sorted) {
     b.stage = stage;
-    let mut default: Option<Origin> = None;
     let mut frontier: Vec<StepId> = Vec::new();
-    for entry in list {
-        if entry.state == RunState::Faulted {
-            let message = format!("`{}` is to become faulted", entry.target);
-            b.findings.push(
-                Finding::error(codes::FAULTED_DEMANDED, message)
-                    .at(entry.origin)
-                    .help("demand unconfigured, stopped or running"),
-            );
-            continue;
-        }
+    for entry in list.iter() {
         match entry.target {
             Target::Component(component) => named(b, component, entry, sorted, &mut frontier),
-            Target::Default => {
-                if let Some(first) = default {
-                    b.findings.push(
-                        Finding::error(codes::DEFAULT_TWICE, "`_default` stands twice in one list")
-                            .at(entry.origin)
-                            .also(first, "the first one")
-                            .help("keep one, and name the components that are to be in another state"),
-                    );
-                    continue;
-                }
-                default = Some(entry.origin);
-                expand(b, list, entry, &mut frontier);
-            }
+            Target::Default => expand(b, list, entry, &mut frontier),
         }
     }
 }
@@ -46,7 +24,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], stage: Sta
 fn named(
     b: &mut Builder<'_, '_, '_>,
     component: ComponentName,
-    entry: &StateEntry,
+    entry: StateEntry,
     sorted: &Sorted,
     frontier: &mut Vec<StepId>,
 ) {
@@ -66,10 +44,11 @@ fn named(
     }
 }
 
-fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: &StateEntry, sorted: &Sorted) {
+fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
-        (Stage::Pre, Some(create), _) => {
+        // One that is destroyed and created again concerns the component that was there before.
+        (Stage::Pre, Some(create), None) => {
             let message =
                 format!("`{component}` is created by this configuration and does not exist before the changes");
             Finding::error(codes::PRE_ON_CREATED, message)
@@ -84,30 +63,19 @@ fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: &StateE
                 .help("remove the entry: destroy stops and cleans up by itself")
         }
         _ if b.blamed.contains(&component) => return,
-        _ => {
-            let violation = Violation::UnknownComponent(component);
-            let mut finding = Finding::error(violation.code(), violation.to_string());
-            finding.help = violation.help(b.view);
-            finding
-        }
+        _ => Violation::UnknownComponent(component).finding(b.view),
     };
     b.findings.push(finding.at(entry.origin));
 }
 
-/// Whether a component belongs to the (sub)system of that path.
-fn in_scope(component: ComponentName, scope: &str) -> bool {
-    let prefix = component.prefix();
-    scope.is_empty() || prefix == scope || prefix.strip_prefix(scope).is_some_and(|rest| rest.starts_with('/'))
-}
-
-fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, frontier: &mut Vec<StepId>) {
-    let named: FxHashSet<ComponentName> =
-        list.iter().filter_map(|e| if let Target::Component(c) = e.target { Some(c) } else { None }).collect();
+fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
+    let named: FxHashSet<ComponentName> = list.named().collect();
     let scope = b.configuration.id.prefix();
+    let wanted = RunState::from(entry.state);
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
-        if node.state != entry.state
-            && in_scope(node.name, scope)
+        if node.state != wanted
+            && node.name.prefix() == scope
             && !named.contains(&node.name)
             && !b.context.avoid.contains(&node.name)
         {
@@ -118,8 +86,8 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &[StateEntry], entry: &StateEntry, 
         return;
     }
     let key = match entry.state {
-        RunState::Running => Transition::Start,
-        _ => Transition::Stop,
+        Wanted::Running => Transition::Start,
+        Wanted::Stopped | Wanted::Unconfigured => Transition::Stop,
     };
     let moves = order::data_flow(b.view, moving, key);
     let from = b.steps.len();

@@ -8,6 +8,7 @@ mod changes;
 mod conflicts;
 pub mod footprint;
 mod lists;
+pub mod meant;
 mod order;
 pub mod prepare;
 #[cfg(test)]
@@ -15,7 +16,7 @@ mod tests;
 pub mod undo;
 
 use crate::model::codes;
-use crate::model::{ComponentName, ConfigId, Configuration, Finding, Findings, Ident, Origin, Step};
+use crate::model::{ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
 use footprint::{Footprint, Saved, Slot};
 use smallvec::SmallVec;
@@ -28,6 +29,13 @@ pub struct Context {
     pub activities: BTreeSet<Ident>,
     /// Components that `_default` passes over: in quarantine, or not known well enough.
     pub avoid: BTreeSet<ComponentName>,
+}
+
+impl Context {
+    /// That of a deployment's configurations.
+    pub fn of(deployment: &Deployment) -> Self {
+        Self { activities: deployment.activities.keys().copied().collect(), avoid: BTreeSet::new() }
+    }
 }
 
 /// The stage a step belongs to. Stages are barriers.
@@ -62,6 +70,10 @@ pub struct PlannedStep {
     pub reversibility: Reversibility,
     /// What undoes it, with the values that the planner saw.
     pub undo: Undo,
+    /// Whether doing it moves hardware.
+    pub moves: bool,
+    /// Whether undoing it moves hardware: no automatic rollback does that unasked.
+    pub undo_moves: bool,
     /// The element of the configuration it comes from.
     pub origin: Origin,
 }

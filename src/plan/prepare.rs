@@ -9,8 +9,8 @@ use super::footprint::{Access, Footprint, Saved, Slot};
 use super::undo::{absolute, restoring};
 use super::{PlannedStep, SavedValue, Stage, StepId};
 use crate::model::{
-    ChangeKind, ComponentName, ConfigId, Configuration, Direction, Ident, MemberRef, Origin, RunState, StateEntry,
-    Step, Target, Transition, Tunable, Value,
+    ChangeKind, ComponentName, ConfigId, Configuration, Direction, Ident, MemberRef, Origin, RunState, StateList, Step,
+    Target, Transition, Tunable, Value, Wanted,
 };
 use crate::system::touch::Touches;
 use crate::system::{System, Undo, View, step};
@@ -47,7 +47,7 @@ struct Write {
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     part: usize,
-    state: RunState,
+    state: Wanted,
     origin: Origin,
 }
 
@@ -126,21 +126,18 @@ impl Switch {
         }
         let index = system.index_of(name)?;
         let node = system.node_at(index)?;
-        let never = node.ty.irreversible;
-        if never.configure || never.stop {
+        let (never, moves) = (node.ty.irreversible, node.ty.moves);
+        if never.configure || never.stop || moves.start || moves.stop {
             return None;
         }
         self.parts.push(Part { name, index, born: node.born, state: node.state });
         Some(self.parts.len() - 1)
     }
 
-    fn entries(&mut self, system: &System, list: &[StateEntry]) -> Option<Vec<Entry>> {
+    fn entries(&mut self, system: &System, list: &StateList) -> Option<Vec<Entry>> {
         let mut entries = Vec::with_capacity(list.len());
-        for entry in list {
+        for entry in list.iter() {
             let Target::Component(name) = entry.target else { return None };
-            if entry.state == RunState::Faulted {
-                return None;
-            }
             entries.push(Entry { part: self.part(system, name)?, state: entry.state, origin: entry.origin });
         }
         Some(entries)
@@ -238,7 +235,7 @@ impl Switch {
                 #[allow(clippy::cast_possible_truncation)]
                 self.acts.push(Act::Move(entry.part as u32, *transition, stage));
             }
-            part.state = entry.state;
+            part.state = entry.state.into();
         }
     }
 
@@ -399,6 +396,9 @@ impl Switch {
                 reversibility: step::reversibility(&step, &undo),
                 step,
                 undo,
+                // What moves is not prepared.
+                moves: false,
+                undo_moves: false,
                 origin: self.origin(*act),
             });
         }

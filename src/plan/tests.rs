@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, Refusal, Stage, plan};
+use super::{Context, Plan, PlannedStep, Refusal, Stage, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,6 +51,7 @@ fn types() -> Arc<Catalogue> {
         (ident("open"), operation(Effect::Undo(ident("close")))),
         (ident("close"), operation(Effect::None)),
         (ident("weld"), operation(Effect::Irreversible)),
+        (ident("swing"), OperationType { moves: true, ..operation(Effect::Undo(ident("swing"))) }),
     ]);
     gain.start_after = vec![TypeName::new("t.Motor").unwrap()];
     let mut motor = ComponentType::new("t.Motor", "moves");
@@ -58,6 +59,7 @@ fn types() -> Arc<Catalogue> {
     motor.ports = gain.ports.clone();
     motor.properties.insert(ident("id"), property("int", None, Tunable::Unconfigured));
     motor.irreversible.destroy = true;
+    motor.moves.start = true;
     let mut catalogue = Catalogue::new();
     catalogue.insert(gain);
     catalogue.insert(motor);
@@ -77,11 +79,11 @@ fn conf(id: &str, pre: &[&str], changes: Vec<ChangeKind>, post: &[&str]) -> Conf
             "_default" => Target::Default,
             name => Target::Component(ComponentName::new(name).unwrap()),
         };
-        StateEntry { target, state: RunState::from_name(state).unwrap(), origin }
+        StateEntry { target, state: RunState::from_name(state).and_then(RunState::wanted).unwrap(), origin }
     };
-    conf.pre = pre.iter().map(|t| entry(t, next())).collect();
+    conf.pre = StateList::of(pre.iter().map(|t| entry(t, next()))).unwrap();
     conf.changes = changes.into_iter().map(|kind| Change { kind, origin: next() }).collect();
-    conf.post = post.iter().map(|t| entry(t, next())).collect();
+    conf.post = StateList::of(post.iter().map(|t| entry(t, next()))).unwrap();
     conf
 }
 
@@ -205,15 +207,19 @@ fn defaults_stop_producers_first_and_start_consumers_first() {
     let plan = apply(&mut system, &conf("loop", &["_default:stopped"], changes, &["_default:running"]));
     assert_eq!(steps(&plan)[5..], ["configure Z", "start Z", "start A", "start B"]);
     assert_eq!(plan.warnings[0].code, codes::ACTUATOR_BY_DEFAULT);
-    // A subsystem's `_default` leaves the others alone, and a sibling that only begins alike.
+}
+
+#[test]
+fn default_stays_in_the_file_of_its_configuration() {
     let mut system = System::new(types());
     let names = ["top", "left/a", "left/in/b", "left_too/c", "right/d"];
     let changes = names.iter().map(|n| create(n, "t.Gain", &[])).collect();
     apply(&mut system, &conf("up", &[], changes, &[]));
-    let plan = attempt(&system, &conf("left/go", &[], vec![], &["_default:stopped"])).unwrap();
-    let mut moved = steps(&plan);
-    moved.sort();
-    assert_eq!(moved, ["configure left/a", "configure left/in/b"]);
+    let moved = |id: &str| steps(&attempt(&system, &conf(id, &[], vec![], &["_default:stopped"])).unwrap());
+    assert_eq!(moved("go"), ["configure top"]);
+    assert_eq!(moved("left/go"), ["configure left/a"]);
+    assert_eq!(moved("left/in/go"), ["configure left/in/b"]);
+    assert!(moved("lef/go").is_empty());
 }
 
 #[test]
@@ -264,8 +270,8 @@ fn names_types_and_values() {
     assert_eq!(one(vec![create("C", "t.Motor", &[])]), [("conf::missing_property", 1, vec![91])]);
     // A property_set beside the create does not replace the value.
     assert_eq!(one(vec![create("C", "t.Motor", &[]), set("C.id", 3)]), [("conf::missing_property", 1, vec![91])]);
-    assert_eq!(one(vec![connect("A.n", "A.u")]), [("conf::port_types", 1, vec![90])]);
-    assert_eq!(one(vec![connect("A.m", "A.u")]), [("conf::port_units", 1, vec![90])]);
+    assert_eq!(one(vec![connect("A.n", "A.u")]), [("conf::port_types", 1, vec![90, 90])]);
+    assert_eq!(one(vec![connect("A.m", "A.u")]), [("conf::port_units", 1, vec![90, 90])]);
     assert_eq!(one(vec![connect("A.u", "A.u")]), [("conf::not_an_out_port", 1, vec![90])]);
     assert_eq!(one(vec![connect("A.y", "B.y")]), [("conf::not_an_in_port", 1, vec![90])]);
     assert_eq!(one(vec![connect("A.y", "B.q")]), [("conf::needs_buffer", 1, vec![90])]);
@@ -294,10 +300,16 @@ fn names_types_and_values() {
 fn lists() {
     let on = |pre: &[&str], changes, post: &[&str]| findings(&conf("c", pre, changes, post));
     assert_eq!(on(&["C:stopped"], vec![create("C", "t.Gain", &[])], &[]), [("conf::pre_on_created", 1, vec![2])]);
+    // Of one that is destroyed and created again the old one is meant, in a list as elsewhere.
+    let again = |name: &str| vec![destroy(name), create(name, "t.Gain", &[])];
+    let swapped = conf("c", &["A:stopped"], [vec![disconnect("A.y", "B.u")], again("A")].concat(), &["A:stopped"]);
+    let expected = ["stop A", "disconnect A.y -> B.u", "cleanup A", "destroy A", "create A : t.Gain", "configure A"];
+    assert_eq!(steps(&attempt(&base(), &swapped).unwrap()), expected);
+    let missing = conf("c", &["C:stopped"], again("C"), &[]);
+    let missing = attempt(&base(), &missing).unwrap_err();
+    assert!(missing.findings.iter().all(|f| f.code == codes::UNKNOWN_COMPONENT), "{missing:?}");
     let gone = vec![disconnect("A.y", "B.u"), destroy("B")];
     assert_eq!(on(&[], gone, &["B:stopped"]), [("conf::post_on_destroyed", 3, vec![2])]);
-    assert_eq!(on(&["_default:stopped", "_default:running"], vec![], &[]), [("conf::default_twice", 2, vec![1])]);
-    assert_eq!(on(&["A:faulted"], vec![], &[]), [("conf::faulted_demanded", 1, vec![])]);
     assert_eq!(on(&[], vec![], &["C:running"]), [("conf::unknown_component", 1, vec![])]);
     // A property that needs `stopped`, after an entry that starts; and one that is enough.
     assert_eq!(on(&["A:stopped", "A:running"], vec![set("A.k", 2)], &[]), [("conf::not_tunable", 3, vec![91])]);
@@ -336,6 +348,45 @@ fn reversibility_is_known_beforehand() {
     assert!(attempt(&base(), &meant).unwrap().warnings.is_empty());
     let named = conf("c", &[], vec![call("A.weld", Some("B.open"))], &[]);
     assert_eq!(attempt(&base(), &named).unwrap().steps[0].reversibility, Reversibility::Compensated);
+}
+
+#[test]
+fn what_moves_is_known_beforehand() {
+    let moving = |undo: &str, moves: bool, undo_moves: bool| {
+        let plan = attempt(&base(), &conf("c", &[], vec![call("B.swing", (!undo.is_empty()).then_some(undo))], &[]));
+        let plan = plan.unwrap();
+        assert_eq!((plan.steps[0].moves, plan.steps[0].undo_moves), (moves, undo_moves), "{undo}");
+    };
+    moving("", true, true);
+    moving("B.open", true, false);
+    moving("B.swing", true, true);
+    let back = attempt(&base(), &conf("c", &[], vec![call("B.open", Some("B.swing"))], &[])).unwrap();
+    assert_eq!((back.steps[0].moves, back.steps[0].undo_moves), (false, true));
+    // Of a component that this plan creates, too; and what it destroys is stopped first.
+    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
+    let flags = |plan: &Plan| {
+        let one = |s: &PlannedStep| (s.step.to_string(), s.moves, s.undo_moves);
+        plan.steps.iter().map(one).filter(|(_, a, b)| *a || *b).collect::<Vec<_>>()
+    };
+    assert_eq!(flags(&attempt(&base(), &new).unwrap()), [("start C".to_owned(), true, false)]);
+    let mut system = base();
+    for s in attempt(&system, &new).unwrap().steps {
+        step::apply(&s.step, &mut system).unwrap();
+    }
+    let gone = attempt(&system, &conf("d", &[], vec![destroy("C")], &[])).unwrap();
+    assert_eq!(flags(&gone), [("stop C".to_owned(), false, true)]);
+}
+
+#[test]
+fn what_moves_is_not_prepared() {
+    let mut system = base();
+    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
+    for s in attempt(&system, &new).unwrap().steps {
+        step::apply(&s.step, &mut system).unwrap();
+    }
+    let switch = |name: &str| conf("s", &[&format!("{name}:stopped")], vec![], &[&format!("{name}:running")]);
+    assert!(super::prepare::Switch::new(&mut system, &switch("A")).is_some());
+    assert!(super::prepare::Switch::new(&mut system, &switch("C")).is_none());
 }
 
 #[test]

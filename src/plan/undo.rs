@@ -5,7 +5,7 @@
 
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
-use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition};
+use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 pub use crate::system::step::absolute;
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
@@ -68,7 +68,7 @@ pub struct Script<'o, 's> {
     /// The place that each step's item had in the list it was taken from.
     pub of: Vec<u32>,
     /// Where failed components are to go, once something needs them there.
-    goals: BTreeMap<ComponentName, (RunState, Stage, Origin)>,
+    goals: BTreeMap<ComponentName, (Wanted, Stage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
     failed: BTreeSet<ComponentName>,
 }
@@ -106,7 +106,7 @@ impl<'o, 's> Script<'o, 's> {
                 let state = self.view.component(component).map(|n| n.state);
                 if state == Some(RunState::Faulted) || self.failed.contains(&component) {
                     self.failed.insert(component);
-                    self.goals.insert(component, (transition.target(), item.stage, item.origin));
+                    self.goals.insert(component, (transition.wanted(), item.stage, item.origin));
                     return Ok(None);
                 }
             }
@@ -132,7 +132,7 @@ impl<'o, 's> Script<'o, 's> {
     /// Brings a failed component to where it is to be.
     fn settle(&mut self, component: ComponentName, wave: u32) -> Result<(), Vec<Violation>> {
         let Some((goal, stage, origin)) = self.goals.remove(&component) else { return Ok(()) };
-        let state = self.view.component(component).map_or(goal, |n| n.state);
+        let state = self.view.component(component).map_or(goal.into(), |n| n.state);
         for transition in state.path_to(goal) {
             let step = Step::State { component, transition: *transition };
             self.push(Item::bare(step, stage, origin), wave, &[])?;
@@ -160,6 +160,7 @@ impl<'o, 's> Script<'o, 's> {
             return Err(found);
         }
         let undo = step::inverse(&item.step, item.call.as_ref(), self.view);
+        let (moves, undo_moves) = (step::moves(&item.step, self.view), step::undo_moves(&undo, self.view));
         step::effect(&item.step, self.view);
         let id = StepId::try_from(self.steps.len()).expect("fewer steps than that");
         self.of.push(item.of);
@@ -170,6 +171,8 @@ impl<'o, 's> Script<'o, 's> {
             after: SmallVec::from_slice(after),
             reversibility: step::reversibility(&item.step, &undo),
             undo,
+            moves,
+            undo_moves,
             step: item.step,
             origin: item.origin,
         });

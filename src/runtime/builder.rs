@@ -7,15 +7,14 @@ use super::beat::Beat;
 use super::call::Reply;
 use super::component::{Answer, Arguments, Component, Context, HookResult, Returned};
 use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
-use super::probe::{Probes, ProbesEnd, Wanted};
+use super::probe::{Observed, Probes, ProbesEnd};
 use super::property::{Prop, PropEnd};
 use super::value::PortValue;
 use crate::model::monitor::Condition;
 use crate::model::{
-    ComponentType, Direction, Effect, EventName, Ident, Irreversible, OperationType, Origin, PortType, PropertyType,
-    Transition, Tunable, TypeName, Value, ValueType,
+    ComponentType, Direction, Effect, EventName, Ident, OperationType, Origin, PortType, PropertyType, Transition,
+    Tunable, Value, ValueType,
 };
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// A port's end at the configurator.
@@ -68,16 +67,16 @@ struct Description<C> {
 }
 
 #[derive(Default)]
-struct Words {
-    doc: String,
-    unit: Option<Arc<str>>,
-    min: Option<f64>,
-    max: Option<f64>,
-    tunable: Tunable,
-    buffered: bool,
-    effect: Option<Effect>,
-    moves: bool,
-    settled_by: Option<Condition>,
+pub(super) struct Words {
+    pub(super) doc: String,
+    pub(super) unit: Option<Arc<str>>,
+    pub(super) min: Option<f64>,
+    pub(super) max: Option<f64>,
+    pub(super) tunable: Tunable,
+    pub(super) buffered: bool,
+    pub(super) effect: Option<Effect>,
+    pub(super) moves: bool,
+    pub(super) settled_by: Option<Condition>,
 }
 
 struct Making<C> {
@@ -98,7 +97,7 @@ pub(crate) struct Ends {
     pub(crate) probes: Option<ProbesEnd>,
 }
 
-fn ident(name: &str) -> Ident {
+pub(super) fn ident(name: &str) -> Ident {
     Ident::new(name).expect("the name of a member")
 }
 
@@ -172,61 +171,18 @@ impl<C: Component> Builder<C> {
         }
     }
 
-    fn words(&mut self, f: impl FnOnce(&mut Words)) -> &mut Self {
+    pub(super) fn words(&mut self, f: impl FnOnce(&mut Words)) -> &mut Self {
         if let Mode::Describe(d) = &mut self.mode {
             f(&mut d.words);
         }
         self
     }
 
-    fn ty(&mut self, f: impl FnOnce(&mut ComponentType)) -> &mut Self {
+    pub(super) fn ty(&mut self, f: impl FnOnce(&mut ComponentType)) -> &mut Self {
         if let Mode::Describe(d) = &mut self.mode {
             f(&mut d.ty);
         }
         self
-    }
-
-    // ---- words about the type ----------------------------------------------------------------------------------
-
-    /// What the type is for; `davit types` prints it.
-    pub fn describe(&mut self, doc: &str) -> &mut Self {
-        self.ty(|ty| ty.doc = doc.to_owned())
-    }
-
-    /// It moves something.
-    pub fn actuator(&mut self) -> &mut Self {
-        self.ty(|ty| ty.actuator = true)
-    }
-
-    /// Starting one moves hardware: an automatic rollback does not do it unasked.
-    pub fn moves_on_start(&mut self) -> &mut Self {
-        self.ty(|ty| ty.moves.start = true)
-    }
-
-    /// Stopping one moves hardware.
-    pub fn moves_on_stop(&mut self) -> &mut Self {
-        self.ty(|ty| ty.moves.stop = true)
-    }
-
-    /// Components of type `other` start before those of this type.
-    ///
-    /// # Panics
-    /// When `other` is no type name.
-    pub fn start_after(&mut self, other: &str) -> &mut Self {
-        self.ty(|ty| ty.start_after.push(TypeName::new(other).expect("a component type's name")))
-    }
-
-    /// Components of type `other` stop after those of this type.
-    ///
-    /// # Panics
-    /// When `other` is no type name.
-    pub fn stop_before(&mut self, other: &str) -> &mut Self {
-        self.ty(|ty| ty.stop_before.push(TypeName::new(other).expect("a component type's name")))
-    }
-
-    /// Which moves of its run state cannot be undone.
-    pub fn irreversible(&mut self, what: Irreversible) -> &mut Self {
-        self.ty(|ty| ty.irreversible = what)
     }
 
     // ---- hooks -------------------------------------------------------------------------------------------------
@@ -257,64 +213,6 @@ impl<C: Component> Builder<C> {
             d.hooks[hook_index(transition)] = Some(hook);
         }
         self
-    }
-
-    // ---- words about the next member ---------------------------------------------------------------------------
-
-    /// What the member is.
-    pub fn doc(&mut self, doc: &str) -> &mut Self {
-        self.words(|w| w.doc = doc.to_owned())
-    }
-
-    /// The unit of a port or property.
-    pub fn unit(&mut self, unit: &str) -> &mut Self {
-        self.words(|w| w.unit = Some(Arc::from(unit)))
-    }
-
-    /// The smallest and largest value of a property, of every number in it.
-    pub fn range(&mut self, range: RangeInclusive<f64>) -> &mut Self {
-        self.words(|w| (w.min, w.max) = (Some(*range.start()), Some(*range.end())))
-    }
-
-    /// The smallest value of a property.
-    pub fn min(&mut self, min: f64) -> &mut Self {
-        self.words(|w| w.min = Some(min))
-    }
-
-    /// The largest value of a property.
-    pub fn max(&mut self, max: f64) -> &mut Self {
-        self.words(|w| w.max = Some(max))
-    }
-
-    /// When a property may be set.
-    pub fn tunable(&mut self, tunable: Tunable) -> &mut Self {
-        self.words(|w| w.tunable = tunable)
-    }
-
-    /// The in-port is read as a queue: it takes only buffered connections, any number of them.
-    pub fn buffered(&mut self) -> &mut Self {
-        self.words(|w| w.buffered = true)
-    }
-
-    /// The operation leaves nothing behind that would have to be undone.
-    pub fn no_effect(&mut self) -> &mut Self {
-        self.words(|w| w.effect = Some(Effect::None))
-    }
-
-    /// The operation is undone by another one of the same component.
-    pub fn undone_by(&mut self, operation: &str) -> &mut Self {
-        self.words(|w| w.effect = Some(Effect::Undo(ident(operation))))
-    }
-
-    /// Calling the operation moves hardware: an automatic rollback does not do it unasked.
-    pub fn moves(&mut self) -> &mut Self {
-        self.words(|w| w.moves = true)
-    }
-
-    /// What is true of the component once the operation was done: a call of which no answer came is settled by it. The
-    /// component itself is written `self`: `Condition::compare("self.mode", Comparison::Equals, 6.0)`.
-    pub fn settled_by(&mut self, condition: Condition) -> &mut Self {
-        self.words(|w| w.settled_by = Some(condition))
     }
 
     // ---- members -----------------------------------------------------------------------------------------------
@@ -439,7 +337,7 @@ impl<C: Component> Builder<C> {
     }
 
     /// Probes of what is `wanted`, beside connections. They come and go with what they look at; a component has one set.
-    pub fn probes(&mut self, wanted: Arc<[Wanted]>) -> Probes {
+    pub fn probes(&mut self, wanted: Arc<[Observed]>) -> Probes {
         match &mut self.mode {
             Mode::Describe(_) => Probes::loose(),
             Mode::Make(m) => {

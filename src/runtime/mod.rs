@@ -22,6 +22,7 @@ pub mod probe;
 pub mod property;
 mod realtime;
 pub mod value;
+mod words;
 
 pub use crate::model::ActivityStatus;
 pub use beat::{Notice, NoticeSink, Notices};
@@ -29,6 +30,6 @@ pub use builder::Builder;
 pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, Returned, Ticket};
 pub use library::{Kind, Libraries, Library};
 pub use port::{EventIn, EventOut, In, Out, Sample};
-pub use probe::{Probes, Seen, Wanted};
+pub use probe::{Observed, Probes, Seen};
 pub use property::Prop;
 pub use value::{PortValue, record};

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Something that a component wants to see.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Wanted {
+pub enum Observed {
     /// What is written to an out-port, or comes to an in-port through its `data` connection.
     Port(MemberRef),
     /// The run state of a component.
@@ -59,14 +59,14 @@ pub(crate) enum Probe {
     Activity(Arc<Activity>),
 }
 
-/// The probes a component has, by the place of what they look at in its list of [`Wanted`].
+/// The probes a component has, by the place of what they look at in its list of [`Observed`].
 pub struct Probes {
     links: Links<(usize, Probe)>,
 }
 
 /// The configurator's end of the probes of one component.
 pub(crate) struct ProbesEnd {
-    pub(crate) wanted: Arc<[Wanted]>,
+    pub(crate) wanted: Arc<[Observed]>,
     pub(crate) sender: Sender<(usize, Probe)>,
     /// Of a component in an event-driven activity: a write to what it looks at wakes it.
     pub(crate) wake: Option<Arc<Beat>>,
@@ -76,7 +76,7 @@ pub(crate) struct ProbesEnd {
 pub struct Seen<'a>(&'a mut Probe);
 
 impl Probes {
-    pub(crate) fn new(wanted: Arc<[Wanted]>, beat: &Arc<Beat>) -> (Self, ProbesEnd) {
+    pub(crate) fn new(wanted: Arc<[Observed]>, beat: &Arc<Beat>) -> (Self, ProbesEnd) {
         let (sender, links) = links();
         let wake = beat.is_event_driven().then(|| beat.clone());
         (Self { links }, ProbesEnd { wanted, sender, wake })

@@ -205,7 +205,7 @@ impl Hub {
             state.outstanding.insert(id, Outstanding { ask, by: by.to_owned(), at: self.clock.now() });
             id
         };
-        self.note(Happening::Requested { request: id.0, ask: ask.to_string(), by: by.to_owned() });
+        self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
         id
     }
 

@@ -1,6 +1,7 @@
 //! What happened, in memory: a bounded number of entries, oldest dropped first.
 
 use super::lanes::Lanes;
+use super::recovery::Difference;
 use crate::configurator::{StepEnd, StepName};
 use crate::coordinator::Dropped;
 use crate::limits;
@@ -49,8 +50,9 @@ pub enum Happening {
     },
     /// A request was made.
     Requested {
-        /// Its number.
-        request: u64,
+        /// Its number; none of a recovery, which is answered where it was asked.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        request: Option<u64>,
         /// What is asked.
         ask: String,
         /// Who asks.
@@ -75,6 +77,8 @@ pub enum Happening {
         /// Which.
         component: String,
     },
+    /// A broken system is whole again.
+    Recovered,
     /// Something had to be forced, or was left over.
     Forced {
         /// What.
@@ -253,6 +257,8 @@ pub struct StatusView {
     pub system: Snapshot,
     /// Frames in force, newest last.
     pub stack: Vec<FrameView>,
+    /// What is left of an application that is neither done nor undone; empty unless it is broken.
+    pub residual: Vec<Difference>,
     /// What is wrong.
     pub faults: Vec<Fault>,
     /// Requests that are not answered yet.

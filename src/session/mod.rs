@@ -11,6 +11,7 @@ mod life;
 pub mod log;
 mod parts;
 pub mod place;
+mod recovery;
 mod routes;
 pub mod rpc;
 pub mod service;
@@ -20,6 +21,7 @@ mod wiring;
 pub use hub::{Hub, Observer};
 pub use life::{Ended, NotUp};
 pub use log::{Happening, Phase, StatusView};
+pub use recovery::{Difference, NO_FORWARD, Recovered, recovery};
 pub use wiring::{Session, Setup};
 
 /// What may be asked of whoever drives a session.

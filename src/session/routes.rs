@@ -168,7 +168,7 @@ pub(super) fn on_progress(hub: &Hub, steps: &Steps, progress: &Progress) {
         Progress::Survived(text) => {
             hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
         }
-        Progress::Recovered => hub.note(Happening::Forced { note: "recovered".to_owned() }),
+        Progress::Recovered => hub.note(Happening::Recovered),
         Progress::Started(_) | Progress::Answered(_) => {}
     }
 }

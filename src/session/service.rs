@@ -4,7 +4,7 @@ use super::hub::Hub;
 use super::log::Answered;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, optional, param};
 use super::socket::Service;
-use super::{Command, Session};
+use super::{Command, NO_FORWARD, Session, recovery};
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, EventName};
 use serde_json::{Value as Json, json};
@@ -16,8 +16,9 @@ pub struct SessionService {
     session: Weak<Session>,
 }
 
-/// The methods, for the help of an unknown one.
-const METHODS: &[&str] = &["status", "stack", "log", "event", "apply", "undo", "commit", "shutdown", "subscribe"];
+/// The methods, for the help of an unknown one and for the documentation's test.
+pub const METHODS: &[&str] =
+    &["status", "stack", "log", "event", "apply", "undo", "drift", "recover", "commit", "shutdown", "subscribe"];
 
 impl SessionService {
     /// The service of `session`.
@@ -66,7 +67,12 @@ impl Service for SessionService {
                 };
                 request(&session, ask, params)
             }
-            "commit" => request(&session, Ask::Commit, params),
+            "drift" => drift(&session, params),
+            "recover" => recover(&session, params),
+            "commit" => {
+                let force = optional(params, "force")?.unwrap_or(false);
+                request(&session, Ask::Commit { force }, params)
+            }
             "shutdown" => {
                 let force = optional(params, "force")?.unwrap_or(false);
                 let wait = optional(params, "wait")?.unwrap_or(false);
@@ -126,6 +132,37 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
         }
         None => Err(RpcError::new(TIMED_OUT, format!("`{wait_for}` was not heard in time"))),
     }
+}
+
+fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {
+    match session.drift(within(params)?) {
+        Some(differences) => Ok(view(&differences)),
+        None => Err(RpcError {
+            code: TIMED_OUT,
+            message: "the platform could not be read in time".to_owned(),
+            data: json!({ "help": "something may be under way, or a component keeps it busy: `davit status` shows it" }),
+        }),
+    }
+}
+
+fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
+    let word: String = param(params, "direction")?;
+    let Some(how) = recovery(&word) else {
+        return Err(if word == "forward" {
+            refused(NO_FORWARD.to_owned(), "go `back`, or `accept` what is there".to_owned())
+        } else {
+            RpcError::new(INVALID_PARAMS, "`direction` is `back` or `accept`")
+        });
+    };
+    let recovered = session.recover(how, "operator", within(params)?);
+    recovered.map(|recovered| view(&recovered)).ok_or_else(|| {
+        let message = "the recovery was not over in time; it goes on".to_owned();
+        RpcError {
+            code: TIMED_OUT,
+            message,
+            data: json!({ "help": "`davit status` and `davit log` show how it ends" }),
+        }
+    })
 }
 
 fn request(session: &Session, ask: Ask, params: &Json) -> Result<Json, RpcError> {

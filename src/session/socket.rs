@@ -9,6 +9,8 @@ use crate::limits;
 use serde_json::Value as Json;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::Shutdown;
+use std::os::fd::OwnedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
@@ -78,6 +80,8 @@ impl Calls {
 /// A listening control socket; dropping it lets the calls under way be answered, closes and removes it.
 pub struct ControlSocket {
     path: PathBuf,
+    /// The listening socket, to end it.
+    listening: UnixStream,
     calls: Arc<Calls>,
     stop: Arc<AtomicBool>,
     subscribers: Arc<Subscribers>,
@@ -119,6 +123,7 @@ impl ControlSocket {
             Err(e) => return Err(io(e)),
         };
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
+        let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
         let stop = Arc::new(AtomicBool::new(false));
         let subscribers = Arc::new(Subscribers::default());
         let calls = Arc::new(Calls::default());
@@ -129,7 +134,7 @@ impl ControlSocket {
                 .spawn(move || accept(&listener, &stop, &subscribers, &calls, &service))
                 .map_err(io)?
         };
-        Ok(Self { path, calls, stop, subscribers, accepting: Some(accepting) })
+        Ok(Self { path, listening, calls, stop, subscribers, accepting: Some(accepting) })
     }
 
     /// Where it listens.
@@ -152,8 +157,9 @@ impl ControlSocket {
 impl Drop for ControlSocket {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
-        // A connection to ourselves wakes the accepting thread.
-        let _ = UnixStream::connect(&self.path);
+        // Wakes the accepting thread, also when the file is gone (its directory was cleaned up, the user logged out): a
+        // connection to ourselves would not find it then.
+        let _ = self.listening.shutdown(Shutdown::Both);
         let _ = fs::remove_file(&self.path);
         if let Some(thread) = self.accepting.take() {
             let _ = thread.join();
@@ -243,7 +249,7 @@ fn forward(lines: Receiver<String>, writer: Arc<Mutex<UnixStream>>) -> io::Resul
         }
         // Cut off, or the deployment is gone: the reader sees the end of the stream instead of silence.
         let stream = writer.lock().unwrap_or_else(PoisonError::into_inner);
-        let _ = stream.shutdown(std::net::Shutdown::Both);
+        let _ = stream.shutdown(Shutdown::Both);
     })?;
     Ok(())
 }

@@ -5,6 +5,7 @@ use super::hub::Hub;
 use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
+use super::recovery::Difference;
 use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
 use crate::configurator::{
     Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
@@ -112,6 +113,10 @@ impl Session {
         &self.platform
     }
 
+    pub(super) fn configurator(&self) -> &ConfiguratorHandle {
+        &self.configurator
+    }
+
     /// Its memory: log, observers, what was heard.
     pub fn hub(&self) -> &Hub {
         &self.hub
@@ -203,8 +208,10 @@ impl Session {
     pub fn status(&self) -> StatusView {
         let view = self.view(true);
         let stack = view.iter().flat_map(|v| &v.stack).map(FrameView::of).collect();
+        let broken = view.as_ref().and_then(|v| v.broken.as_deref());
+        let residual = broken.map(Difference::of_residual).unwrap_or_default();
         let phase = match self.hub.phase() {
-            Phase::Up | Phase::Deploying if view.as_ref().is_some_and(|v| v.broken.is_some()) => Phase::Broken,
+            Phase::Up | Phase::Deploying if broken.is_some() => Phase::Broken,
             phase => phase,
         };
         StatusView {
@@ -214,6 +221,7 @@ impl Session {
             coordinators: self.active(),
             system: view.and_then(|v| v.system.as_deref().cloned()).unwrap_or_default(),
             stack,
+            residual,
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
             slow: self.slow(),

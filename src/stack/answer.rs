@@ -8,6 +8,10 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// The way out of *broken*, as it is told wherever something is.
+pub const WAY_OUT: &str = "`davit undo ID` takes back what is left of that configuration, `davit recover --back` all that is; \
+                           `davit recover --accept` takes what is there as the state; `davit drift` shows what differs";
+
 /// The answer to a request. Every request gets exactly one; a later [`Verdict::Reverted`] (or an undo verdict in its
 /// place, when the frame could not be popped) about a configuration whose confirmation did not come is a notice and
 /// carries the number of the request that had pushed it.
@@ -244,8 +248,7 @@ impl fmt::Display for Reason {
 
 impl Residual {
     fn finding(&self, code: crate::model::Code) -> Finding {
-        Finding::error(code, self.to_string())
-            .help("`davit undo ID` takes back what is partial, `davit drift` shows what differs, `davit recover --back` undoes all of it")
+        Finding::error(code, self.to_string()).help(WAY_OUT)
     }
 }
 

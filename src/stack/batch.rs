@@ -6,11 +6,11 @@
 //! left out, and the rest is planned anew.
 
 use super::work::{Op, Planned, Work};
-use super::{FrameId, Reason, Request, Requester, Why, World, claims, share};
+use super::{FrameId, Reason, Request, Requester, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
-use crate::system::{Overlay, step};
+use crate::system::Overlay;
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -52,7 +52,7 @@ pub struct Group {
     pub places: SmallVec<[usize; 2]>,
     /// What is repaired before the plan is carried out, by its place in [`World::broken`].
     pub repairs: Option<usize>,
-    /// The present state becomes the floor.
+    /// The requester's frames are made permanent.
     pub commits: bool,
     /// A coordinator has come to its *down* state.
     pub down: bool,
@@ -252,16 +252,16 @@ fn resolve<'a>(
                 },
             }
         }
-        Ask::Commit => {
+        Ask::Commit { force } => {
             if rules.busy {
                 return tell(failed, Reason::Busy);
             }
             if let Some(broken) = world.broken.first() {
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }
-            match foreign(&work.frames, request) {
-                Some(id) => tell(failed, Reason::NeedsForce(id)),
-                None => Resolved::Commit,
+            match may_commit(&world.stack, request.requester, force) {
+                Err(held) => tell(failed, Reason::Refused(vec![held])),
+                Ok(()) => Resolved::Commit,
             }
         }
     }
@@ -291,7 +291,7 @@ fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Plann
         let _ = place;
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
-        if let Some((_, moving)) = own.find(|(_, planned)| step::moves(&planned.step, &world.system)) {
+        if let Some((_, moving)) = own.find(|(_, planned)| planned.moves) {
             return Some((part, Reason::Moves(moving.step.clone())));
         }
     }

@@ -69,7 +69,7 @@ impl Claims {
         for configuration in configurations.clone() {
             let mut claim = Claim::default();
             named(configuration).for_each(|component| claim.set(numbers[&component]));
-            let mut states = configuration.pre.iter().chain(&configuration.post);
+            let mut states = configuration.pre.iter().chain(configuration.post.iter());
             if states.any(|entry| entry.target == Target::Default) {
                 let scope = configuration.id.prefix();
                 numbers.iter().filter(|(name, _)| name.prefix() == scope).for_each(|(_, at)| claim.set(*at));
@@ -98,7 +98,7 @@ impl Claims {
                     }
                 }
                 // Whose frame is the newest is not known from the text.
-                Ask::Undo | Ask::UndoTo(_) | Ask::Commit => claim.all = true,
+                Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => claim.all = true,
             }
         }
         claim
@@ -108,7 +108,7 @@ impl Claims {
 /// Components that a configuration names.
 fn named(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
     let changes = configuration.changes.iter().flat_map(|change| change.kind.components());
-    let entries = configuration.pre.iter().chain(&configuration.post);
+    let entries = configuration.pre.iter().chain(configuration.post.iter());
     let states = entries.filter_map(|entry| match entry.target {
         Target::Component(component) => Some(component),
         Target::Default => None,

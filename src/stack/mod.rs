@@ -6,14 +6,16 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
+//!   batch come to. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
 mod batch;
 pub mod claims;
 mod desk;
+mod effort;
 mod net;
+mod permanent;
 mod prepared;
 pub mod request;
 mod share;
@@ -26,7 +28,9 @@ mod world;
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
 pub use desk::{Arrival, Desk, Turn};
+pub use effort::{Effort, effort};
 pub use net::reduce;
+pub use permanent::may_commit;
 pub use prepared::switch_frame;
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::{HandOver, is_kept, shares};
@@ -205,14 +209,6 @@ impl Stack {
     pub fn unscope(&mut self, frame: FrameId) {
         if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && f.scope.is_some()) {
             Arc::make_mut(frame).scope = None;
-        }
-    }
-
-    /// Makes the present state the floor: nothing that is in force now can be undone any more.
-    pub fn make_floor(&mut self) {
-        for frame in self.frames.drain(..) {
-            self.committed.insert(frame.buried());
-            self.committed.extend(frame.parts.iter().copied());
         }
     }
 

@@ -50,20 +50,20 @@ struct Bench {
 fn conf(
     id: &str,
     group: Option<&str>,
-    pre: &[(&str, RunState)],
+    pre: &[(&str, Wanted)],
     changes: Vec<ChangeKind>,
-    post: &[(&str, RunState)],
+    post: &[(&str, Wanted)],
 ) -> Configuration {
     let mut conf = Configuration::new(ConfigId::new(id).unwrap());
     conf.group = group.map(ident);
-    let entry = |(name, state): &(&str, RunState)| StateEntry {
+    let entry = |(name, state): &(&str, Wanted)| StateEntry {
         target: Target::Component(ComponentName::new(name).unwrap()),
         state: *state,
         origin: Origin::NONE,
     };
-    conf.pre = pre.iter().map(entry).collect();
+    conf.pre = StateList::of(pre.iter().map(entry)).unwrap();
     conf.changes = changes.into_iter().map(|kind| Change { kind, origin: Origin::NONE }).collect();
-    conf.post = post.iter().map(entry).collect();
+    conf.post = StateList::of(post.iter().map(entry)).unwrap();
     conf
 }
 
@@ -89,10 +89,10 @@ impl Bench {
             activity: None,
             properties: BTreeMap::new(),
         };
-        let running = [("A", RunState::Running), ("B", RunState::Running)];
+        let running = [("A", Wanted::Running), ("B", Wanted::Running)];
         let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
         bench.ok(&[push(&up)]);
-        bench.stack.make_floor();
+        bench.stack.make_permanent(Requester::Operator);
         bench
     }
 
@@ -123,8 +123,8 @@ impl Bench {
 #[test]
 fn alternatives_never_pass_through_what_was_before_both() {
     let mut bench = Bench::new(64);
-    let stopped = [("A", RunState::Stopped)];
-    let running = [("A", RunState::Running)];
+    let stopped = [("A", Wanted::Stopped)];
+    let running = [("A", Wanted::Running)];
     let eight = conf("eight", Some("dof"), &stopped, vec![set("A.mass", 8.0), set("A.gain", 1.0)], &running);
     let five = conf("five", Some("dof"), &stopped, vec![set("A.mass", 5.0)], &running);
     assert_eq!(bench.ok(&[push(&eight)]).0.len(), 4);
@@ -168,7 +168,7 @@ fn undo_does_not_pass_a_floor() {
     assert_eq!(bench.codes(&[Op::Undo(below)]), ["stack::floor"]);
     bench.ok(&[Op::UndoTop]);
     assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
-    bench.stack.make_floor();
+    bench.stack.make_permanent(Requester::Operator);
     assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
     assert!(bench.stack.is_buried(ConfigId::new("weld").unwrap(), None));
     bench.stack.discard();
@@ -192,8 +192,8 @@ fn values_are_handed_over_and_what_blocks_is_named() {
     assert_eq!(bench.value("A.gain"), 1.0);
     assert_eq!(bench.ok(&[Op::UndoTop]).0, ["property_set A.gain = 0.0"]);
     // A state that a frame above demanded by name blocks, though no step was needed.
-    let stop = bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![], &[]))]).1[0];
-    bench.ok(&[push(&conf("needs", None, &[("A", RunState::Stopped)], vec![], &[]))]);
+    let stop = bench.ok(&[push(&conf("stop", None, &[("A", Wanted::Stopped)], vec![], &[]))]).1[0];
+    bench.ok(&[push(&conf("needs", None, &[("A", Wanted::Stopped)], vec![], &[]))]);
     let refusal = bench.ask(&[Op::Undo(stop)]).unwrap_err();
     assert_eq!(refusal.findings[0].message, "`stop` cannot be undone before `needs`, which needs the run state of `A`");
 }
@@ -247,7 +247,7 @@ fn calls_that_pile_up_become_a_floor() {
 #[test]
 fn a_switch_to_and_fro_stays_bounded_when_squashed() {
     let mut bench = Bench::new(2);
-    let (stopped, running) = ([("A", RunState::Stopped)], [("A", RunState::Running)]);
+    let (stopped, running) = ([("A", Wanted::Stopped)], [("A", Wanted::Running)]);
     for n in 0..200 {
         bench.ok(&[push(&conf("c", None, &stopped, vec![set("A.mass", f64::from(n % 3))], &running))]);
     }
@@ -268,11 +268,11 @@ fn a_failed_component_is_taken_down_without_being_started() {
         activity: None,
         properties: BTreeMap::new(),
     };
-    bench.ok(&[push(&conf("more", None, &[], vec![create], &[("C", RunState::Running)]))]);
+    bench.ok(&[push(&conf("more", None, &[], vec![create], &[("C", Wanted::Running)]))]);
     bench.system.set_state(a, RunState::Faulted);
     assert_eq!(bench.ok(&[Op::UndoTop]).0, ["destroy C"]);
     // Where it stays, it goes from the fault to where the inverse wants it.
-    bench.ok(&[push(&conf("stop", None, &[("A", RunState::Stopped)], vec![set("A.mass", 3.0)], &[]))]);
+    bench.ok(&[push(&conf("stop", None, &[("A", Wanted::Stopped)], vec![set("A.mass", 3.0)], &[]))]);
     bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
     let (steps, _) = bench.ok(&[Op::UndoTop]);
     assert_eq!(steps, ["cleanup A", "property_set A.mass = 0.0", "configure A", "start A"]);

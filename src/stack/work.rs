@@ -5,6 +5,7 @@ use super::{Edits, Frame, FrameId, Inverse, Requester, Scope, Stack, net, newest
 use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
 use crate::plan::undo::{Item, Script, undo};
 use crate::plan::{Context, Plan, PlannedStep, Refusal, StepId, plan_on};
+use crate::system::touch::absolute;
 use crate::system::{Overlay, System, View, Violation};
 use crate::time::Time;
 use smallvec::SmallVec;
@@ -76,7 +77,7 @@ impl Planned {
 
     /// The place of a step in [`Self::whole`]; none: it is there for no one of them alone.
     pub fn place(&self, step: usize) -> Option<u32> {
-        if self.of.is_empty() {
+        if self.whole.is_empty() {
             u32::try_from(step).ok()
         } else {
             self.of.get(step).copied().filter(|of| *of != Item::NOWHERE)
@@ -211,7 +212,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             Inverse::List(items) => {
                 let wave = self.script.next_wave();
                 for item in items {
-                    if crate::plan::undo::absolute(&item.step).is_some_and(skip) {
+                    if absolute(&item.step).is_some_and(skip) {
                         continue;
                     }
                     let after: SmallVec<[StepId; 1]> =
@@ -305,7 +306,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     pub(super) fn finish(self, system: &System) -> Result<Planned, Refusal> {
         let Self { mut script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
-        let mixed = replaced || parts.iter().any(|p| p.pushes.is_none()) && parts.iter().any(|p| p.pushes.is_some());
+        let undone = parts.iter().any(|part| part.pushes.is_none());
+        let mixed = replaced || undone && parts.iter().any(|part| part.pushes.is_some());
         let end = mixed.then(|| script.view().clone());
         let whole = script.finish().map_err(|found| drifted(&found))?;
         let net = end.and_then(|end| shorter(system, &end, &whole));

@@ -149,6 +149,16 @@ pub(super) enum Op {
     Call(FunctionId),
 }
 
+impl Op {
+    /// The state whose state-scoped configuration is asked for or taken back, at that place.
+    pub fn scope(self, place: super::Place) -> Option<NodeId> {
+        match (self, place) {
+            (Self::RaiseScoped(_), super::Place::Entry(state) | super::Place::Exit(state)) => Some(state),
+            _ => None,
+        }
+    }
+}
+
 /// A time event of a state.
 #[derive(Debug, Clone)]
 pub(super) struct Timer {

@@ -6,8 +6,7 @@ use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
 use super::outcome::{Ended, Mode, Step, Stepped};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
-use super::timers::Armed;
-use super::trace::Trace;
+use super::{timers::Armed, trace::Trace};
 use crate::limits;
 use crate::time::Time;
 use std::sync::Arc;
@@ -490,15 +489,9 @@ impl Machine {
     fn act(&mut self, chart: &Chart, ops: Span, place: Place, owner: NodeId, hook: &mut impl Hook) {
         for op in ops.of(&chart.ops) {
             match *op {
-                Op::Raise(name) => {
-                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()], scope: None });
-                }
-                Op::RaiseScoped(name) => {
-                    let scope = match place {
-                        Place::Entry(state) | Place::Exit(state) => Some(state),
-                        _ => None,
-                    };
-                    hook.raised(chart, Raised { name, owner, visit: self.visits[owner.index()], scope });
+                Op::Raise(name) | Op::RaiseScoped(name) => {
+                    let (visit, scope) = (self.visits[owner.index()], op.scope(place));
+                    hook.raised(chart, Raised { name, owner, visit, scope });
                 }
                 Op::Call(function) => hook.action(function, place, &mut self.view(chart)),
             }

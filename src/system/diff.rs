@@ -2,7 +2,7 @@
 //! and the comparison of two systems (design §4).
 
 use super::{Node, System, View};
-use crate::model::{ComponentName, MemberRef, Policy, RunState, Step, Value};
+use crate::model::{ComponentName, MemberRef, Policy, RunState, Step, Value, Wanted};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The steps that make `from` into `to`, in an order in which each may happen. Empty when the two show the same.
@@ -15,6 +15,11 @@ pub fn diff(from: &System, to: &System) -> Vec<Step> {
     diff.steps
 }
 
+/// What is demanded of a component that is to be as one in `state`.
+fn to_want(state: RunState) -> Wanted {
+    state.wanted().unwrap_or(Wanted::Unconfigured)
+}
+
 struct Diff {
     steps: Vec<Step>,
     /// The state each component is in after the steps so far, where that differs from `from`.
@@ -23,11 +28,11 @@ struct Diff {
 }
 
 impl Diff {
-    fn go(&mut self, component: ComponentName, now: RunState, wanted: RunState) {
+    fn go(&mut self, component: ComponentName, now: RunState, wanted: Wanted) {
         for transition in now.path_to(wanted) {
             self.steps.push(Step::State { component, transition: *transition });
         }
-        self.states.insert(component, wanted);
+        self.states.insert(component, wanted.into());
     }
 
     fn compare(&mut self, from: &System, to: &System) {
@@ -38,7 +43,7 @@ impl Diff {
         for node in &order {
             match kept(node) {
                 None if node.state == RunState::Faulted => {}
-                None => self.go(node.name, node.state, RunState::Unconfigured),
+                None => self.go(node.name, node.state, Wanted::Unconfigured),
                 Some(target) => self.lower(node, target),
             }
         }
@@ -77,31 +82,35 @@ impl Diff {
             let now = self.states.get(&target.name).copied().or_else(|| from.component(target.name).map(|n| n.state));
             let now = now.unwrap_or(RunState::Unconfigured);
             if now != target.state {
-                let wanted = if target.state == RunState::Faulted { RunState::Unconfigured } else { target.state };
-                self.go(target.name, now, wanted);
+                self.go(target.name, now, to_want(target.state));
             }
         }
     }
 
     /// Brings a component that stays down to where it can be changed, and keeps its property_sets for later.
     fn lower(&mut self, node: &Node, target: &Node) {
-        let mut wanted = node.state;
+        let (mut state, mut goal) = (node.state, None);
+        let mut to_go = |wanted: Wanted| {
+            goal = Some(wanted);
+            RunState::from(wanted)
+        };
         for (((name, declared), now), value) in node.ty.properties.iter().zip(&node.properties).zip(&target.properties)
         {
             if now != value {
                 self.sets.push(Step::PropertySet { property: node.name.member(*name), value: value.clone() });
-                while !declared.tunable.allows(wanted) {
-                    wanted = if wanted == RunState::Running { RunState::Stopped } else { RunState::Unconfigured };
+                while !declared.tunable.allows(state) {
+                    let stopped = state == RunState::Running;
+                    state = to_go(if stopped { Wanted::Stopped } else { Wanted::Unconfigured });
                 }
             }
         }
         // A component that only has to go down goes down here, with the others that do.
-        let target_state = if target.state == RunState::Faulted { RunState::Unconfigured } else { target.state };
-        if node.state != target.state && node.state != RunState::Faulted && target_state < wanted {
-            wanted = target_state;
+        let wanted = to_want(target.state);
+        if node.state != target.state && node.state != RunState::Faulted && RunState::from(wanted) < state {
+            to_go(wanted);
         }
-        if wanted != node.state {
-            self.go(node.name, node.state, wanted);
+        if let Some(goal) = goal {
+            self.go(node.name, node.state, goal);
         }
     }
 

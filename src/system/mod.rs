@@ -3,6 +3,7 @@
 //! Pure: nothing here knows a platform, a thread, a clock or a file. A [`System`] is never wrong about itself: it changes
 //! only through [`step::apply`] (a step whose precondition holds) and [`System::set_state`] (what a platform reports).
 
+mod advice;
 pub mod diff;
 mod node;
 mod overlay;
@@ -17,7 +18,7 @@ pub use overlay::Overlay;
 pub use step::{Reversibility, Undo};
 pub use system_graph::{System, UnknownType};
 pub use touch::{Access, Slot, Touch};
-pub use violation::Violation;
+pub use violation::{Member, Violation, either};
 
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Value};
 

@@ -4,10 +4,11 @@
 //! What it touches stands beside them, in [`touch`](super::touch).
 
 pub use super::touch::{absolute, components, touches};
-use super::{Driven, Node, View, ViewMut, Violation};
+use super::violation::brief;
+use super::{Driven, Member, Node, View, ViewMut, Violation};
 use crate::model::{
-    Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, RunState, Step, Transition, TypeName,
-    Value,
+    Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Step,
+    Transition, TypeName, Value, ValueType,
 };
 
 /// What undoes a step.
@@ -184,21 +185,29 @@ pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
     }
 }
 
-/// Whether `step` moves hardware: an operation that is declared so, or starting or stopping a component whose type says so.
-/// Such a step is run when somebody asks for it, and not by itself (design §3).
+/// Whether doing `step` moves hardware: a call of an operation that is declared to, or starting or stopping a component of
+/// a type that says so. Seen in a system in which its component exists; of one that does not, nothing is known to move.
+///
+/// What moves because of a value (a gain, a reference) cannot be known.
 pub fn moves(step: &Step, view: &impl View) -> bool {
+    let Some(ty) = view.component(step.component()).map(|node| &node.ty) else { return false };
     match step {
-        Step::Operation(call) => view
-            .component(call.operation.component)
-            .and_then(|node| node.ty.operations.get(&call.operation.member))
-            .is_some_and(|operation| operation.moves),
-        Step::State { component, transition } => view.component(*component).is_some_and(|node| match transition {
-            Transition::Start => node.ty.moves.start,
-            Transition::Stop => node.ty.moves.stop,
-            Transition::Configure | Transition::Cleanup => false,
-        }),
-        _ => false,
+        Step::State { transition: Transition::Start, .. } => ty.moves.start,
+        Step::State { transition: Transition::Stop, .. } => ty.moves.stop,
+        Step::Operation(call) => ty.operations.get(&call.operation.member).is_some_and(|o| o.moves),
+        Step::State { transition: Transition::Configure | Transition::Cleanup, .. }
+        | Step::Create { .. }
+        | Step::Destroy { .. }
+        | Step::Connect { .. }
+        | Step::Disconnect { .. }
+        | Step::PropertySet { .. }
+        | Step::PortWrite { .. } => false,
     }
+}
+
+/// Whether undoing a step moves hardware, seen in the system before it or after it.
+pub fn undo_moves(undo: &Undo, view: &impl View) -> bool {
+    undo.steps().iter().any(|step| moves(step, view))
 }
 
 /// Makes `step` happen in the picture, when its precondition holds.
@@ -227,7 +236,7 @@ fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &im
         found.push(Violation::Exists(name));
     }
     let Some(ty) = view.types().get(ty) else {
-        found.push(Violation::UnknownType(ty));
+        found.push(Violation::UnknownType { component: name, ty });
         return;
     };
     if ty.properties.len() != values.len() {
@@ -236,7 +245,7 @@ fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &im
         return;
     }
     for ((property, declared), value) in ty.properties.iter().zip(values) {
-        check_value(name.member(*property), declared, value, found);
+        found.extend(bad_value(name.member(*property), declared, value));
     }
 }
 
@@ -267,9 +276,13 @@ fn port_of<'v>(port: MemberRef, view: &'v impl View, found: &mut Vec<Violation>)
     };
     let declared = node.ty.ports.get(&port.member);
     if declared.is_none() {
-        found.push(Violation::UnknownPort { port, ty: node.ty.name });
+        found.push(lacks(Member::Port, port, node));
     }
     declared
+}
+
+fn lacks(what: Member, member: MemberRef, node: &Node) -> Violation {
+    Violation::UnknownMember { what, member, types: vec![node.ty.name] }
 }
 
 /// Out-ports that drive an in-port. A search: only for messages.
@@ -287,31 +300,32 @@ fn sources(to: MemberRef, view: &impl View) -> Vec<MemberRef> {
 fn connect_allowed(from: MemberRef, to: MemberRef, policy: Policy, view: &impl View, found: &mut Vec<Violation>) {
     let source = port_of(from, view, found);
     let sink = port_of(to, view, found);
-    if source.is_some_and(|p| p.direction != Direction::Out) {
-        found.push(Violation::NotOut(from));
+    if let Some(p) = source.filter(|p| p.direction != Direction::Out) {
+        found.push(Violation::NotOut { port: from, declared: p.origin });
     }
-    if sink.is_some_and(|p| p.direction != Direction::In) {
-        found.push(Violation::NotIn(to));
+    if let Some(p) = sink.filter(|p| p.direction != Direction::In) {
+        found.push(Violation::NotIn { port: to, declared: p.origin });
     }
     if policy == Policy::Buffer(0) {
         found.push(Violation::BufferSize(to));
     }
     let (Some(source), Some(sink)) = (source, sink) else { return };
+    let ends = ((from, source.origin), (to, sink.origin));
     if source.ty != sink.ty {
         let (from_ty, to_ty) = (source.ty.clone(), sink.ty.clone());
-        found.push(Violation::PortTypes { from, to, from_ty, to_ty });
+        found.push(Violation::PortTypes { from: ends.0, to: ends.1, from_ty, to_ty });
     }
     if let (Some(from_unit), Some(to_unit)) = (&source.unit, &sink.unit)
         && from_unit != to_unit
     {
         let (from_unit, to_unit) = (from_unit.clone(), to_unit.clone());
-        found.push(Violation::PortUnits { from, to, from_unit, to_unit });
+        found.push(Violation::PortUnits { from: ends.0, to: ends.1, from_unit, to_unit });
     }
     if view.link(from, to).is_some() {
         found.push(Violation::AlreadyConnected { from, to });
     } else if !sink.is_event() {
         if sink.buffered && policy == Policy::Data {
-            found.push(Violation::NeedsBuffer(to));
+            found.push(Violation::NeedsBuffer { port: to, declared: sink.origin });
         }
         let Driven { links, data } = view.driven(to);
         if data > 0 || (policy == Policy::Data && links > 0) {
@@ -320,7 +334,8 @@ fn connect_allowed(from: MemberRef, to: MemberRef, policy: Policy, view: &impl V
     }
 }
 
-fn check_value(slot: MemberRef, declared: &crate::model::PropertyType, value: &Value, found: &mut Vec<Violation>) {
+/// Why a property cannot have this value, which is of its type already or can be of none.
+pub(crate) fn bad_value(slot: MemberRef, declared: &PropertyType, value: &Value) -> Option<Violation> {
     let bounded = declared.min.is_some() || declared.max.is_some();
     let mut within = true;
     if bounded {
@@ -328,13 +343,24 @@ fn check_value(slot: MemberRef, declared: &crate::model::PropertyType, value: &V
             within &= declared.min.is_none_or(|m| n >= m) && declared.max.is_none_or(|m| n <= m);
         });
     }
-    if !(within && value.is_of(&declared.ty)) {
-        let reason = match declared.fit(value.clone()) {
-            Err(error) => error.to_string(),
-            Ok(fitted) => format!("expected {}, found {} (not converted)", declared.ty, fitted.describe()),
-        };
-        found.push(Violation::BadValue { slot, reason });
+    if within && value.is_of(&declared.ty) {
+        return None;
     }
+    let reason = match declared.fit(value.clone()) {
+        Err(error) => error.to_string(),
+        Ok(fitted) => unfitted(&declared.ty, &fitted),
+    };
+    let wanted = wanted(&declared.ty, declared.unit.as_deref());
+    Some(Violation::BadValue { slot, value: brief(value), reason, wanted, declared: declared.origin })
+}
+
+fn unfitted(ty: &ValueType, value: &Value) -> String {
+    format!("expected {ty}, found {} (not converted)", value.describe())
+}
+
+/// `float in N`.
+fn wanted(ty: &ValueType, unit: Option<&str>) -> String {
+    unit.map_or_else(|| ty.to_string(), |unit| format!("{ty} in {unit}"))
 }
 
 fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut Vec<Violation>) {
@@ -343,23 +369,24 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
         return;
     };
     let Some((_, declared)) = node.property(property.member) else {
-        found.push(Violation::UnknownProperty { property, ty: node.ty.name });
+        found.push(lacks(Member::Property, property, node));
         return;
     };
     if !declared.tunable.allows(node.state) {
-        found.push(Violation::NotTunable { property, tunable: declared.tunable, state: node.state });
+        let (tunable, state, declared) = (declared.tunable, node.state, declared.origin);
+        found.push(Violation::NotTunable { property, tunable, state, declared });
     }
-    check_value(property, declared, value, found);
+    found.extend(bad_value(property, declared, value));
 }
 
 fn write_allowed(port: MemberRef, value: Option<&Value>, view: &impl View, found: &mut Vec<Violation>) {
     let Some(declared) = port_of(port, view, found) else { return };
     if declared.direction != Direction::In {
-        found.push(Violation::NotIn(port));
+        found.push(Violation::WritesOut { port, declared: declared.origin });
         return;
     }
     if declared.is_event() || declared.buffered {
-        found.push(Violation::NotWritable { port, event: declared.is_event() });
+        found.push(Violation::NotWritable { port, event: declared.is_event(), declared: declared.origin });
         return;
     }
     if let Some(value) = value
@@ -367,9 +394,10 @@ fn write_allowed(port: MemberRef, value: Option<&Value>, view: &impl View, found
     {
         let reason = match value.clone().fit(&declared.ty) {
             Err(error) => error.to_string(),
-            Ok(_) => format!("expected {}, found {} (not converted)", declared.ty, value.describe()),
+            Ok(_) => unfitted(&declared.ty, value),
         };
-        found.push(Violation::BadValue { slot: port, reason });
+        let wanted = wanted(&declared.ty, declared.unit.as_deref());
+        found.push(Violation::BadValue { slot: port, value: brief(value), reason, wanted, declared: declared.origin });
     }
     if view.driven(port).links > 0 {
         found.push(Violation::Driven { port, by: sources(port, view) });
@@ -383,21 +411,63 @@ fn call_allowed(call: &Call, view: &impl View, found: &mut Vec<Violation>) {
         return;
     };
     let Some(declared) = node.ty.operations.get::<Ident>(&operation.member) else {
-        found.push(Violation::UnknownOperation { operation, ty: node.ty.name });
+        found.push(lacks(Member::Operation, operation, node));
         return;
     };
+    let (wanted, origin) = (|| declared.args.clone(), declared.origin);
     if declared.args.len() != call.args.len() {
-        let (expected, given) = (declared.args.len(), call.args.len());
-        found.push(Violation::ArgumentCount { operation, expected, found: given });
+        let found_n = call.args.len();
+        found.push(Violation::ArgumentCount { operation, wanted: wanted(), found: found_n, declared: origin });
         return;
     }
     for (i, (ty, value)) in declared.args.iter().zip(&call.args).enumerate() {
         if !value.is_of(ty) {
             let reason = match value.clone().fit(ty) {
                 Err(error) => error.to_string(),
-                Ok(_) => format!("expected {ty}, found {} (not converted)", value.describe()),
+                Ok(_) => unfitted(ty, value),
             };
-            found.push(Violation::Argument { operation, position: i + 1, reason });
+            let (position, value) = (i + 1, brief(value));
+            found.push(Violation::Argument { operation, position, value, reason, wanted: wanted(), declared: origin });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Catalogue, ComponentType, Moves, OperationType};
+    use crate::system::System;
+    use std::sync::Arc;
+
+    #[test]
+    fn what_moves_is_what_its_type_says() {
+        let ident = |name| Ident::new(name).unwrap();
+        let mut ty = ComponentType::new("Arm", "");
+        ty.moves = Moves { start: true, stop: false };
+        for (name, moves) in [("fold", true), ("look", false)] {
+            ty.operations.insert(ident(name), OperationType { moves, ..OperationType::new(Effect::None) });
+        }
+        let mut types = Catalogue::new();
+        types.insert(ty);
+        let mut system = System::new(Arc::new(types));
+        let arm = ComponentName::new("arm").unwrap();
+        let create =
+            Step::Create { component: arm, ty: TypeName::new("Arm").unwrap(), activity: None, properties: vec![] };
+        let state = |transition| Step::State { component: arm, transition };
+        let call = |name| Step::Operation(Call { operation: arm.member(ident(name)), args: vec![] });
+        assert!(!moves(&state(Transition::Start), &system), "of a component that is not there nothing is known");
+        assert!(!moves(&create, &system));
+        apply(&create, &mut system).unwrap();
+        let moving: Vec<bool> = [Transition::Configure, Transition::Start, Transition::Stop, Transition::Cleanup]
+            .map(|transition| moves(&state(transition), &system))
+            .to_vec();
+        assert_eq!(moving, [false, true, false, false]);
+        assert_eq!(["fold", "look", "nothing"].map(|name| moves(&call(name), &system)), [true, false, false]);
+        assert!(!moves(&Step::Destroy { component: arm }, &system));
+        assert!(undo_moves(&inverse(&state(Transition::Stop), None, &system), &system));
+        assert!(!undo_moves(&inverse(&state(Transition::Start), None, &system), &system));
+        let Step::Operation(fold) = call("fold") else { unreachable!() };
+        assert!(undo_moves(&inverse(&call("look"), Some(&fold), &system), &system));
+        assert!(!undo_moves(&Undo::Nothing, &system));
     }
 }

@@ -1,19 +1,64 @@
-//! Why a step may not happen, as data.
+//! Why a step may not happen, as data. What a user reads of it is in `advice`.
 
-use super::View;
 use crate::model::codes::{self, Code};
-use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, Ident, MemberRef, RunState, Transition, Tunable, TypeName, ValueType};
+use crate::model::{
+    ComponentName, ComponentType, Ident, MemberRef, Origin, RunState, Transition, Tunable, TypeName, Value, ValueType,
+};
 use std::sync::Arc;
 
-/// A false precondition of a step.
+/// A kind of what components have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Member {
+    /// A port.
+    Port,
+    /// A property.
+    Property,
+    /// An operation.
+    Operation,
+}
+
+impl Member {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Port, Self::Property, Self::Operation];
+
+    /// What it is called: one, and several.
+    pub fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Port => ("port", "ports"),
+            Self::Property => ("property", "properties"),
+            Self::Operation => ("operation", "operations"),
+        }
+    }
+
+    /// Whether a type has one of that name.
+    pub fn is_in(self, ty: &ComponentType, name: Ident) -> bool {
+        match self {
+            Self::Port => ty.ports.contains_key(&name),
+            Self::Property => ty.properties.contains_key(&name),
+            Self::Operation => ty.operations.contains_key(&name),
+        }
+    }
+
+    /// The names of those that a type has.
+    pub fn of(self, ty: &ComponentType) -> Vec<&'static str> {
+        match self {
+            Self::Port => ty.ports.keys().map(Ident::as_str).collect(),
+            Self::Property => ty.properties.keys().map(Ident::as_str).collect(),
+            Self::Operation => ty.operations.keys().map(Ident::as_str).collect(),
+        }
+    }
+}
+
+/// A false precondition of a step, or of what is made into one. `declared` is where the member at fault was declared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum Violation {
     #[error("there is no component `{0}`")]
     UnknownComponent(ComponentName),
-    #[error("there is no component type `{0}`")]
-    UnknownType(TypeName),
+    #[error("there is no component type `{ty}`")]
+    UnknownType { component: ComponentName, ty: TypeName },
+    #[error("there is no activity `{activity}` for `{component}`")]
+    UnknownActivity { component: ComponentName, activity: Ident, near: String },
     #[error("there is a component `{0}` already")]
     Exists(ComponentName),
     #[error("`{component}` cannot {transition}: it is {state}")]
@@ -22,42 +67,51 @@ pub enum Violation {
     NotUnconfigured { component: ComponentName, state: RunState },
     #[error("`{component}` still has connections: {}", list(links))]
     StillConnected { component: ComponentName, links: Vec<(MemberRef, MemberRef)> },
-    #[error("`{}` ({ty}) has no port `{}`", port.component, port.member)]
-    UnknownPort { port: MemberRef, ty: TypeName },
-    #[error("`{}` ({ty}) has no property `{}`", property.component, property.member)]
-    UnknownProperty { property: MemberRef, ty: TypeName },
-    #[error("`{}` ({ty}) has no operation `{}`", operation.component, operation.member)]
-    UnknownOperation { operation: MemberRef, ty: TypeName },
-    #[error("`{0}` is an in-port; a connection begins at an out-port")]
-    NotOut(MemberRef),
-    #[error("`{0}` is an out-port; only an in-port can be connected to or written")]
-    NotIn(MemberRef),
-    #[error("`{from}` carries {from_ty}, `{to}` takes {to_ty}")]
-    PortTypes { from: MemberRef, to: MemberRef, from_ty: ValueType, to_ty: ValueType },
-    #[error("`{from}` is in {from_unit}, `{to}` in {to_unit}")]
-    PortUnits { from: MemberRef, to: MemberRef, from_unit: Arc<str>, to_unit: Arc<str> },
+    /// `types` are all that the component may be of. The member alone is quoted: a finding points at what it quotes first.
+    #[error("{} ({}) has no {} `{}`", member.component, either(types), what.words().0, member.member)]
+    UnknownMember { what: Member, member: MemberRef, types: Vec<TypeName> },
+    #[error("`{port}` is an in-port; a connection begins at an out-port")]
+    NotOut { port: MemberRef, declared: Origin },
+    #[error("`{port}` is an out-port; a connection ends at an in-port")]
+    NotIn { port: MemberRef, declared: Origin },
+    #[error("`{port}` is an out-port; only an in-port can be written")]
+    WritesOut { port: MemberRef, declared: Origin },
+    #[error("`{}` carries {}, `{}` takes {}", from.0, from_ty, to.0, to_ty)]
+    PortTypes { from: (MemberRef, Origin), to: (MemberRef, Origin), from_ty: ValueType, to_ty: ValueType },
+    #[error("`{}` is in {}, `{}` in {}", from.0, from_unit, to.0, to_unit)]
+    PortUnits { from: (MemberRef, Origin), to: (MemberRef, Origin), from_unit: Arc<str>, to_unit: Arc<str> },
     #[error("`{from}` and `{to}` are connected already")]
     AlreadyConnected { from: MemberRef, to: MemberRef },
     #[error("`{from}` and `{to}` are not connected")]
     NotConnected { from: MemberRef, to: MemberRef },
     #[error("`{to}` is driven by {} already; a data connection must be the only one of its in-port", names(by))]
     DataAlone { to: MemberRef, by: Vec<MemberRef> },
-    #[error("`{0}` takes only buffered connections")]
-    NeedsBuffer(MemberRef),
+    #[error("`{port}` takes only buffered connections")]
+    NeedsBuffer { port: MemberRef, declared: Origin },
     #[error("the connection to `{0}` has a buffer without room for a sample")]
     BufferSize(MemberRef),
     #[error("`{property}` is tunable only while {}; `{}` is {state}", states(*tunable), property.component)]
-    NotTunable { property: MemberRef, tunable: Tunable, state: RunState },
-    #[error("the value of `{slot}`: {reason}")]
-    BadValue { slot: MemberRef, reason: String },
+    NotTunable { property: MemberRef, tunable: Tunable, state: RunState, declared: Origin },
+    /// `wanted` is what fits, in words.
+    #[error("`{slot}` cannot be {value}: {reason}")]
+    BadValue { slot: MemberRef, value: String, reason: String, wanted: String, declared: Origin },
+    #[error("`{}` is created without a value for `{}`, which has no default", property.component, property.member)]
+    MissingProperty { property: MemberRef, ty: ValueType, declared: Origin },
     #[error("`{port}` is driven by {} and cannot be written", names(by))]
     Driven { port: MemberRef, by: Vec<MemberRef> },
     #[error("`{port}` is {} port and cannot be written", if *event { "an event" } else { "a buffered" })]
-    NotWritable { port: MemberRef, event: bool },
-    #[error("`{operation}` takes {expected} arguments, {found} are given")]
-    ArgumentCount { operation: MemberRef, expected: usize, found: usize },
-    #[error("argument {position} of `{operation}`: {reason}")]
-    Argument { operation: MemberRef, position: usize, reason: String },
+    NotWritable { port: MemberRef, event: bool, declared: Origin },
+    #[error("`{operation}` takes {}, {found} {} given", arguments(wanted.len()), if *found == 1 { "is" } else { "are" })]
+    ArgumentCount { operation: MemberRef, wanted: Vec<ValueType>, found: usize, declared: Origin },
+    #[error("argument {position} of `{operation}` cannot be {value}: {reason}")]
+    Argument {
+        operation: MemberRef,
+        position: usize,
+        value: String,
+        reason: String,
+        wanted: Vec<ValueType>,
+        declared: Origin,
+    },
     #[error("`{component}` is created with {found} values, its type has {expected} properties")]
     PropertyCount { component: ComponentName, expected: usize, found: usize },
 }
@@ -72,6 +126,26 @@ fn names(by: &[MemberRef]) -> String {
     if shown.is_empty() { "a connection".to_owned() } else { shown.join(", ") }
 }
 
+/// `Pid`, `Pid or Mpc`, `Lqr, Pid or Mpc`.
+pub fn either(types: &[TypeName]) -> String {
+    match types {
+        [] => "of unknown type".to_owned(),
+        [one] => one.to_string(),
+        [most @ .., last] => {
+            let most: Vec<&str> = most.iter().map(TypeName::as_str).collect();
+            format!("{} or {last}", most.join(", "))
+        }
+    }
+}
+
+fn arguments(n: usize) -> String {
+    match n {
+        0 => "no arguments".to_owned(),
+        1 => "1 argument".to_owned(),
+        n => format!("{n} arguments"),
+    }
+}
+
 fn states(tunable: Tunable) -> &'static str {
     match tunable {
         Tunable::Unconfigured => "unconfigured",
@@ -80,85 +154,126 @@ fn states(tunable: Tunable) -> &'static str {
     }
 }
 
+/// A value in a message: as it is written, or what kind of value it is where that is long.
+pub(super) fn brief(value: &Value) -> String {
+    let text = value.to_string();
+    if text.chars().count() <= 60 { text } else { value.describe() }
+}
+
 impl Violation {
     /// The stable code.
     pub fn code(&self) -> Code {
         match self {
             Self::UnknownComponent(_) => codes::UNKNOWN_COMPONENT,
-            Self::UnknownType(_) => codes::UNKNOWN_TYPE,
+            Self::UnknownType { .. } => codes::UNKNOWN_TYPE,
+            Self::UnknownActivity { .. } => codes::UNKNOWN_ACTIVITY,
             Self::Exists(_) => codes::COMPONENT_EXISTS,
             Self::Transition { .. } => codes::ILLEGAL_TRANSITION,
             Self::NotUnconfigured { .. } => codes::NOT_UNCONFIGURED,
             Self::StillConnected { .. } => codes::STILL_CONNECTED,
-            Self::UnknownPort { .. } => codes::UNKNOWN_PORT,
-            Self::UnknownProperty { .. } => codes::UNKNOWN_PROPERTY,
-            Self::UnknownOperation { .. } => codes::UNKNOWN_OPERATION,
-            Self::NotOut(_) => codes::NOT_AN_OUT_PORT,
-            Self::NotIn(_) => codes::NOT_AN_IN_PORT,
+            Self::UnknownMember { what: Member::Port, .. } => codes::UNKNOWN_PORT,
+            Self::UnknownMember { what: Member::Property, .. } => codes::UNKNOWN_PROPERTY,
+            Self::UnknownMember { what: Member::Operation, .. } => codes::UNKNOWN_OPERATION,
+            Self::NotOut { .. } => codes::NOT_AN_OUT_PORT,
+            Self::NotIn { .. } | Self::WritesOut { .. } => codes::NOT_AN_IN_PORT,
             Self::PortTypes { .. } => codes::PORT_TYPES,
             Self::PortUnits { .. } => codes::PORT_UNITS,
             Self::AlreadyConnected { .. } => codes::ALREADY_CONNECTED,
             Self::NotConnected { .. } => codes::NOT_CONNECTED,
             Self::DataAlone { .. } => codes::DATA_ALONE,
-            Self::NeedsBuffer(_) => codes::NEEDS_BUFFER,
+            Self::NeedsBuffer { .. } => codes::NEEDS_BUFFER,
             Self::BufferSize(_) => codes::BUFFER_SIZE,
             Self::NotTunable { .. } => codes::NOT_TUNABLE,
             Self::BadValue { .. } | Self::PropertyCount { .. } => codes::BAD_VALUE,
+            Self::MissingProperty { .. } => codes::MISSING_PROPERTY,
             Self::Driven { .. } => codes::PORT_DRIVEN,
             Self::NotWritable { .. } => codes::PORT_NOT_WRITABLE,
             Self::ArgumentCount { .. } | Self::Argument { .. } => codes::BAD_ARGUMENTS,
         }
     }
 
-    /// What to do about it, with near names where a name is unknown in `view`.
-    pub fn help(&self, view: &impl View) -> Option<String> {
-        let members = |component: ComponentName, pick: fn(&super::Node) -> Vec<Ident>| {
-            view.component(component).map(pick).unwrap_or_default()
-        };
-        Some(match self {
-            Self::UnknownComponent(name) => {
-                let mut known = Vec::new();
-                view.for_each_component(&mut |node| known.push(node.name));
-                known.sort_unstable();
-                did_you_mean(name.as_str(), "components", known.iter().map(|n| n.as_str()))
-            }
-            Self::UnknownType(name) => {
-                let known: Vec<TypeName> = view.types().iter().map(|t| t.name).collect();
-                did_you_mean(name.as_str(), "component types", known.iter().map(|n| n.as_str()))
-            }
-            Self::UnknownPort { port, .. } => {
-                let known = members(port.component, |n| n.ty.ports.keys().copied().collect());
-                did_you_mean(port.member.as_str(), "ports", known.iter().map(|n| n.as_str()))
-            }
-            Self::UnknownProperty { property, .. } => {
-                let known = members(property.component, |n| n.ty.properties.keys().copied().collect());
-                did_you_mean(property.member.as_str(), "properties", known.iter().map(|n| n.as_str()))
-            }
-            Self::UnknownOperation { operation, .. } => {
-                let known = members(operation.component, |n| n.ty.operations.keys().copied().collect());
-                did_you_mean(operation.member.as_str(), "operations", known.iter().map(|n| n.as_str()))
-            }
-            Self::Exists(name) => format!("destroy `{name}` in the same configuration, or choose another name"),
-            Self::StillConnected { links, .. } => {
-                let shown: Vec<String> =
-                    links.iter().map(|(from, to)| format!("disconnect(\"{from}\", \"{to}\")")).collect();
-                format!("add {}", shown.join(", "))
-            }
-            Self::NotOut(_) | Self::NotIn(_) => "are the two ends exchanged? connect(out_port, in_port)".to_owned(),
-            Self::AlreadyConnected { from, to } => {
-                format!("to change the policy add disconnect(\"{from}\", \"{to}\") to the same configuration")
-            }
-            Self::DataAlone { to, by } | Self::Driven { port: to, by } => match by.first() {
-                Some(from) => format!("add disconnect(\"{from}\", \"{to}\") to the same configuration"),
-                None => return None,
-            },
-            Self::NeedsBuffer(_) => "give a policy: { buffer = 64 }".to_owned(),
-            Self::NotTunable { property, tunable, .. } => {
-                let state = if *tunable == Tunable::Unconfigured { "unconfigured" } else { "stopped" };
-                let c = property.component;
-                format!("add \"{c}:{state}\" to pre_conf_state, and \"{c}:running\" to post_conf_state")
-            }
-            _ => return None,
-        })
+    /// Whether it follows from the types of the components (and the deployment's activities) alone: then it is there in
+    /// every system in which they are of these types. What is not depends on what is there, in which run state, and how it
+    /// is connected.
+    pub fn is_of_types(&self) -> bool {
+        match self {
+            Self::UnknownType { .. }
+            | Self::UnknownActivity { .. }
+            | Self::UnknownMember { .. }
+            | Self::NotOut { .. }
+            | Self::NotIn { .. }
+            | Self::WritesOut { .. }
+            | Self::PortTypes { .. }
+            | Self::PortUnits { .. }
+            | Self::NeedsBuffer { .. }
+            | Self::BufferSize(_)
+            | Self::BadValue { .. }
+            | Self::MissingProperty { .. }
+            | Self::NotWritable { .. }
+            | Self::ArgumentCount { .. }
+            | Self::Argument { .. }
+            | Self::PropertyCount { .. } => true,
+            Self::UnknownComponent(_)
+            | Self::Exists(_)
+            | Self::Transition { .. }
+            | Self::NotUnconfigured { .. }
+            | Self::StillConnected { .. }
+            | Self::AlreadyConnected { .. }
+            | Self::NotConnected { .. }
+            | Self::DataAlone { .. }
+            | Self::NotTunable { .. }
+            | Self::Driven { .. } => false,
+        }
+    }
+
+    /// Whether it is the same mistake as `other`, if perhaps of another type: that `c` has no property `x`, that `c.k`
+    /// cannot be so.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.code() == other.code() && self.members() == other.members()
+    }
+
+    /// Whether it is about a member of that component.
+    pub fn is_about(&self, component: ComponentName) -> bool {
+        self.members().iter().flatten().any(|member| member.component == component)
+    }
+
+    /// The members it is about.
+    fn members(&self) -> [Option<MemberRef>; 2] {
+        match self {
+            Self::UnknownMember { member: m, .. }
+            | Self::NotOut { port: m, .. }
+            | Self::NotIn { port: m, .. }
+            | Self::WritesOut { port: m, .. }
+            | Self::NeedsBuffer { port: m, .. }
+            | Self::BufferSize(m)
+            | Self::NotTunable { property: m, .. }
+            | Self::BadValue { slot: m, .. }
+            | Self::MissingProperty { property: m, .. }
+            | Self::Driven { port: m, .. }
+            | Self::DataAlone { to: m, .. }
+            | Self::NotWritable { port: m, .. }
+            | Self::ArgumentCount { operation: m, .. }
+            | Self::Argument { operation: m, .. } => [Some(*m), None],
+            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } => [Some(from.0), Some(to.0)],
+            Self::AlreadyConnected { from, to } | Self::NotConnected { from, to } => [Some(*from), Some(*to)],
+            Self::UnknownComponent(_)
+            | Self::UnknownType { .. }
+            | Self::UnknownActivity { .. }
+            | Self::Exists(_)
+            | Self::Transition { .. }
+            | Self::NotUnconfigured { .. }
+            | Self::StillConnected { .. }
+            | Self::PropertyCount { .. } => [None, None],
+        }
+    }
+
+    /// This violation where the component may be of the types of `other` as well.
+    #[must_use]
+    pub fn or(mut self, other: &Self) -> Self {
+        if let (Self::UnknownMember { types, .. }, Self::UnknownMember { types: more, .. }) = (&mut self, other) {
+            let new: Vec<TypeName> = more.iter().copied().filter(|ty| !types.contains(ty)).collect();
+            types.extend(new);
+        }
+        self
     }
 }

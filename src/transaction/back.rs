@@ -3,11 +3,10 @@
 
 use super::Transaction;
 use super::run::Run;
-use crate::model::{ComponentName, OnFailure, Origin, Step};
-use crate::plan::undo::{Item, Script};
+use crate::model::{ComponentName, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
 use crate::system::touch::{Slot, components};
-use crate::system::{Overlay, Reversibility, System, Undo, step};
+use crate::system::{Reversibility, System, Undo, View as _, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
@@ -68,6 +67,8 @@ fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> Plan
         step,
         reversibility: Reversibility::Exact,
         undo: Undo::Nothing,
+        moves: false,
+        undo_moves: false,
         origin: Origin::NONE,
     }
 }
@@ -100,7 +101,8 @@ impl Transaction {
     pub(super) fn way_back(&self, part: usize, live: &System) -> WayBack {
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut way = WayBack::default();
-        if self.taken_down {
+        let held = self.holds(part);
+        if self.taken_down || held && part == 0 {
             return way;
         }
         let mut ends: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
@@ -112,19 +114,18 @@ impl Transaction {
         }
         let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
         for i in forward.done.iter().rev().copied() {
-            if self.taken_back.contains(&i) || self.part_of(i) < part {
+            if held || self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
-            let late = forward.late.iter().find(|(late, _)| *late == i).map(|(_, undo)| undo);
-            let undo = late.unwrap_or_else(|| self.undo_of(i));
+            let late = self.late(i).is_some();
             let original = &forward.list[i as usize];
             let mut after: SmallVec<[u32; 4]> =
                 followers[i as usize].iter().flat_map(|f| ends[*f as usize].clone()).collect();
             after.sort_unstable();
             after.dedup();
-            for back in undo.steps() {
-                let touched = late.is_none() && self.touched.has(back);
-                if late.is_none() && !self.may_move(i) && step::moves(back, live) {
+            for back in self.steps_back(i, part) {
+                let touched = !late && self.touched.has(back);
+                if !late && !self.may_move(i) && step::moves(back, live) {
                     way.withheld = Some(back.clone());
                     return way;
                 }
@@ -146,6 +147,11 @@ impl Transaction {
         way
     }
 
+    /// Whether what was done of a part stays when it fails.
+    fn holds(&self, part: usize) -> bool {
+        self.planned.parts[part].on_failure == OnFailure::Hold && !self.asked_back
+    }
+
     /// Whether the way back of a forward step may move.
     fn may_move(&self, i: u32) -> bool {
         self.asked_back || !self.interrupted && self.planned.parts[self.part_of(i)].on_failure == OnFailure::Rollback
@@ -156,54 +162,98 @@ impl Transaction {
         self.planned.part_of(self.planned.place(i as usize))
     }
 
-    /// What takes a step of the forward list back: to where the parts before it have led, not to before all of them.
-    pub(super) fn undo_of(&self, i: u32) -> &Undo {
-        match self.planned.place(i as usize) {
-            Some(place) => &self.whole()[place as usize].undo,
-            None => &self.forward.as_ref().expect("something was carried out").list[i as usize].undo,
-        }
+    /// What takes back a step that came in after the transaction was to stop.
+    fn late(&self, i: u32) -> Option<&Undo> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        forward.late.iter().find(|(late, _)| *late == i).map(|(_, undo)| undo)
     }
 
-    /// Adds what is missing of the parts before `part`: they were to stand whatever comes after them.
+    /// The steps that are still to be done to take a step of the forward list back.
+    pub(super) fn steps_back(&self, i: u32, part: usize) -> &[Step] {
+        let steps = self.late(i).unwrap_or_else(|| self.undo_of(i, part)).steps();
+        &steps[self.partly.get(&i).map_or(0, |done| *done.min(&steps.len()))..]
+    }
+
+    /// Whether some of the steps that take a step back were done.
+    pub(super) fn is_partly_back(&self, i: u32) -> bool {
+        self.partly.get(&i).is_some_and(|done| *done > 0)
+    }
+
+    /// What takes a step of the forward list back, to where the parts before `part` have led.
+    pub(super) fn undo_of(&self, i: u32, part: usize) -> &Undo {
+        let forward = &self.forward.as_ref().expect("something was carried out").list[i as usize];
+        // The net was planned on the system before all of them.
+        let Some(place) = self.planned.place(i as usize).filter(|_| part > 0 && !self.planned.whole.is_empty()) else {
+            return &forward.undo;
+        };
+        let whole = self.whole();
+        let Some(slot) = crate::system::touch::absolute(&forward.step) else { return &whole[place as usize].undo };
+        // An earlier write of the same slot may have been left out of the net.
+        let from = self.planned.parts[part].range.start as usize;
+        let first = whole[from..].iter().find(|planned| crate::system::touch::absolute(&planned.step) == Some(slot));
+        &first.unwrap_or(&whole[place as usize]).undo
+    }
+
+    /// The system that the parts before `part` lead to, as the model knows it before anything is taken back; with what was
+    /// done of `part` and later ones, where that is held.
+    pub(super) fn led_to(&self, part: usize, live: &System) -> System {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let mut system = live.clone();
+        for (component, state) in forward.faulted.iter().rev() {
+            if system.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
+                system.set_state(*component, *state);
+            }
+        }
+        // The net was planned on the system before all of them: its own inverses lead there.
+        for i in forward.done.iter().rev() {
+            for back in forward.list[*i as usize].undo.steps() {
+                let _ = step::apply(back, &mut system);
+            }
+        }
+        let before = |place: &u32| self.planned.part_of(Some(*place)) < part;
+        for (_, planned) in (0u32..).zip(self.whole()).take_while(|(place, _)| before(place)) {
+            let _ = step::apply(&planned.step, &mut system);
+        }
+        if self.holds(part) {
+            for i in forward.done.iter().filter(|i| self.part_of(**i) >= part) {
+                let _ = step::apply(&forward.list[*i as usize].step, &mut system);
+            }
+        }
+        system
+    }
+
+    /// Adds what is missing of the parts before `part`: they were to stand whatever comes after them. First their calls, with
+    /// what these need; then whatever else differs.
     fn finish_before(&self, part: usize, live: &System, way: &mut WayBack) {
+        let Some(between) = &self.between else { return };
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
         done.extend(self.finished.iter().copied());
-        let mut view = Overlay::new(live);
+        let before = |place: &u32| self.planned.part_of(Some(*place)) < part;
+        let open: Vec<(u32, &PlannedStep)> =
+            (0u32..).zip(self.whole()).filter(|(place, _)| before(place) && !done.contains(place)).collect();
+        let mut view = live.clone();
         for step in &way.list {
             let _ = step::apply(&step.step, &mut view);
         }
-        // What a held part has written stands above what the parts before it would write.
-        let held: FxHashSet<Slot> = (forward.done.iter())
-            .filter(|i| {
-                self.part_of(**i) >= part && !way.takes_back.contains(&Some(**i)) && !self.taken_back.contains(*i)
-            })
-            .filter_map(|i| crate::system::touch::absolute(&forward.list[*i as usize].step))
-            .collect();
         let wave = way.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);
-        let mut script = Script::new(&mut view);
-        for (place, planned) in (0u32..).zip(self.whole()) {
-            let before = self.planned.part_of(Some(place)) < part;
-            let overwritten = crate::system::touch::absolute(&planned.step).is_some_and(|slot| held.contains(&slot));
-            if !before || done.contains(&place) || overwritten {
-                continue;
-            }
-            let mut item = Item::of(planned);
-            item.of = place;
-            let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-            if script.add(item, 0, &after).is_err() {
-                break;
+        let first = way.list.len();
+        let add = |way: &mut WayBack, step: Step, place: Option<u32>| {
+            let id = StepId::try_from(way.list.len()).expect("fewer steps than that");
+            let after = id.checked_sub(1).filter(|_| way.list.len() > first).into_iter().collect();
+            way.list.push(item(step, id, wave, after));
+            way.takes_back.push(None);
+            way.finishes.push(place);
+        };
+        // A call needs what stands before it; without one, the difference is the shortest way.
+        let last = open.iter().rposition(|(_, planned)| matches!(planned.step, Step::Operation(_)));
+        for (place, planned) in open.iter().take(last.map_or(0, |at| at + 1)) {
+            if step::apply(&planned.step, &mut view).is_ok() {
+                add(way, planned.step.clone(), Some(*place));
             }
         }
-        let Ok((steps, of)) = script.finish_placed() else { return };
-        let base = way.list.len() as u32;
-        for (mut planned, place) in steps.into_iter().zip(of) {
-            planned.id += base;
-            planned.after.iter_mut().for_each(|id| *id += base);
-            planned.wave = wave;
-            way.list.push(planned);
-            way.takes_back.push(None);
-            way.finishes.push((place != Item::NOWHERE).then_some(place));
+        for step in diff(&view, between) {
+            add(way, step, None);
         }
     }
 }

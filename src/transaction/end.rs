@@ -57,7 +57,7 @@ impl Transaction {
         let residual =
             Residual { unsettled: self.unsettled.clone(), quarantined: self.hung(can), ..Residual::of(self.reason()) };
         let own = self.own();
-        let broken = self.broken(0, residual, live.snapshot_some(&own));
+        let broken = self.broken(0, residual, live.snapshot_some(&own), false);
         self.over(vec![broken]);
     }
 
@@ -89,7 +89,7 @@ impl Transaction {
     fn remaining(&self, part: usize) -> Vec<u32> {
         let forward = self.forward.as_ref().expect("it was carried out");
         let left = |i: &u32| {
-            let needs = !matches!(self.undo_of(*i), Undo::Nothing);
+            let needs = !matches!(self.undo_of(*i, part), Undo::Nothing);
             needs && !self.taken_back.contains(i) && self.part_of(*i) >= part
         };
         forward.done.iter().copied().filter(left).collect()
@@ -98,7 +98,7 @@ impl Transaction {
     /// Whether a difference may be mended by itself.
     fn mends(&self, part: usize) -> bool {
         let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
-        !held && self.withheld.is_none() && !self.taken_down
+        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
     }
 
     /// The system as it should be now, from the model: without the faults that this brought about, and, where nothing keeps
@@ -106,25 +106,37 @@ impl Transaction {
     fn wanted(&self, part: usize, live: &System) -> (System, bool) {
         let mut wanted = live.clone();
         let forward = self.forward.as_ref().expect("it was carried out");
-        for (component, state) in forward.faulted.iter().chain(&self.faulted) {
+        // The last fault of a component first: between two of them the way back may have brought it somewhere else.
+        for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
             if wanted.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
                 wanted.set_state(*component, *state);
             }
         }
         let remaining = self.remaining(part);
         let plain = |i: &u32| {
-            let steps = self.undo_of(*i).steps();
+            let steps = self.steps_back(*i, part);
             !steps.is_empty() && steps.iter().all(|step| !matches!(step, Step::Operation(_)))
         };
         let whole = self.mends(part) && remaining.iter().all(plain);
-        if whole {
-            for i in remaining.iter().rev() {
-                for back in self.undo_of(*i).steps() {
-                    let _ = step::apply(back, &mut wanted);
-                }
+        match (&self.between, whole) {
+            (Some(between), true) => wanted = between.as_ref().clone(),
+            (None, true) => self.take_back(&remaining, part, &mut wanted),
+            // Of what was taken back in part the rest belongs to what should be.
+            (_, false) => {
+                let partly: Vec<u32> = remaining.iter().copied().filter(|i| self.is_partly_back(*i)).collect();
+                self.take_back(&partly, part, &mut wanted);
             }
         }
         (wanted, whole)
+    }
+
+    /// Takes `remaining` back on `system`, latest first, as far as that goes.
+    fn take_back(&self, remaining: &[u32], part: usize, system: &mut System) {
+        for i in remaining.iter().rev() {
+            for back in self.steps_back(*i, part) {
+                let _ = step::apply(back, system);
+            }
+        }
     }
 
     /// Compares what was seen of its components with what should be; mends the difference once; names what remains.
@@ -132,7 +144,7 @@ impl Transaction {
         let part = self.failed_part();
         let own = self.own();
         let (wanted, whole) = match self.target.take() {
-            Some(target) => (*target, true),
+            Some(target) => *target,
             None => self.wanted(part, live),
         };
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
@@ -146,7 +158,7 @@ impl Transaction {
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
             if !steps.is_empty() && (asked || !steps.iter().any(|step| step::moves(step, live))) {
-                return self.mend(steps, wanted);
+                return self.mend(steps, (wanted, whole));
             }
         }
         self.judge(part, &wanted, whole, observed, live, can);
@@ -179,12 +191,14 @@ impl Transaction {
         let remaining = if whole { Vec::new() } else { self.remaining(part) };
         let forward = self.forward.as_ref().expect("it was carried out");
         let residual = Residual {
-            left: remaining.iter().map(|i| forward.list[*i as usize].step.clone()).collect(),
+            left: (remaining.iter().filter(|i| !self.is_partly_back(**i)))
+                .map(|i| forward.list[*i as usize].step.clone())
+                .collect(),
             withheld: self.withheld.clone(),
             difference,
             unsettled: unsettled.clone(),
             irreversible: (remaining.iter())
-                .filter(|i| matches!(self.undo_of(**i), Undo::Irreversible(_)))
+                .filter(|i| matches!(self.undo_of(**i, part), Undo::Irreversible(_)))
                 .map(|i| forward.list[*i as usize].step.clone())
                 .collect(),
             faulted,
@@ -195,12 +209,12 @@ impl Transaction {
         };
         self.unsettled = unsettled;
         let clean = residual.is_settled() && remaining.is_empty();
-        let missing = self.missing(part);
+        let missing = self.missing(part, live);
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if at < part {
                 if missing.contains(&at) {
-                    self.broken(at, Residual::of(self.reason()), Snapshot::default())
+                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false)
                 } else {
                     PartEnd::Done
                 }
@@ -208,7 +222,7 @@ impl Transaction {
                 match (clean, self.given_up) {
                     (true, Some(_)) if matches!(self.stopped_by, Some(Reason::GivenUp)) => PartEnd::Cancelled,
                     (true, _) => PartEnd::Failed(self.reason()),
-                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own)),
+                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
                 }
             } else if self.interrupted || self.taken_down {
                 PartEnd::Failed(self.reason())
@@ -219,26 +233,37 @@ impl Transaction {
         self.over(parts);
     }
 
-    /// Parts before `part` of which a step is neither done nor finished.
-    fn missing(&self, part: usize) -> FxHashSet<usize> {
-        if part == 0 || self.planned.of.is_empty() {
-            return FxHashSet::default();
-        }
-        // What the finishing script left out had nothing to do; only what it could not do is missing.
+    /// Parts before `part` that do not stand: a call of theirs was neither done nor finished, or what they lead to is not
+    /// there.
+    fn missing(&self, part: usize, live: &System) -> FxHashSet<usize> {
+        let Some(between) = &self.between else { return FxHashSet::default() };
         let forward = self.forward.as_ref().expect("it was carried out");
         let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
         done.extend(self.finished.iter().copied());
-        let calls = |place: &u32| matches!(self.whole()[*place as usize].step, Step::Operation(_));
-        let places = (0..self.whole().len() as u32).filter(|place| !done.contains(place)).filter(calls);
-        places.map(|place| self.planned.part_of(Some(place))).filter(|at| *at < part).collect()
+        let before = || (0..).zip(self.whole()).take_while(|(place, _)| self.planned.part_of(Some(*place)) < part);
+        let mut missing: FxHashSet<usize> = before()
+            .filter(|(place, planned)| !done.contains(place) && matches!(planned.step, Step::Operation(_)))
+            .map(|(place, _)| self.planned.part_of(Some(place)))
+            .collect();
+        // What is left of the failed part itself is told with that.
+        let mut stands = live.clone();
+        self.take_back(&self.remaining(part), part, &mut stands);
+        let differs: FxHashSet<ComponentName> = diff(&stands, between).iter().flat_map(touch::components).collect();
+        let differs =
+            before().filter(|(_, planned)| touch::components(&planned.step).iter().any(|c| differs.contains(c)));
+        missing.extend(differs.map(|(place, _)| self.planned.part_of(Some(place))));
+        missing
     }
 
-    /// A part that is neither done nor taken back.
-    fn broken(&self, part: usize, residual: Residual, expected: Snapshot) -> PartEnd {
+    /// A part that is neither done nor taken back. `whole`: going to `expected` takes all of it back, and its frame has
+    /// nothing to add to that.
+    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool) -> PartEnd {
         let planned = &self.planned.parts[part];
         let forward = self.forward.as_ref().expect("it was carried out");
         let undone = planned.pushes.is_none();
-        let items: Vec<Item> = if undone {
+        let items: Vec<Item> = if whole && !undone {
+            Vec::new()
+        } else if undone {
             // What is still to be undone of the frame.
             let done: FxHashSet<u32> = (forward.done.iter())
                 .filter(|i| !self.taken_back.contains(*i))
@@ -250,7 +275,7 @@ impl Transaction {
             let left = self.remaining(part).into_iter().filter(|i| self.part_of(*i) == part).rev();
             left.flat_map(|i| {
                 let of = &forward.list[i as usize];
-                self.undo_of(i).steps().iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
+                self.steps_back(i, part).iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
             })
             .collect()
         };
@@ -279,6 +304,8 @@ impl Transaction {
         });
         let instead = if undone { frame.as_ref().map(|frame| frame.id) } else { None };
         let residual = Arc::new(residual);
+        // Of a frame that was being undone nothing is: it stays as it is.
+        let frame = frame.filter(|_| !(whole && undone));
         PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected }))
     }
 }

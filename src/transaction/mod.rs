@@ -6,21 +6,23 @@
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `back`: the way back.
-//! `end`: what comes of each part.
+//! `end`: what comes of each part. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
 
 mod back;
 mod end;
+mod messages;
 mod order;
 mod run;
 mod settle;
 
 pub use back::Touched;
 pub use end::{BrokenPart, End, PartEnd};
+pub use messages::{Can, Input, Poll, Spec};
 
-use crate::model::{Cause, ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
+use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
@@ -28,77 +30,6 @@ use crate::time::Time;
 use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
-use smallvec::SmallVec;
-use std::time::Duration;
-
-/// How a transaction is carried out.
-#[derive(Debug, Clone, Copy)]
-pub struct Spec {
-    /// No step of it begins later.
-    pub until: Time,
-    /// What that time is, from its beginning, for words.
-    pub timeout: Duration,
-    /// How long one step may take.
-    pub patience: Duration,
-    /// Every step is tried, past failures, and none is taken back: a safe configuration.
-    pub best_effort: bool,
-    /// Somebody asked for what a way back would do: it may move.
-    pub asked_back: bool,
-}
-
-/// What whoever drives it can do now.
-pub struct Can<'a> {
-    /// How a step is carried out on the platform.
-    pub execution: &'a dyn Fn(&Step) -> Execution,
-    /// Whether there is room for a call that takes time.
-    pub room: bool,
-    /// Components whose call has not returned.
-    pub quarantined: &'a [ComponentName],
-}
-
-/// What is to be done next.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Poll {
-    /// These steps begin now, by their numbers in the list in hand ([`Transaction::step`]).
-    Begin(SmallVec<[u32; 1]>),
-    /// The call that is out for this step is given up: it is told so.
-    Cancel(u32),
-    /// These components are read back.
-    Read(Vec<ComponentName>),
-    /// Nothing, until something comes.
-    Wait,
-    /// It is over: [`Transaction::end`].
-    Over,
-}
-
-/// What happened.
-#[derive(Debug, Clone)]
-pub enum Input {
-    /// A step that was begun is back.
-    Ended {
-        /// Its number.
-        step: u32,
-        /// How.
-        outcome: Outcome,
-    },
-    /// A step that was to begin did not.
-    NotBegun(u32),
-    /// What was read; none: nobody answered.
-    Seen(Option<Snapshot>),
-    /// A part of it is given up, by who asked for it: what was done is taken back, also what moves.
-    GiveUp {
-        /// The part.
-        part: usize,
-    },
-    /// A safe configuration goes first. Nothing further begins, and nothing is taken back before [`Input::Release`].
-    Interrupt(ConfigId),
-    /// The safe configuration has been applied, and touched this.
-    Release(Touched),
-    /// Everything is taken down: nothing further begins, and nothing is taken back.
-    TakenDown,
-    /// Nothing further begins, and what was done is taken back as after a failure.
-    Stop,
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -130,6 +61,9 @@ pub struct Transaction {
     partly: FxHashMap<u32, usize>,
     /// Places of the whole that were finished on the way back.
     finished: FxHashSet<u32>,
+    /// Where the net of several parts is carried out: the system that the parts before the failed one lead to, and what a
+    /// held part has added to it.
+    between: Option<Box<System>>,
     withheld: Option<Step>,
     /// Steps of unknown outcome, of ways back too.
     unsettled: Vec<Step>,
@@ -146,8 +80,8 @@ pub struct Transaction {
     reading: bool,
     seen: Option<Option<Snapshot>>,
     cancels: Vec<u32>,
-    /// What the components are compared with.
-    target: Option<Box<System>>,
+    /// What the components are compared with after mending, and whether that has nothing of what was done.
+    target: Option<Box<(System, bool)>>,
     end: Option<End>,
 }
 
@@ -166,6 +100,7 @@ impl Transaction {
             taken_back: FxHashSet::default(),
             partly: FxHashMap::default(),
             finished: FxHashSet::default(),
+            between: None,
             withheld: None,
             unsettled: Vec::new(),
             faulted: Vec::new(),
@@ -207,7 +142,7 @@ impl Transaction {
 
     /// All steps, one operation after the other.
     fn whole(&self) -> &[PlannedStep] {
-        if self.planned.of.is_empty() {
+        if self.planned.whole.is_empty() {
             self.forward.as_ref().map_or(&[], |run| &run.list)
         } else {
             &self.planned.whole
@@ -260,7 +195,7 @@ impl Transaction {
     pub fn done_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &crate::system::Undo)> {
         let forward = self.forward.as_ref().expect("something was carried out");
         let open = forward.done.iter().copied().filter(|i| !self.taken_back.contains(i));
-        open.map(|i| (&forward.list[i as usize], self.undo_of(i)))
+        open.map(|i| (&forward.list[i as usize], self.undo_of(i, 0)))
     }
 
     /// What failed so far, and what nobody knows of.
@@ -390,7 +325,7 @@ impl Transaction {
             return None;
         }
         if self.reading {
-            let seen = self.seen.take()?;
+            let Some(seen) = self.seen.take() else { return Some(Poll::Wait) };
             self.reading = false;
             self.in_hand_mut().settle_by(seen.as_ref(), live);
             return None;
@@ -454,6 +389,9 @@ impl Transaction {
             failed = self.took_back(&run, &way);
         }
         let part = self.failed_part();
+        if self.between.is_none() && part > 0 && !self.planned.whole.is_empty() {
+            self.between = Some(Box::new(self.led_to(part, live)));
+        }
         let way = self.way_back(part, live);
         self.withheld.clone_from(&way.withheld);
         self.taken_back.extend(way.superseded.iter().copied());
@@ -477,9 +415,8 @@ impl Transaction {
     fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
         for i in &run.done {
             if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
-                let done = self.partly.entry(*taken).or_default();
-                *done += 1;
-                if *done >= way.takes_back.iter().filter(|t| **t == Some(*taken)).count() {
+                *self.partly.entry(*taken).or_default() += 1;
+                if self.steps_back(*taken, self.failed_part()).is_empty() {
                     self.taken_back.insert(*taken);
                 }
             }
@@ -520,7 +457,7 @@ impl Transaction {
     }
 
     /// Mends the difference between what is there and what should be.
-    fn mend(&mut self, steps: Vec<Step>, target: System) {
+    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.target = Some(Box::new(target));
         let list = chain(steps);
         self.back = Some((Run::new(list, Time::NEVER), WayBack::default()));

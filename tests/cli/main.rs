@@ -3,10 +3,16 @@
 mod background;
 mod breakages;
 mod commands;
+mod declared;
 mod demo;
 mod explored;
+mod faults;
+mod hot_swap;
 mod monitor;
+mod recovery;
+mod several;
 mod simulated;
 mod together;
 mod unasked;
 mod unheard;
+mod words;

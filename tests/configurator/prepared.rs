@@ -1,7 +1,6 @@
 //! Prepared switches do what the ordinary way does, and give way to it when they no longer fit.
 
 use crate::rig::*;
-use davit::configurator::Requester;
 use davit::model::*;
 use davit::platform::simulated::{Options, Simulated};
 use davit::platform::*;
@@ -72,7 +71,7 @@ fn a_switch_goes_the_prepared_way_to_and_fro() {
         assert_eq!(count.load(Ordering::SeqCst), 5 + 10 * (round - 1));
     }
     for _ in 0..4 {
-        assert_eq!(rig.ask_as("undo", Requester::Operator), ["undo.done"]);
+        assert_eq!(rig.ask("undo"), ["undo.done"]);
     }
     assert!(rig.see().is_empty(), "frames of both kinds are undone in the ordinary way too");
     rig.each_answered_once();

@@ -91,15 +91,15 @@ fn change(text: &str) -> Change {
 fn entry(text: &str) -> StateEntry {
     let (target, state) = text.split_once(':').unwrap();
     let target = if target == "_default" { Target::Default } else { Target::Component(name(target)) };
-    StateEntry { target, state: RunState::from_name(state).unwrap(), origin: Origin::NONE }
+    StateEntry { target, state: RunState::from_name(state).and_then(RunState::wanted).unwrap(), origin: Origin::NONE }
 }
 
 /// A configuration: pre-states, changes, post-states, each in words separated by `;` or blanks.
 pub fn configuration(name: &str, pre: &str, changes: &str, post: &str) -> Configuration {
     Configuration {
-        pre: pre.split_whitespace().map(entry).collect(),
+        pre: StateList::of(pre.split_whitespace().map(entry)).unwrap(),
         changes: changes.split(';').map(str::trim).filter(|t| !t.is_empty()).map(change).collect(),
-        post: post.split_whitespace().map(entry).collect(),
+        post: StateList::of(post.split_whitespace().map(entry)).unwrap(),
         ..Configuration::new(id(name))
     }
 }
@@ -223,7 +223,8 @@ impl Rig {
     fn request(&self, word: &str, requester: Requester) -> Request {
         let ask = match word {
             "undo" => Ask::Undo,
-            "commit" => Ask::Commit,
+            "commit" => Ask::Commit { force: false },
+            "commit!" => Ask::Commit { force: true },
             _ => match word.strip_suffix(".undo") {
                 Some(name) => Ask::UndoOf(id(name)),
                 None => match word.strip_prefix("to=") {
@@ -241,7 +242,7 @@ impl Rig {
         request
     }
 
-    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`.
+    /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`, `commit!` (by force).
     pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), Full> {
         self.handle.submit(words.split_whitespace().map(|word| self.request(word, requester)).collect())
     }

@@ -96,13 +96,32 @@ fn undo_to_pops_down_to_a_number_of_frames() {
 }
 
 #[test]
-fn commit_makes_the_floor() {
-    let rig = up();
-    assert_eq!(rig.ask_as("commit", Requester::Operator), ["commit.ok"]);
+fn commit_makes_the_operators_own_frames_permanent() {
+    let mut burn = configuration("burn", "", "call B.burn", "");
+    burn.irreversible = true;
+    let rig = Rig::new(scenario().into_iter().chain([burn]).collect::<Vec<_>>());
+    let operator = |word: &str| rig.ask_as(word, Requester::Operator);
+    for word in ["make", "wire", "run"] {
+        assert_eq!(operator(word), [format!("{word}.ok")]);
+    }
+    assert_eq!(operator("commit"), ["commit.ok"]);
+    assert!(rig.frames().is_empty());
     assert_eq!(rig.ask("undo"), ["undo.failed"]);
-    assert_eq!(rig.ask("run.undo"), ["run.undo.failed"], "in force, and not to be undone by itself");
+    assert_eq!(operator("run.undo"), ["run.undo.failed"], "in force, and not to be undone by itself");
     assert_eq!(rig.ask("switch"), ["switch.ok"]);
+    assert_eq!(operator("commit"), ["commit.failed"], "a coordinator's frame is in force");
+    assert_eq!(rig.last().findings()[0].code, davit::model::codes::STACK_HELD);
     assert_eq!(rig.ask("undo"), ["undo.done"]);
+
+    assert_eq!(rig.ask("switch"), ["switch.ok"]);
+    for word in ["rewire", "burn"] {
+        assert_eq!(operator(word), [format!("{word}.ok")]);
+    }
+    assert_eq!(operator("commit!"), ["commit.ok"]);
+    assert_eq!(rig.frames(), ["switch", "burn"], "the coordinator's, and the floor that holds it back");
+    assert_eq!(rig.ask("undo"), ["undo.failed"]);
+    rig.in_step();
+    rig.each_answered_once();
 }
 
 #[test]
@@ -188,14 +207,15 @@ fn a_queued_request_is_cancelled_by_its_undo() {
 }
 
 #[test]
-fn what_has_begun_is_not_cancelled() {
+fn what_has_begun_is_given_up_by_its_undo() {
     let rig = up();
     rig.inject("stop B", Fault::LostAnswer);
     rig.submit("switch");
     rig.wait(0.01);
     rig.submit("switch.undo");
     rig.wait(100.0);
-    assert_eq!(rig.events()[3..], ["switch.ok", "switch.undone"]);
+    assert_eq!(rig.events()[3..], ["switch.cancelled", "switch.undone"], "{:?}", rig.last());
+    assert_eq!(rig.frames(), ["make", "wire", "run"]);
     rig.in_step();
 }
 

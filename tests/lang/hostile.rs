@@ -222,6 +222,18 @@ fn values_are_finite() {
         let text = format!("ConfiguratorConf {{ a = Configuration {{ property_set('A.k', {value}) }} }}");
         assert_eq!(lua(&text), ["text::not_finite"], "{value}");
     }
+    // Whose value it is, is said.
+    for (change, whose) in [
+        ("property_set('A.k', 0/0)", "`A.k` cannot be NaN"),
+        ("create('A', 'T', { properties = { k = { 1.0, 1/0 } } })", "`A.k` cannot be inf"),
+        ("port_write('A.u', -1/0)", "`A.u` cannot be -inf"),
+        ("operation_call('A.go', 0/0)", "an argument of `A.go` cannot be NaN"),
+    ] {
+        let text = format!("ConfiguratorConf {{ a = Configuration {{ {change} }} }}");
+        let loaded = with_configurations(&text);
+        let message = loaded.findings[0].message.replace("-NaN", "NaN");
+        assert!(loaded.findings.len() == 1 && message.starts_with(whose), "{change}: {message}");
+    }
     for value in [".nan", ".inf", "-.inf", "[1.0, .nan]"] {
         let text = format!(
             "configurations: {{ a: {{ changes: [{{ property_set: {{ property: A.k, value: {value} }} }}] }} }}"

@@ -112,14 +112,17 @@ fn change() -> impl Strategy<Value = Change> {
     .prop_map(|kind| Change { kind, origin: Origin::NONE })
 }
 
-fn states() -> impl Strategy<Value = Vec<StateEntry>> {
-    let state = prop::sample::select(vec![RunState::Unconfigured, RunState::Stopped, RunState::Running]);
+fn states() -> impl Strategy<Value = StateList> {
+    let state = prop::sample::select(vec![Wanted::Unconfigured, Wanted::Stopped, Wanted::Running]);
     let one = (component(), state.clone()).prop_filter_map("not the keyword", |(name, state)| {
         (name.as_str() != "_default").then_some((Target::Component(name), state))
     });
-    (vec(one, 0..3), option::of(state)).prop_map(|(mut list, default)| {
-        list.extend(default.map(|state| (Target::Default, state)));
-        list.into_iter().map(|(target, state)| StateEntry { target, state, origin: Origin::NONE }).collect()
+    (vec(one, 0..3), option::of((state, 0_usize..3))).prop_map(|(mut list, default)| {
+        if let Some((state, place)) = default {
+            list.insert(place.min(list.len()), (Target::Default, state));
+        }
+        StateList::of(list.into_iter().map(|(target, state)| StateEntry { target, state, origin: Origin::NONE }))
+            .unwrap()
     })
 }
 

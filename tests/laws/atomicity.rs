@@ -5,6 +5,7 @@ use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
 use davit::model::{Cause, Execution, Outcome, Step};
+use davit::plan::PlannedStep;
 use davit::stack::{Op, Planned, Stack, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
@@ -107,13 +108,16 @@ proptest! {
             })
             .collect();
         let fails = std::iter::once(fail).chain(again.map(|later| fail + later)).collect();
+        let told = |steps: &[PlannedStep]| steps.iter().map(|s| s.step.to_string()).collect::<Vec<_>>();
+        let ranges: Vec<_> = planned.parts.iter().map(|part| part.range.clone()).collect();
+        let shown = format!("steps {:?}, net of {:?} in parts {ranges:?}", told(&planned.steps), told(&planned.whole));
         let mut bench = Bench::new(&system, fails, picks);
         let ends = bench.drive(planned);
         prop_assert_eq!(bench.model.snapshot(), bench.platform.snapshot(), "the model is the platform");
         let stands = ends.iter().take_while(|end| matches!(end, PartEnd::Done)).count();
         match ends.get(stands) {
             None | Some(PartEnd::Failed(_)) => {
-                prop_assert_eq!(bench.model.snapshot(), after[stands].snapshot(), "those before stand, the rest is not there");
+                prop_assert_eq!(bench.model.snapshot(), after[stands].snapshot(), "those before stand, the rest is not there: {}", shown);
                 prop_assert!(ends[stands..].iter().skip(1).all(|end| matches!(end, PartEnd::Anew)));
             }
             Some(PartEnd::Broken(broken)) => {

@@ -184,7 +184,7 @@ pub fn read(gene: &ConfigGene, system: &System) -> Configuration {
     r.conf
 }
 
-const STATES: [RunState; 4] = [RunState::Running, RunState::Stopped, RunState::Running, RunState::Unconfigured];
+const STATES: [Wanted; 4] = [Wanted::Running, Wanted::Stopped, Wanted::Running, Wanted::Unconfigured];
 
 impl Reader<'_> {
     fn list(&mut self, entries: &[(u8, u8)], pre: bool) {
@@ -209,7 +209,9 @@ impl Reader<'_> {
                 }
             };
             let entry = StateEntry { target, state, origin: Origin::NONE };
-            if pre { self.conf.pre.push(entry) } else { self.conf.post.push(entry) }
+            let list = if pre { &mut self.conf.pre } else { &mut self.conf.post };
+            // A second `_default` has no place in a list.
+            let _ = list.push(entry);
         }
     }
 
@@ -331,10 +333,13 @@ impl Reader<'_> {
         self.push(ChangeKind::PropertySet { property, value: wrong });
         let state = self.system.component(property.component).map(|n| n.state);
         if let Some(state) = state.filter(|s| !ty.tunable.allows(*s) && !c.is_multiple_of(16)) {
-            let state_for = if ty.tunable == Tunable::Stopped { RunState::Stopped } else { RunState::Unconfigured };
+            let state_for = if ty.tunable == Tunable::Stopped { Wanted::Stopped } else { Wanted::Unconfigured };
             let target = Target::Component(property.component);
-            self.conf.pre.push(StateEntry { target, state: state_for, origin: Origin::NONE });
-            self.conf.post.push(StateEntry { target, state, origin: Origin::NONE });
+            let entry = |state| StateEntry { target, state, origin: Origin::NONE };
+            self.conf.pre.push(entry(state_for)).unwrap();
+            if let Some(state) = state.wanted() {
+                self.conf.post.push(entry(state)).unwrap();
+            }
         }
     }
 

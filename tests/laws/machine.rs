@@ -163,7 +163,7 @@ impl StateMachineTest for Machine {
                 }
             }
             Act::Commit => {
-                s.both.stack.make_floor();
+                s.both.stack.make_permanent(Requester::Operator);
                 s.base = s.both.system.snapshot();
                 s.frames.clear();
                 assert!(s.both.ask(&[Op::UndoTop]).is_err());

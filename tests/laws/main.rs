@@ -4,6 +4,7 @@
 //! Every law runs over `DAVIT_LAW_CASES` cases, 10,000 where it is not set; `DAVIT_LAW_CASES=1000000 cargo test --release
 //! --test laws` is a long run.
 
+mod alone;
 mod atomicity;
 mod difference;
 mod generate;

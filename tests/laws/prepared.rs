@@ -4,7 +4,7 @@ use crate::generate::{self, read};
 use crate::plans::operator;
 use crate::settings;
 use crate::stacks::Both;
-use davit::model::{ChangeKind, Step, Target};
+use davit::model::{ChangeKind, StateList, Step, Target};
 use davit::plan::prepare::Switch;
 use davit::stack::{Op, Requester};
 use davit::time::Time;
@@ -26,8 +26,9 @@ proptest! {
             let mut conf = read(gene, &plain.system);
             conf.group = None;
             conf.changes.retain(|c| matches!(c.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. }));
-            conf.pre.retain(|e| e.target != Target::Default);
-            conf.post.retain(|e| e.target != Target::Default);
+            for list in [&mut conf.pre, &mut conf.post] {
+                *list = StateList::of(list.iter().filter(|e| e.target != Target::Default)).unwrap();
+            }
             confs.push(conf);
         }
         let mut prepared: Vec<Option<Switch>> = confs.iter().map(|c| Switch::new(&mut fast.system, c)).collect();

@@ -91,7 +91,7 @@ fn a_stop_waits_for_the_update_under_way() {
     b.create("s", "Slow", "slow", &[("takes_ms", Value::Int(8))]);
     b.start(&["s"]);
     b.wait(MS * 12);
-    b.go("s", RunState::Stopped);
+    b.go("s", Wanted::Stopped);
     let stopped = b.clock.now().as_nanos() / 1_000_000;
     assert!((18..20).contains(&stopped), "the update lasts from 10 to 18; stopped at {stopped}");
 }

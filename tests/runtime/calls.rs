@@ -74,7 +74,7 @@ fn busy(activity: &str) -> Bench {
 fn operations_answer_whatever_the_run_state() {
     for activity in ["fast", "events"] {
         let b = busy(activity);
-        for state in [RunState::Unconfigured, RunState::Stopped, RunState::Running] {
+        for state in [Wanted::Unconfigured, Wanted::Stopped, Wanted::Running] {
             b.go("c", state);
             b.wait(MS);
             assert_eq!(b.does(call("c.add", vec![Value::Int(2), Value::Int(3)])), Some(Value::Int(5)), "{state}");
@@ -152,7 +152,7 @@ fn a_dropped_ticket_is_a_failure() {
 
 #[test]
 fn a_panic_in_an_operation_faults_the_component() {
-    for state in [RunState::Stopped, RunState::Running] {
+    for state in [Wanted::Stopped, Wanted::Running] {
         let b = busy("fast");
         b.go("c", state);
         let outcome = b.run(&call("c.panic", vec![]));
@@ -163,13 +163,13 @@ fn a_panic_in_an_operation_faults_the_component() {
         assert_eq!(b.state_of("c"), Some(RunState::Faulted));
         assert_eq!(b.faults().len(), 1);
         assert!(b.platform.activities().iter().all(|a| a.running == 0));
-        b.go("c", RunState::Running);
+        b.go("c", Wanted::Running);
     }
 }
 
 #[test]
 fn an_operation_that_hangs_is_unknown_at_the_deadline() {
-    for state in [RunState::Stopped, RunState::Running] {
+    for state in [Wanted::Stopped, Wanted::Running] {
         let b = busy("fast");
         b.go("c", state);
         let before = b.clock.now();
@@ -179,7 +179,7 @@ fn an_operation_that_hangs_is_unknown_at_the_deadline() {
         assert_eq!(b.run(&call("c.nothing", vec![])), Outcome::NotDone(Cause::Quarantined));
         assert_eq!(
             b.raised().len(),
-            usize::from(state == RunState::Running),
+            usize::from(state == Wanted::Running),
             "the activity is stuck only where it hangs"
         );
         b.clock.shutdown();
@@ -291,7 +291,7 @@ fn a_hook_that_comes_back_late_leaves_nothing() {
         let left = b.platform.observe(b.clock.now()).unwrap();
         assert_eq!(left.components.keys().copied().collect::<Vec<_>>(), [name("source")], "{hook}");
         assert!(left.connections.is_empty() && b.platform.quarantined().is_empty());
-        b.go("source", RunState::Unconfigured);
+        b.go("source", Wanted::Unconfigured);
         b.does(Step::Destroy { component: name("source") });
     }
     assert!(DROPPED.load(Ordering::SeqCst) >= 4);

@@ -122,7 +122,7 @@ fn what_takes_many_updates_ends_in_the_next_one() {
 
 #[test]
 fn code_that_works_for_long_looks_whether_it_is_given_up() {
-    for state in [RunState::Stopped, RunState::Running] {
+    for state in [Wanted::Stopped, Wanted::Running] {
         let b = running();
         b.go("m", state);
         let grind = call("m.grind", vec![Value::Int(500)]);
@@ -212,8 +212,8 @@ fn stopping_brings_to_rest() {
     let waiting = b.begin(&note("kept back"), SECOND * 5);
     b.wait(MS * 5);
     assert!(waiting.is_empty());
-    b.go("m", RunState::Stopped);
-    b.go("n", RunState::Stopped);
+    b.go("m", Wanted::Stopped);
+    b.go("n", Wanted::Stopped);
     b.wait(MS);
     assert_eq!(waiting.try_recv().expect("who is not updated is at rest").0, Outcome::Done(None));
     assert_eq!(b.does(note("and on a worker")), None);

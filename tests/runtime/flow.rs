@@ -1,7 +1,7 @@
 //! Ports and properties of running components: data, queues, written values, order, changes under load.
 
 use crate::support::*;
-use davit::model::{EventName, Policy, RunState, Step, Value};
+use davit::model::{EventName, Policy, Step, Value, Wanted};
 use davit::runtime::*;
 use davit::time::{Clock, Time};
 use proptest::prelude::*;
@@ -217,7 +217,7 @@ fn event_driven_components_are_updated_when_something_comes() {
     b.start(&["counter"]);
     b.wait(MS);
     assert_eq!(log::take(&b.clock), ["first", "second"]);
-    b.go("counter", RunState::Stopped);
+    b.go("counter", Wanted::Stopped);
     b.disconnect("first.y", "second.u");
     b.write("second.u", 1);
     b.wait(MS);
@@ -239,7 +239,7 @@ fn a_loop_of_event_driven_components_does_not_hold_time_still() {
     b.write("a.u", 1);
     b.wait(MS);
     b.connect("b.y", "a.u", Policy::Data);
-    b.go("b", RunState::Stopped);
+    b.go("b", Wanted::Stopped);
     b.start(&["b"]);
     b.wait(Duration::from_secs(1));
     assert!(b.clock.now() >= Time(1_000_000_000));
@@ -327,11 +327,11 @@ proptest! {
             match change {
                 0 | 1 if connected => { b.disconnect("counter.wide", "probe.wide"); connected = false; }
                 0 | 1 => { b.connect("counter.wide", "probe.wide", Policy::Data); connected = true; }
-                2 => { b.go("probe", RunState::Stopped); }
+                2 => { b.go("probe", Wanted::Stopped); }
                 3 => { b.start(&["probe"]); }
                 4 => b.set("probe.note", false),
                 _ => {
-                    b.go("counter", RunState::Stopped);
+                    b.go("counter", Wanted::Stopped);
                     b.start(&["counter"]);
                 }
             }

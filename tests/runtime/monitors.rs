@@ -171,7 +171,7 @@ fn what_is_watched_may_go_and_come_back() {
         came.retain(|event| !event.contains("gone"));
         came.sort();
         assert_eq!(came, ["e_high", "e_runs"]);
-        b.go("s", RunState::Unconfigured);
+        b.go("s", Wanted::Unconfigured);
         b.does(Step::Destroy { component: name("s") });
         b.clock.sleep(25 * MS);
         let went = raised(&b);

@@ -71,7 +71,7 @@ fn sources() {
     assert_eq!(found.len(), 200);
     near(&found, |i| 1.0 - 3.0 * i as f64 * 1e-3);
     // Started anew it begins anew.
-    b.go("r", RunState::Stopped);
+    b.go("r", Wanted::Stopped);
     b.start(&["r"]);
     b.wait(MS);
     assert_eq!(recorded(&b).last(), Some(&1.0));
@@ -204,13 +204,13 @@ fn csv_logger_writes_a_line_an_update() {
     b.connect("r.y", "log.u2", Policy::Data);
     b.start(&["r", "log"]);
     b.wait(MS * 5 + MS / 2);
-    b.go("log", RunState::Stopped);
+    b.go("log", Wanted::Stopped);
     let text = std::fs::read_to_string(&path).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     // Its hooks let the ramp begin first: the first update is the one at 1 ms.
     assert_eq!(lines, ["time,u1,u2,u3,u4,u5,u6,u7,u8", "0.002,,2,,,,,,", "0.004,,4,,,,,,"]);
     // A file that cannot be made is a failure, not a fault.
-    b.go("log", RunState::Unconfigured);
+    b.go("log", Wanted::Unconfigured);
     b.set("log.path", folder.path().to_str().unwrap());
     let configure = Step::State { component: name("log"), transition: Transition::Configure };
     assert!(matches!(b.run(&configure), davit::platform::Outcome::NotDone(davit::platform::Cause::Failed(_))));

@@ -99,7 +99,7 @@ impl Bench {
     }
 
     #[track_caller]
-    pub fn go(&self, component: &str, target: RunState) {
+    pub fn go(&self, component: &str, target: Wanted) {
         let now = self.platform.observe_component(name(component), Time::NEVER).unwrap().expect("a component").state;
         for transition in now.path_to(target) {
             self.does(Step::State { component: name(component), transition: *transition });
@@ -109,7 +109,7 @@ impl Bench {
     #[track_caller]
     pub fn start(&self, components: &[&str]) {
         for component in components {
-            self.go(component, RunState::Running);
+            self.go(component, Wanted::Running);
         }
     }
 

@@ -105,3 +105,15 @@ fn a_socket_left_by_a_killed_process_is_no_obstacle() {
     assert!(path.exists());
     drop(ControlSocket::open(&name, Arc::new(Echo)).unwrap());
 }
+
+#[test]
+fn a_socket_whose_file_is_gone_closes_all_the_same() {
+    let (_, socket) = open("removed");
+    std::fs::remove_file(socket.path()).unwrap();
+    let (closed, heard) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        drop(socket);
+        let _ = closed.send(());
+    });
+    assert!(heard.recv_timeout(LIMIT).is_ok(), "nothing wakes the thread that accepts");
+}

@@ -28,20 +28,20 @@ impl Term {
 
 /// What is wanted where a word stands.
 #[derive(Clone, Copy)]
-struct Wanted {
+struct Expected {
     what: &'static str,
     words: &'static [Word],
     others: &'static [Word],
     example: &'static str,
 }
 
-const A_CONDITION: Wanted =
-    Wanted { what: "a condition", words: CONDITIONS, others: SIGNALS, example: "above(\"A.x\", 2.0)" };
-const A_SIGNAL: Wanted =
-    Wanted { what: "a signal", words: SIGNALS, others: CONDITIONS, example: "above(\"A.x\", 2.0)" };
+const A_CONDITION: Expected =
+    Expected { what: "a condition", words: CONDITIONS, others: SIGNALS, example: "above(\"A.x\", 2.0)" };
+const A_SIGNAL: Expected =
+    Expected { what: "a signal", words: SIGNALS, others: CONDITIONS, example: "above(\"A.x\", 2.0)" };
 
 /// Reads a word and its arguments: `word(a, b)` of Lua, `{ word: [a, b] }` of YAML.
-fn term(cx: &mut Cx, node: Node, wanted: Wanted) -> Option<Term> {
+fn term(cx: &mut Cx, node: Node, wanted: Expected) -> Option<Term> {
     let origin = node.origin;
     let (key, key_origin, args) =
         match node.kind {

@@ -5,8 +5,8 @@ use crate::lang::concern;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{
-    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, EventName, Finding, Ident, MemberRef,
-    OnFailure, Origin, Policy, RunState, StateEntry, Target, TypeName, Value, codes,
+    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, DefaultTwice, EventName, Finding, Ident,
+    MemberRef, OnFailure, Origin, Policy, RunState, StateEntry, StateList, Target, TypeName, Value, Wanted, codes,
 };
 use std::collections::BTreeMap;
 
@@ -156,7 +156,7 @@ fn confirm(cx: &mut Cx, node: Node) -> Option<Confirm> {
 }
 
 /// A pre- or post-state list: entries `'comp:state'`, then at most one keyed `comp = 'state'`.
-fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
+fn states(cx: &mut Cx, entry: Entry) -> StateList {
     const EXAMPLE: &str = "{ 'compA:running', '_default:stopped' }";
     let list_origin = cx.part(entry.value.origin, &entry.key);
     let (list, keyed) = match entry.value.kind {
@@ -165,7 +165,7 @@ fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
         Kind::Map(keyed) => (Vec::new(), keyed),
         _ => {
             cx.wrong(&entry.value, &format!("`{}`", entry.key), "a list of `component:state`", EXAMPLE);
-            return Vec::new();
+            return StateList::default();
         }
     };
     if keyed.len() > 1 {
@@ -186,7 +186,7 @@ fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
             .help(format!("write them as a list, in the order wanted: `{{ {} }}`", as_list.join(", "))),
         );
     }
-    let mut out: Vec<StateEntry> = Vec::with_capacity(list.len() + keyed.len());
+    let mut found: Vec<StateEntry> = Vec::with_capacity(list.len() + keyed.len());
     for node in list {
         let Kind::Str(text) = &node.kind else {
             cx.wrong(&node, "an entry of a state list", "a text `component:state`", EXAMPLE);
@@ -201,7 +201,7 @@ fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
             );
             continue;
         };
-        out.extend(state_entry(cx, who.trim(), state.trim(), origin));
+        found.extend(state_entry(cx, who.trim(), state.trim(), origin));
     }
     for entry in keyed {
         let Kind::Str(state) = &entry.value.kind else {
@@ -209,15 +209,17 @@ fn states(cx: &mut Cx, entry: Entry) -> Vec<StateEntry> {
             continue;
         };
         let origin = cx.inside(list_origin, entry.origin, &entry.key);
-        out.extend(state_entry(cx, &entry.key, state, origin));
+        found.extend(state_entry(cx, &entry.key, state, origin));
     }
-    let mut defaults = out.iter().filter(|e| e.target == Target::Default);
-    if let (Some(first), Some(second)) = (defaults.next(), defaults.next()) {
-        let finding = Finding::error(codes::DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
-            .at(second.origin)
-            .also(first.origin, "first here")
-            .help("it stands for every component not named in the list, so it can only have one state: keep one");
-        cx.report(finding);
+    let mut out = StateList::default();
+    for state in found {
+        if let Err(DefaultTwice(first)) = out.push(state) {
+            let finding = Finding::error(codes::DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
+                .at(state.origin)
+                .also(first, "first here")
+                .help("it stands for every component not named in the list, so it can only have one state: keep one");
+            cx.report(finding);
+        }
     }
     out
 }
@@ -229,30 +231,26 @@ fn state_entry(cx: &mut Cx, who: &str, state: &str, origin: Origin) -> Option<St
         let node = Node::new(Kind::Str(who.into()), origin);
         name::<ComponentName>(cx, &node, "a component", "compA:running").map(Target::Component)
     };
-    let state = match RunState::from_name(state) {
-        Some(RunState::Faulted) => {
-            cx.report(
-                Finding::error(codes::CONF_BAD_STATE, "no configuration can demand `faulted`")
-                    .at(origin)
-                    .help("components become faulted by themselves; demand `unconfigured` to bring one out of it"),
-            );
-            None
-        }
-        Some(state) => Some(state),
-        None => {
-            // Our own names before the field's, which differ from them in a capital letter.
-            let ours = nearest(state, RunState::NAMES[..3].iter().copied());
-            let help = ours.map_or_else(
-                || did_you_mean(state, "states", RunState::NAMES.iter().copied()),
-                |near| format!("did you mean `{near}`?"),
-            );
-            cx.report(
-                Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help),
-            );
-            None
-        }
-    };
-    Some(StateEntry { target: target?, state: state?, origin })
+    Some(StateEntry { target: target?, state: wanted(cx, state, origin)?, origin })
+}
+
+fn wanted(cx: &mut Cx, state: &str, origin: Origin) -> Option<Wanted> {
+    let named = RunState::from_name(state);
+    let wanted = named.and_then(RunState::wanted);
+    if named.is_some() && wanted.is_none() {
+        let finding = Finding::error(codes::FAULTED_DEMANDED, format!("no configuration can demand `{state}`"));
+        let help = "components become faulted by themselves; demand `unconfigured` to bring one out of it";
+        cx.report(finding.at(origin).help(help));
+    } else if wanted.is_none() {
+        // Our own names before the field's, which differ from them in a capital letter.
+        let ours = nearest(state, RunState::NAMES[..3].iter().copied());
+        let help = ours.map_or_else(
+            || did_you_mean(state, "states", RunState::NAMES.iter().copied()),
+            |near| format!("did you mean `{near}`?"),
+        );
+        cx.report(Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help));
+    }
+    wanted
 }
 
 /// One change.
@@ -307,7 +305,7 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
             let activity = fields
                 .take("activity")
                 .and_then(|node| name::<Ident>(cx, &node, "`activity`", "activity = \"control\""));
-            let properties = fields.take("properties").map(|node| properties(cx, node)).unwrap_or_default();
+            let properties = fields.take("properties").map(|node| properties(cx, node, component)).unwrap_or_default();
             component.zip(ty).map(|(component, ty)| ChangeKind::Create { component, ty, activity, properties })
         }
         "destroy" => component(cx, &mut fields).map(|component| ChangeKind::Destroy { component }),
@@ -323,12 +321,12 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
         }
         "property_set" => {
             let property = member(cx, &mut fields, "property", "Dynamics.force_gain");
-            let value = required_value(cx, &mut fields, "a property's value");
+            let value = required_value(cx, &mut fields, property, "a property's value");
             property.zip(value).map(|(property, value)| ChangeKind::PropertySet { property, value })
         }
         "port_write" => {
             let port = member(cx, &mut fields, "port", "Cart_Impedance.ext_ref_mode");
-            let value = required_value(cx, &mut fields, "a port's value");
+            let value = required_value(cx, &mut fields, port, "a port's value");
             port.zip(value).map(|(port, value)| ChangeKind::PortWrite { port, value })
         }
         _ => {
@@ -360,9 +358,13 @@ fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) ->
     name(cx, &node, key, example)
 }
 
-fn required_value(cx: &mut Cx, fields: &mut Fields, what: &str) -> Option<Value> {
+/// The value of `slot`, which is called `what` where its name could not be read.
+fn required_value(cx: &mut Cx, fields: &mut Fields, slot: Option<MemberRef>, what: &str) -> Option<Value> {
     let node = fields.required(cx, "value", "value: 0.5")?;
-    value(cx, node, what)
+    match slot {
+        Some(slot) => value(cx, node, &format!("`{slot}`")),
+        None => value(cx, node, what),
+    }
 }
 
 fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
@@ -371,7 +373,8 @@ fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
         None => Some(Vec::new()),
         Some(Node { kind: Kind::List(list), .. }) => {
             let length = list.len();
-            let args: Vec<Value> = list.into_iter().filter_map(|node| value(cx, node, "an argument")).collect();
+            let what = operation.map_or_else(|| "an argument".to_owned(), |o| format!("an argument of `{o}`"));
+            let args: Vec<Value> = list.into_iter().filter_map(|node| value(cx, node, &what)).collect();
             (args.len() == length).then_some(args)
         }
         Some(node) => {
@@ -394,7 +397,7 @@ fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
     u32::try_from(length?).ok().map(Policy::Buffer)
 }
 
-fn properties(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Value> {
+fn properties(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
     let Some(entries) = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }") else {
         return BTreeMap::new();
     };
@@ -402,7 +405,11 @@ fn properties(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Value> {
     for entry in entries {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
         let field = name::<Ident>(cx, &key, "a property", "friction_comp = 0.9");
-        if let (Some(field), Some(value)) = (field, value(cx, entry.value, "a property's value")) {
+        let what = match (component, field) {
+            (Some(component), Some(field)) => format!("`{component}.{field}`"),
+            _ => "a property's value".to_owned(),
+        };
+        if let (Some(field), Some(value)) = (field, value(cx, entry.value, &what)) {
             out.insert(field, value);
         }
     }

@@ -68,7 +68,7 @@ pub fn number(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<f64
         Kind::Int(v) => Some(v as f64),
         Kind::Float(v) if v.is_finite() => Some(v),
         Kind::Float(v) => {
-            not_finite(cx, node, v);
+            not_finite(cx, node, v, what);
             None
         }
         _ => {
@@ -78,9 +78,9 @@ pub fn number(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<f64
     }
 }
 
-fn not_finite(cx: &mut Cx, node: &Node, v: f64) {
+fn not_finite(cx: &mut Cx, node: &Node, v: f64, what: &str) {
     cx.report(
-        Finding::error(codes::TEXT_NOT_FINITE, format!("{v} is not a finite number"))
+        Finding::error(codes::TEXT_NOT_FINITE, format!("{what} cannot be {v}: it is not a finite number"))
             .at(node.origin)
             .help("values of a robot's system are finite: look at the calculation that led here"),
     );
@@ -213,7 +213,7 @@ pub fn value(cx: &mut Cx, node: Node, what: &str) -> Option<Value> {
         Kind::Int(v) => Some(Value::Int(v)),
         Kind::Float(v) if v.is_finite() => Some(Value::Float(v)),
         Kind::Float(v) => {
-            not_finite(cx, &node, v);
+            not_finite(cx, &node, v, what);
             None
         }
         Kind::Str(v) => Some(Value::Str(Arc::from(v))),

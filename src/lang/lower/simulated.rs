@@ -2,6 +2,7 @@
 
 use super::{Unit, choice, name, text, time, whole};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
+use crate::limits;
 use crate::model::{ComponentName, EventName, FaultKind, Origin, SimulatedReaction, StepFault};
 
 const EXAMPLE: &str =
@@ -52,9 +53,6 @@ fn step(cx: &mut Cx, node: Node, around: Origin, what: &str, example: &str) -> O
     Some((step, if cx.sources.is_exact(node.origin) { node.origin } else { around }))
 }
 
-/// Most times that one fault happens: a deployment that waits for the end of more is taken for a mistake.
-const MOST_TIMES: i64 = 1_000_000;
-
 /// Lowers the key `faults`.
 pub fn faults(cx: &mut Cx, node: Node) -> Vec<StepFault> {
     const EXAMPLE: &str = "faults: [{ step: \"property_set a.k\", how: fail }]";
@@ -72,7 +70,8 @@ fn fault(cx: &mut Cx, node: Node) -> Option<StepFault> {
     let step = step.and_then(|node| self::step(cx, node, origin, "`step`", "step: \"property_set a.k\""));
     let how = fields.required(cx, "how", "how: fail");
     let how = how.and_then(|node| choice(cx, &node, "`how`", &FaultKind::NAMES));
-    let times = fields.take("times").map(|node| whole(cx, &node, "`times`", 1..=MOST_TIMES, "times: 1"));
+    let times =
+        fields.take("times").map(|node| whole(cx, &node, "`times`", 1..=i64::from(limits::FAULT_TIMES), "times: 1"));
     fields.finish(cx);
     let times = times.unwrap_or(Some(1)).and_then(|n| u32::try_from(n).ok());
     let (step, origin) = step?;

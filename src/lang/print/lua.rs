@@ -4,7 +4,7 @@ use super::wrap::wrap;
 use super::{float, monitor, seconds};
 use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
-use crate::model::{Call, Change, ChangeKind, Configuration, OnFailure, Origin, Policy, StateEntry, Statechart, Value};
+use crate::model::{Call, Change, ChangeKind, Configuration, OnFailure, Origin, Policy, StateList, Statechart, Value};
 use std::fmt::Write as _;
 
 /// Words that Lua keeps for itself.
@@ -73,7 +73,7 @@ fn value(out: &mut String, v: &Value) {
     }
 }
 
-fn states(out: &mut String, name: &str, entries: &[StateEntry]) {
+fn states(out: &mut String, name: &str, entries: &StateList) {
     if entries.is_empty() {
         return;
     }

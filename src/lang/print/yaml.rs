@@ -7,7 +7,7 @@ use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
 use crate::model::{
     Call, ChangeKind, ComponentType, Configuration, Coordinator, Deployment, Direction, Effect, OnFailure, Origin,
-    Policy, StateEntry, Statechart, Tunable, Value, Written,
+    Policy, StateList, Statechart, Tunable, Value, Written,
 };
 use std::fmt::{Display, Write as _};
 
@@ -66,7 +66,7 @@ fn list(texts: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", texts.into_iter().collect::<Vec<_>>().join(", "))
 }
 
-fn states(out: &mut String, name: &str, entries: &[StateEntry]) {
+fn states(out: &mut String, name: &str, entries: &StateList) {
     if !entries.is_empty() {
         let entries = list(entries.iter().map(|e| quoted(&format!("{}:{}", e.target, e.state))));
         _ = writeln!(out, "    {name}: {entries}");

@@ -5,15 +5,15 @@ use crate::model::{ComponentName, Direction, Ident, MemberRef};
 use crate::runtime::beat::Beat;
 use crate::runtime::builder::PortEnd;
 use crate::runtime::links::Sender;
-use crate::runtime::probe::{Probe, ProbesEnd, Tap, Wanted};
+use crate::runtime::probe::{Observed, Probe, ProbesEnd, Tap};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// A component that looks at others.
 pub(super) struct Watcher {
     name: ComponentName,
-    wanted: Arc<[Wanted]>,
-    places: FxHashMap<Wanted, usize>,
+    wanted: Arc<[Observed]>,
+    places: FxHashMap<Observed, usize>,
     sender: Sender<(usize, Probe)>,
     wake: Option<Arc<Beat>>,
     given: Vec<Given>,
@@ -29,12 +29,12 @@ struct Given {
 
 impl Watcher {
     /// Whether it looks at this.
-    fn place(&self, wanted: &Wanted) -> Option<usize> {
+    fn place(&self, wanted: &Observed) -> Option<usize> {
         self.places.get(wanted).copied()
     }
 
     /// Takes away the probes for which `gone` is true; answers the links they were.
-    fn take(&mut self, gone: impl Fn(&Given, &Wanted) -> bool) -> Vec<(u64, MemberRef)> {
+    fn take(&mut self, gone: impl Fn(&Given, &Observed) -> bool) -> Vec<(u64, MemberRef)> {
         let mut links = Vec::new();
         let (sender, wanted) = (&mut self.sender, &self.wanted);
         self.given.retain(|given| {
@@ -78,10 +78,10 @@ impl Registry {
     fn show_to(&mut self, watcher: usize, slot: u32) {
         let entry = self.entry(slot);
         let (cell, crew) = (entry.cell.clone(), entry.crew);
-        if let Some(place) = self.watchers[watcher].place(&Wanted::Component(cell.name)) {
+        if let Some(place) = self.watchers[watcher].place(&Observed::Component(cell.name)) {
             self.give(watcher, place, None, Probe::Component(cell.clone()));
         }
-        if let Some(place) = self.watchers[watcher].place(&Wanted::Activity(crew))
+        if let Some(place) = self.watchers[watcher].place(&Observed::Activity(crew))
             && self.watchers[watcher].given.iter().all(|given| given.place != place)
             && let Some(crew) = self.crews.get(&crew)
         {
@@ -91,7 +91,7 @@ impl Registry {
         for (index, port) in cell.kind.ports.iter().enumerate() {
             let member = cell.name.member(*port);
             let out = cell.kind.ty.ports.get(port).is_some_and(|ty| ty.direction == Direction::Out);
-            if out && let Some(place) = self.watchers[watcher].place(&Wanted::Port(member)) {
+            if out && let Some(place) = self.watchers[watcher].place(&Observed::Port(member)) {
                 self.tap(watcher, place, slot, index, member);
             }
         }
@@ -105,7 +105,7 @@ impl Registry {
     }
 
     fn show_connection_to(&mut self, watcher: usize, from: MemberRef, to: MemberRef) {
-        if let Some(place) = self.watchers[watcher].place(&Wanted::Port(to))
+        if let Some(place) = self.watchers[watcher].place(&Observed::Port(to))
             && let Ok(slot) = self.find(from.component)
             && let Ok((index, _)) = self.port(slot, from.member)
         {
@@ -115,7 +115,7 @@ impl Registry {
 
     /// A connection is being removed.
     pub(super) fn hide_connection(&mut self, to: MemberRef) {
-        self.take_probes(|_, wanted| *wanted == Wanted::Port(to));
+        self.take_probes(|_, wanted| *wanted == Observed::Port(to));
     }
 
     /// A component is being removed: it looks no more, and is looked at no more.
@@ -126,16 +126,16 @@ impl Registry {
             self.detach(watcher.take(|_, _| true));
         }
         self.take_probes(|given, wanted| {
-            *wanted == Wanted::Component(name) || given.at.is_some_and(|at| at.component == name)
+            *wanted == Observed::Component(name) || given.at.is_some_and(|at| at.component == name)
         });
     }
 
     /// An activity has ended.
     pub(super) fn hide_activity(&mut self, name: Ident) {
-        self.take_probes(|_, wanted| *wanted == Wanted::Activity(name));
+        self.take_probes(|_, wanted| *wanted == Observed::Activity(name));
     }
 
-    fn take_probes(&mut self, gone: impl Fn(&Given, &Wanted) -> bool) {
+    fn take_probes(&mut self, gone: impl Fn(&Given, &Observed) -> bool) {
         for watcher in 0..self.watchers.len() {
             let links = self.watchers[watcher].take(&gone);
             self.detach(links);

@@ -220,6 +220,14 @@ impl Simulated {
         state.faults = faults;
     }
 
+    /// From now on this goes wrong too, where no earlier rule decides. Whoever adds faults while others use the platform
+    /// makes it `blocking`, so that nobody waits for a step in a thread that must not.
+    pub fn add_fault(&self, rule: FaultRule) {
+        let mut state = self.shared.lock();
+        state.faults.rules.push(rule);
+        state.fired.push(0);
+    }
+
     /// From now on steps take so long.
     pub fn set_delays(&self, delays: Delays) {
         self.shared.lock().delays = delays;

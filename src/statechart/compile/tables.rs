@@ -206,7 +206,7 @@ impl Builder<'_> {
     }
 
     fn raise(&mut self, name: EventName, when: When, scoped: bool, origin: Origin) {
-        self.ops.push(Op::Raise(name));
+        self.ops.push(if scoped { Op::RaiseScoped(name) } else { Op::Raise(name) });
         self.raises.push(RaiseSite { name, when, scoped, origin });
     }
 

@@ -110,12 +110,15 @@ impl Component for Driver {
         );
         b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds.")
             .no_effect()
+            .moves()
             .operation("start_calibration", |c, cx, (): ()| c.begin(cx, Drives::calibrate));
         b.doc("Moves the arm from its stops to the working pose and holds it there. Takes seconds.")
             .undone_by("fold")
+            .moves()
             .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
         b.doc("Moves the arm onto its stops. Takes seconds.")
             .undone_by("unfold")
+            .moves()
             .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
         b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
             c.motors.error_flags = 0;

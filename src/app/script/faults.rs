@@ -1,0 +1,92 @@
+//! `fault(step, how, times)`: what a script lets go wrong on the simulated platform, before a deployment and while it is up.
+
+use super::error;
+use crate::app::Checked;
+use crate::app::start::rule;
+use crate::check;
+use crate::limits;
+use crate::model::finding::did_you_mean;
+use crate::model::{FaultKind, Origin, StepFault};
+use crate::platform::simulated::Simulated;
+
+/// What a script lets go wrong.
+#[derive(Default)]
+pub(super) struct Faults {
+    /// For the next deployment.
+    waiting: Vec<StepFault>,
+    /// What is up, with the platform it runs on, if that is the simulated one.
+    up: Option<(Checked, Option<Simulated>)>,
+}
+
+impl Faults {
+    /// From now on this goes wrong; without a deployment, from the beginning of the next one.
+    pub(super) fn add(&mut self, step: &str, how: &str, times: Option<f64>) -> mlua::Result<()> {
+        // One blank between words, as steps are printed.
+        let step = step.split_whitespace().collect::<Vec<_>>().join(" ");
+        let kind = FaultKind::NAMES.iter().find(|(word, _)| *word == how);
+        let how = kind.map(|(_, kind)| *kind).ok_or_else(|| {
+            let help = did_you_mean(how, "kinds of fault", FaultKind::NAMES.map(|(word, _)| word));
+            error(format!("`{how}` is no kind of fault: {help}"))
+        })?;
+        let fault = StepFault { step, how, times: whole(times.unwrap_or(1.0))?, origin: Origin::NONE };
+        match &self.up {
+            None => self.waiting.push(fault),
+            Some((checked, simulated)) => {
+                fits(&fault, checked)?;
+                if let Some(simulated) = simulated {
+                    simulated.add_fault(rule(&fault));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what waits for this deployment can go wrong in it.
+    pub(super) fn fit(&self, checked: &Checked) -> mlua::Result<()> {
+        self.waiting.iter().try_for_each(|fault| fits(fault, checked))
+    }
+
+    /// A deployment is about to be brought up; what waited for it is in force.
+    pub(super) fn up(&mut self, checked: Checked, simulated: Option<Simulated>) {
+        if let Some(simulated) = &simulated {
+            self.waiting.drain(..).for_each(|fault| simulated.add_fault(rule(&fault)));
+        }
+        self.up = Some((checked, simulated));
+    }
+
+    /// It has been taken down, and its faults with it.
+    pub(super) fn down(&mut self) {
+        self.up = None;
+    }
+}
+
+fn whole(times: f64) -> mlua::Result<u32> {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let number = times as u32;
+    if f64::from(number).to_bits() != times.to_bits() || !(1..=limits::FAULT_TIMES).contains(&number) {
+        return Err(error(format!(
+            "{times} is not a number of times: a whole number from 1 to {}",
+            limits::FAULT_TIMES
+        )));
+    }
+    Ok(number)
+}
+
+/// Whether the fault can happen in the deployment.
+fn fits(fault: &StepFault, checked: &Checked) -> mlua::Result<()> {
+    let (deployment, step) = (&*checked.deployment, &fault.step);
+    if deployment.platform.as_str() != "simulated" {
+        return Err(error(format!(
+            "fault \"{step}\": the platform is `{}`, and only the simulated one does wrong what it is told to: run the \
+             script with `--platform simulated`",
+            deployment.platform
+        )));
+    }
+    match check::fault(fault, deployment, &checked.catalogue).into_iter().next() {
+        None => Ok(()),
+        Some(finding) => {
+            let help = finding.help.map(|help| format!(": {help}")).unwrap_or_default();
+            Err(error(format!("fault \"{step}\": {}{help}", finding.message)))
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! `davit drift`
+
+use super::exit::Exit;
+use super::output::Style;
+use super::remote::{ASK, connect, failure, seconds};
+use super::status::text;
+use super::{Answer, Context, Run};
+use crate::configurator::WAY_OUT;
+use serde_json::{Value as Json, json};
+use std::time::Duration;
+
+/// Show how a running deployment differs from what it should be: the platform is read and compared.
+///
+/// Each line is what leads from the system as it should be to the system as it is. Exit status: 0 no difference; 1 a
+/// difference, or the platform cannot be read.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The running deployment's name; not needed while only one runs.
+    name: Option<String>,
+    /// How long to wait at most, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    within: f64,
+    /// Print JSON: an array with one object a difference.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
+        let out = &context.out;
+        let mut client = connect(self.name.as_deref())?;
+        let limit = Duration::from_secs_f64(self.within) + ASK;
+        let drift = client.call("drift", &json!({ "within_s": self.within }), limit).map_err(failure)?;
+        let differences = drift.as_array().map_or(&[][..], Vec::as_slice);
+        let exit = if differences.is_empty() { Exit::Done } else { Exit::No };
+        if self.json {
+            out.json(&drift);
+            return Ok(exit);
+        }
+        let name = out.paint(Style::Bold, client.name());
+        if differences.is_empty() {
+            out.line(format!("{name}: as it should be"));
+            return Ok(exit);
+        }
+        out.line(format!("{name}: what leads from the system as it should be to the system as it is"));
+        context.out.text(listed(differences));
+        if client.call("status", &json!({}), ASK).is_ok_and(|status| status["phase"] == "broken") {
+            out.error(format!("note: it is broken; {WAY_OUT}\n"));
+        }
+        Ok(exit)
+    }
+}
+
+/// Differences as they are shown, one a line.
+pub fn listed(differences: &[Json]) -> String {
+    differences.iter().map(|difference| format!("  {}\n", text(&difference["text"]))).collect()
+}

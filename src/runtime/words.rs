@@ -1,0 +1,111 @@
+//! The words of a declaration: what is said about a component type, and about the member that comes next.
+
+use super::builder::{Builder, ident};
+use super::component::Component;
+use crate::model::monitor::Condition;
+use crate::model::{Effect, Irreversible, Tunable, TypeName};
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+/// Words about the type.
+impl<C: Component> Builder<C> {
+    /// What the type is for; `davit types` prints it.
+    pub fn describe(&mut self, doc: &str) -> &mut Self {
+        self.ty(|ty| ty.doc = doc.to_owned())
+    }
+
+    /// It moves something.
+    pub fn actuator(&mut self) -> &mut Self {
+        self.ty(|ty| ty.actuator = true)
+    }
+
+    /// Starting one moves hardware: an automatic rollback does not do it unasked.
+    pub fn moves_on_start(&mut self) -> &mut Self {
+        self.ty(|ty| ty.moves.start = true)
+    }
+
+    /// Stopping one moves hardware.
+    pub fn moves_on_stop(&mut self) -> &mut Self {
+        self.ty(|ty| ty.moves.stop = true)
+    }
+
+    /// Components of type `other` start before those of this type.
+    ///
+    /// # Panics
+    /// When `other` is no type name.
+    pub fn start_after(&mut self, other: &str) -> &mut Self {
+        self.ty(|ty| ty.start_after.push(TypeName::new(other).expect("a component type's name")))
+    }
+
+    /// Components of type `other` stop after those of this type.
+    ///
+    /// # Panics
+    /// When `other` is no type name.
+    pub fn stop_before(&mut self, other: &str) -> &mut Self {
+        self.ty(|ty| ty.stop_before.push(TypeName::new(other).expect("a component type's name")))
+    }
+
+    /// Which moves of its run state cannot be undone.
+    pub fn irreversible(&mut self, what: Irreversible) -> &mut Self {
+        self.ty(|ty| ty.irreversible = what)
+    }
+}
+
+/// Words about the next member.
+impl<C: Component> Builder<C> {
+    /// What the member is.
+    pub fn doc(&mut self, doc: &str) -> &mut Self {
+        self.words(|w| w.doc = doc.to_owned())
+    }
+
+    /// The unit of a port or property.
+    pub fn unit(&mut self, unit: &str) -> &mut Self {
+        self.words(|w| w.unit = Some(Arc::from(unit)))
+    }
+
+    /// The smallest and largest value of a property, of every number in it.
+    pub fn range(&mut self, range: RangeInclusive<f64>) -> &mut Self {
+        self.words(|w| (w.min, w.max) = (Some(*range.start()), Some(*range.end())))
+    }
+
+    /// The smallest value of a property.
+    pub fn min(&mut self, min: f64) -> &mut Self {
+        self.words(|w| w.min = Some(min))
+    }
+
+    /// The largest value of a property.
+    pub fn max(&mut self, max: f64) -> &mut Self {
+        self.words(|w| w.max = Some(max))
+    }
+
+    /// When a property may be set.
+    pub fn tunable(&mut self, tunable: Tunable) -> &mut Self {
+        self.words(|w| w.tunable = tunable)
+    }
+
+    /// The in-port is read as a queue: it takes only buffered connections, any number of them.
+    pub fn buffered(&mut self) -> &mut Self {
+        self.words(|w| w.buffered = true)
+    }
+
+    /// The operation leaves nothing behind that would have to be undone.
+    pub fn no_effect(&mut self) -> &mut Self {
+        self.words(|w| w.effect = Some(Effect::None))
+    }
+
+    /// The operation is undone by another one of the same component.
+    pub fn undone_by(&mut self, operation: &str) -> &mut Self {
+        self.words(|w| w.effect = Some(Effect::Undo(ident(operation))))
+    }
+
+    /// Calling the operation moves hardware: an automatic rollback does not do it unasked.
+    pub fn moves(&mut self) -> &mut Self {
+        self.words(|w| w.moves = true)
+    }
+
+    /// What is true of the component once the operation was done: a call of which no answer came is settled by it. The
+    /// component itself is written `self`: `Condition::compare("self.mode", Comparison::Equals, 6.0)`.
+    pub fn settled_by(&mut self, condition: Condition) -> &mut Self {
+        self.words(|w| w.settled_by = Some(condition))
+    }
+}

@@ -1,0 +1,146 @@
+//! The way out of *broken* (design §6): what differs from what should be, going back, taking what is there.
+
+use super::Session;
+use super::log::Happening;
+use crate::configurator::{Drift, Recovery, Residual};
+use crate::model::{ComponentName, Step};
+use serde::Serialize;
+use std::fmt;
+use std::time::Duration;
+
+/// One thing that is not as it should be: `{"how": "differs", "do": "property_set", "target": "a.k", "value": 2.0,
+/// "text": "property_set a.k = 2.0"}`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    how: How,
+    #[serde(flatten)]
+    what: What,
+    text: String,
+}
+
+/// What is known of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum How {
+    /// The step leads from what should be to what is.
+    Differs,
+    /// Nobody knows whether the step happened.
+    Unknown,
+    /// The step happened, and nothing undoes it.
+    Irreversible,
+    /// The component is faulted and should not be.
+    Faulted,
+    /// A call of the component has not returned.
+    Quarantined,
+}
+
+/// What it is about.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+enum What {
+    Step(Step),
+    Component { target: ComponentName },
+}
+
+impl Difference {
+    fn step(how: How, step: &Step) -> Self {
+        let text = match how {
+            How::Unknown => format!("{step} (nobody knows whether it happened)"),
+            How::Irreversible => format!("{step} (cannot be undone)"),
+            _ => step.to_string(),
+        };
+        Self { how, what: What::Step(step.clone()), text }
+    }
+
+    fn component(how: How, target: ComponentName) -> Self {
+        let word = if how == How::Faulted { "faulted" } else { "in quarantine" };
+        Self { how, what: What::Component { target }, text: format!("{target} is {word}") }
+    }
+
+    /// What the platform shows that should not be so.
+    fn of_drift(drift: &Drift) -> Vec<Self> {
+        let steps = drift.steps.iter().map(|step| Self::step(How::Differs, step));
+        steps.chain(drift.faulted.iter().map(|name| Self::component(How::Faulted, *name))).collect()
+    }
+
+    /// What is left of an application that is neither done nor undone.
+    pub(super) fn of_residual(residual: &Residual) -> Vec<Self> {
+        let lists = [
+            (How::Differs, &residual.difference),
+            (How::Unknown, &residual.unsettled),
+            (How::Irreversible, &residual.irreversible),
+        ];
+        let left = residual.left.iter().filter(|step| !residual.irreversible.contains(step));
+        let left = left.map(|step| Self::step(How::Differs, step));
+        let steps = lists.into_iter().flat_map(|(how, steps)| steps.iter().map(move |step| Self::step(how, step)));
+        let components = [(How::Faulted, &residual.faulted), (How::Quarantined, &residual.quarantined)];
+        let components =
+            components.into_iter().flat_map(|(how, names)| names.iter().map(move |name| Self::component(how, *name)));
+        left.chain(steps).chain(components).collect()
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// How a recovery ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Recovered {
+    /// Whether the system is whole now.
+    pub recovered: bool,
+    /// Whether it was broken before.
+    pub was_broken: bool,
+    /// Why it still is not whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+    /// What remains; empty when it is whole.
+    pub residual: Vec<Difference>,
+}
+
+/// The word of a recovery, as it is typed.
+pub fn recovery(word: &str) -> Option<Recovery> {
+    match word {
+        "back" => Some(Recovery::Back),
+        "accept" => Some(Recovery::Accept),
+        _ => None,
+    }
+}
+
+/// Why nothing can be finished instead of undone.
+pub const NO_FORWARD: &str = "nothing can be finished forward: there is no journal yet that says how far it came";
+
+impl Session {
+    /// What differs from what should be, as the platform shows it; empty when all is as it should be. None: no answer
+    /// within `within`, or the platform could not be read.
+    pub fn drift(&self, within: Duration) -> Option<Vec<Difference>> {
+        let drift = self.configurator().drift(self.clock().now() + within)?;
+        drift.observed.then(|| Difference::of_drift(&drift))
+    }
+
+    /// Recovers a broken system, in the name of `by`; a whole one stays as it is. None: no answer within `within`; what
+    /// was begun goes on.
+    pub fn recover(&self, how: Recovery, by: &str, within: Duration) -> Option<Recovered> {
+        let deadline = self.clock().now() + within;
+        let was_broken = self.configurator().view(false, deadline)?.broken.is_some();
+        let word = match how {
+            Recovery::Back => "back",
+            Recovery::Accept => "accept",
+        };
+        self.hub().note(Happening::Requested { request: None, ask: format!("recover --{word}"), by: by.to_owned() });
+        let ended = self.configurator().recover(how, deadline)?;
+        self.refresh_phase();
+        let residual = ended.err();
+        if let Some(residual) = &residual {
+            self.hub().note(Happening::Forced { note: format!("not recovered: {residual}") });
+        }
+        Some(Recovered {
+            recovered: residual.is_none(),
+            was_broken,
+            why: residual.as_ref().map(|residual| residual.cause.to_string()),
+            residual: residual.map(|residual| Difference::of_residual(&residual)).unwrap_or_default(),
+        })
+    }
+}

@@ -1,0 +1,112 @@
+//! What a safe configuration comes to: as much of it as can be done, whatever is in its way (design §6).
+//!
+//! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
+//! there has nothing to be made safe, and is left out.
+
+use super::work::{Op, Part, Planned, transaction};
+use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
+use crate::model::{Change, Configuration, StateList, codes};
+use crate::plan::footprint::Footprint;
+use crate::plan::{Context, PlannedStep, plan_on};
+use crate::system::{Overlay, System};
+use crate::time::Time;
+use std::sync::Arc;
+
+/// A safe configuration, planned as far as it goes.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    /// What is done.
+    pub planned: Planned,
+    /// The frame it leaves, without a number.
+    pub frame: Frame,
+    /// Why pieces of it cannot be done.
+    pub troubles: Vec<Reason>,
+}
+
+/// What the safe `configuration`, asked for by `request`, comes to.
+pub fn effort(
+    system: &System,
+    stack: &Stack,
+    configuration: &Configuration,
+    request: &Request,
+    at: Time,
+    context: &Context,
+) -> Effort {
+    let op = Op::Push { configuration, requester: request.requester, at, scope: request.scope };
+    match transaction(system, stack, &[op], context) {
+        Ok(planned) => match planned.parts[0].edits.push.as_deref().cloned() {
+            Some(frame) => Effort { planned, frame, troubles: Vec::new() },
+            None => piecewise(system, configuration, request, at, context),
+        },
+        Err(_) => piecewise(system, configuration, request, at, context),
+    }
+}
+
+fn piecewise(system: &System, configuration: &Configuration, request: &Request, at: Time, context: &Context) -> Effort {
+    let mut view = Overlay::new(system);
+    let mut steps: Vec<PlannedStep> = Vec::new();
+    let mut troubles = Vec::new();
+    let (mut footprint, mut saved) = (Footprint::default(), Vec::new());
+    for piece in pieces(configuration) {
+        let mut trial = view.clone();
+        match plan_on(&mut trial, &piece, context) {
+            Ok(plan) => {
+                view = trial;
+                let base = u32::try_from(steps.len()).expect("fewer steps than that");
+                let wave = steps.last().map_or(0, |step| step.wave + 1);
+                footprint.touches.extend(plan.footprint.touches);
+                saved.extend(plan.saved.into_iter().map(|mut value| {
+                    value.at += base;
+                    value
+                }));
+                for mut planned in plan.steps {
+                    planned.id += base;
+                    planned.wave += wave;
+                    planned.after.iter_mut().for_each(|id| *id += base);
+                    steps.push(planned);
+                }
+            }
+            Err(refusal) if refusal.findings.iter().all(|finding| finding.code == codes::UNKNOWN_COMPONENT) => {}
+            Err(refusal) => troubles.push(Reason::Refused(refusal.findings)),
+        }
+    }
+    let frame = Frame {
+        id: FrameId(u64::MAX),
+        configuration: configuration.id,
+        group: configuration.group,
+        requester: request.requester,
+        at,
+        inverse: Inverse::Steps(steps.clone()),
+        footprint,
+        saved,
+        floor: crate::plan::irreversible(&steps).map(str::to_owned),
+        parts: std::collections::BTreeSet::new(),
+        acts: Vec::new(),
+        scope: request.scope,
+        partial: !troubles.is_empty(),
+        safe: true,
+    };
+    let part = Part {
+        range: 0..u32::try_from(steps.len()).expect("fewer steps than that"),
+        edits: Edits { pops: Vec::new(), push: Some(Arc::new(frame.clone())) },
+        pushes: Some(configuration.id),
+        on_failure: configuration.on_failure,
+        frame: Some(Arc::new(frame.clone())),
+    };
+    let revision = system.revision();
+    let parts = vec![part];
+    let planned =
+        Planned { steps, of: Vec::new(), whole: Vec::new(), parts, revision, warnings: Vec::new(), popped: Vec::new() };
+    Effort { planned, frame, troubles }
+}
+
+/// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.
+fn pieces(whole: &Configuration) -> Vec<Configuration> {
+    let empty = || Configuration::new(whole.id);
+    let one = |entry| StateList::of([entry]).expect("one `_default` at most");
+    let pre = whole.pre.iter().map(|entry| Configuration { pre: one(entry), ..empty() });
+    let changes =
+        whole.changes.iter().map(|change: &Change| Configuration { changes: vec![change.clone()], ..empty() });
+    let post = whole.post.iter().map(|entry| Configuration { post: one(entry), ..empty() });
+    pre.chain(changes).chain(post).collect()
+}

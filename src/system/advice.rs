@@ -1,0 +1,146 @@
+//! What a user reads of a violation: one text, whoever found it.
+
+use super::violation::Member;
+use super::{View, Violation};
+use crate::model::finding::did_you_mean;
+use crate::model::{ComponentName, ComponentType, Finding, MemberRef, Origin, Tunable, TypeName, ValueType};
+
+impl Violation {
+    /// It as a finding, at no place yet: what is wrong, where what it is about was declared, what to do. `view` is the
+    /// system it was found in.
+    pub fn finding(&self, view: &impl View) -> Finding {
+        let mut finding = Finding::error(self.code(), self.to_string()).labelled(self.label());
+        finding.help = self.help(view);
+        for (origin, text) in self.declarations(view) {
+            if origin.is_some() {
+                finding = finding.also(origin, text);
+            }
+        }
+        finding
+    }
+
+    /// What to write at the place itself; mostly nothing.
+    fn label(&self) -> String {
+        match self {
+            Self::UnknownType { component, .. } => format!("`{component}` would be one"),
+            Self::UnknownActivity { .. } => "runs in an activity that the deployment does not declare".to_owned(),
+            Self::UnknownMember { what, .. } => format!("no such {}", what.words().0),
+            _ => String::new(),
+        }
+    }
+
+    /// Where what it is about was declared.
+    fn declarations(&self, view: &impl View) -> Vec<(Origin, String)> {
+        let here = |declared: &Origin, how: &str| vec![(*declared, format!("declared here{how}"))];
+        match self {
+            Self::UnknownMember { types, .. } => {
+                let declared = types.iter().filter_map(|ty| view.types().get(*ty));
+                declared.map(|ty| (ty.origin, format!("{} is declared here", ty.name))).collect()
+            }
+            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } => {
+                [from, to].map(|(port, declared)| (*declared, format!("`{port}` is declared here"))).to_vec()
+            }
+            Self::MissingProperty { declared, .. } => here(declared, " without a default"),
+            Self::NeedsBuffer { declared, .. } => here(declared, " as buffered"),
+            Self::NotOut { declared, .. }
+            | Self::NotIn { declared, .. }
+            | Self::WritesOut { declared, .. }
+            | Self::NotTunable { declared, .. }
+            | Self::BadValue { declared, .. }
+            | Self::NotWritable { declared, .. }
+            | Self::ArgumentCount { declared, .. }
+            | Self::Argument { declared, .. } => here(declared, ""),
+            Self::UnknownComponent(_)
+            | Self::UnknownType { .. }
+            | Self::UnknownActivity { .. }
+            | Self::Exists(_)
+            | Self::Transition { .. }
+            | Self::NotUnconfigured { .. }
+            | Self::StillConnected { .. }
+            | Self::AlreadyConnected { .. }
+            | Self::NotConnected { .. }
+            | Self::DataAlone { .. }
+            | Self::BufferSize(_)
+            | Self::Driven { .. }
+            | Self::PropertyCount { .. } => Vec::new(),
+        }
+    }
+
+    /// What to do about it, with near names where a name is unknown in `view`.
+    pub fn help(&self, view: &impl View) -> Option<String> {
+        Some(match self {
+            Self::UnknownComponent(name) => {
+                let mut known = Vec::new();
+                view.for_each_component(&mut |node| known.push(node.name));
+                known.sort_unstable();
+                did_you_mean(name.as_str(), "components", known.iter().map(ComponentName::as_str))
+            }
+            Self::UnknownType { ty, .. } => {
+                let known: Vec<TypeName> = view.types().iter().map(|t| t.name).collect();
+                did_you_mean(ty.as_str(), "component types", known.iter().map(TypeName::as_str))
+            }
+            Self::UnknownActivity { near, .. } => near.clone(),
+            Self::UnknownMember { what, member, types } => {
+                let types: Vec<&ComponentType> =
+                    types.iter().filter_map(|ty| view.types().get(*ty)).map(AsRef::as_ref).collect();
+                near_member(*what, *member, &types)
+            }
+            Self::Exists(name) => format!("destroy `{name}` in the same configuration, or choose another name"),
+            Self::StillConnected { links, .. } => {
+                let shown: Vec<String> =
+                    links.iter().map(|(from, to)| format!("disconnect(\"{from}\", \"{to}\")")).collect();
+                format!("add {}", shown.join(", "))
+            }
+            Self::NotOut { .. } | Self::NotIn { .. } => {
+                "are the two ends the wrong way round? the out-port is the first: connect(out_port, in_port)".to_owned()
+            }
+            Self::WritesOut { .. } => "name an in-port: what leaves an out-port, its component decides".to_owned(),
+            Self::PortTypes { .. } => "connect ports of the same type; nothing is converted on the way".to_owned(),
+            Self::PortUnits { .. } => {
+                "put a component between them that converts, or correct the unit of one".to_owned()
+            }
+            Self::AlreadyConnected { from, to } => {
+                format!("to change the policy add disconnect(\"{from}\", \"{to}\") to the same configuration")
+            }
+            Self::DataAlone { to, by } | Self::Driven { port: to, by } => match by.first() {
+                Some(from) => format!("add disconnect(\"{from}\", \"{to}\") to the same configuration"),
+                None => return None,
+            },
+            Self::NeedsBuffer { .. } => "give the connection a buffer, such as `buffer = 64`".to_owned(),
+            Self::BufferSize(_) => "a buffer holds at least one sample".to_owned(),
+            Self::NotTunable { property, tunable, .. } => {
+                let state = if *tunable == Tunable::Unconfigured { "unconfigured" } else { "stopped" };
+                let c = property.component;
+                format!("add \"{c}:{state}\" to pre_conf_state, and \"{c}:running\" to post_conf_state")
+            }
+            Self::BadValue { wanted, .. } => format!("give it a value of type {wanted}"),
+            Self::MissingProperty { property, ty, .. } => {
+                format!("add `{} = …` ({ty}) to the properties of this create", property.member)
+            }
+            Self::NotWritable { .. } => "connect a component that sends what you want to write".to_owned(),
+            Self::ArgumentCount { operation, wanted, .. } | Self::Argument { operation, wanted, .. } => {
+                let wanted: Vec<String> = wanted.iter().map(ValueType::to_string).collect();
+                format!("call it as {operation}({})", wanted.join(", "))
+            }
+            Self::Transition { .. }
+            | Self::NotUnconfigured { .. }
+            | Self::NotConnected { .. }
+            | Self::PropertyCount { .. } => return None,
+        })
+    }
+}
+
+/// What may have been meant by a member that none of `types` has.
+fn near_member(what: Member, member: MemberRef, types: &[&ComponentType]) -> String {
+    let name = member.member;
+    let others = Member::ALL.into_iter().filter(|other| *other != what);
+    let elsewhere = others.flat_map(|other| types.iter().map(move |ty| (other, *ty)));
+    if let Some((other, ty)) = elsewhere.into_iter().find(|(other, ty)| other.is_in(ty, name)) {
+        let article = if other == Member::Operation { "an" } else { "a" };
+        return format!("`{name}` is {article} {} of {}", other.words().0, ty.name);
+    }
+    let mut known: Vec<&str> = types.iter().flat_map(|ty| what.of(ty)).collect();
+    known.sort_unstable();
+    known.dedup();
+    did_you_mean(name.as_str(), what.words().1, known)
+}

@@ -1,0 +1,76 @@
+//! What goes into a transaction and comes out of it.
+
+use super::Touched;
+use crate::model::{ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
+use crate::time::Time;
+use smallvec::SmallVec;
+use std::time::Duration;
+
+/// How a transaction is carried out.
+#[derive(Debug, Clone, Copy)]
+pub struct Spec {
+    /// No step of it begins later.
+    pub until: Time,
+    /// What that time is, from its beginning, for words.
+    pub timeout: Duration,
+    /// How long one step may take.
+    pub patience: Duration,
+    /// Every step is tried, past failures, and none is taken back: a safe configuration.
+    pub best_effort: bool,
+    /// Somebody asked for what a way back would do: it may move.
+    pub asked_back: bool,
+}
+
+/// What whoever drives it can do now.
+pub struct Can<'a> {
+    /// How a step is carried out on the platform.
+    pub execution: &'a dyn Fn(&Step) -> Execution,
+    /// Whether there is room for a call that takes time.
+    pub room: bool,
+    /// Components whose call has not returned.
+    pub quarantined: &'a [ComponentName],
+}
+
+/// What is to be done next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Poll {
+    /// These steps begin now, by their numbers in the list in hand ([`Transaction::step`]).
+    Begin(SmallVec<[u32; 1]>),
+    /// The call that is out for this step is given up: it is told so.
+    Cancel(u32),
+    /// These components are read back.
+    Read(Vec<ComponentName>),
+    /// Nothing, until something comes.
+    Wait,
+    /// It is over: [`Transaction::end`].
+    Over,
+}
+
+/// What happened.
+#[derive(Debug, Clone)]
+pub enum Input {
+    /// A step that was begun is back.
+    Ended {
+        /// Its number.
+        step: u32,
+        /// How.
+        outcome: Outcome,
+    },
+    /// A step that was to begin did not.
+    NotBegun(u32),
+    /// What was read; none: nobody answered.
+    Seen(Option<Snapshot>),
+    /// A part of it is given up, by who asked for it: what was done is taken back, also what moves.
+    GiveUp {
+        /// The part.
+        part: usize,
+    },
+    /// A safe configuration goes first. Nothing further begins, and nothing is taken back before [`Input::Release`].
+    Interrupt(ConfigId),
+    /// The safe configuration has been applied, and touched this.
+    Release(Touched),
+    /// Everything is taken down: nothing further begins, and nothing is taken back.
+    TakenDown,
+    /// Nothing further begins, and what was done is taken back as after a failure.
+    Stop,
+}

@@ -1,0 +1,269 @@
+//! The way out of *broken*: `davit drift`, `davit recover`, `davit commit`, as commands, on the socket and in scripts.
+
+use crate::demo::Demo;
+use serde_json::{Value, json};
+
+/// A logger whose file decides whether `swap` fails, and whether it can be taken back.
+const DEPLOYMENT: &str = "davit: 1
+name: logged
+platform: embedded
+libraries: [standard]
+activities:
+  slow: { period_ms: 10.0 }
+configurations: [configurations.lua]
+coordinator: coordinator.lua
+deploy:   { event: e_start,    up: up,   within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+";
+
+const CONFIGURATIONS: &str = r#"ConfiguratorConf {
+  make = Configuration {
+    create("log", "standard.CsvLogger", { activity = "slow", properties = { path = "logs/a.csv" } }),
+    post_conf_state = { "log:running" },
+  },
+  thin = Configuration { property_set("log.every", 5) },
+  thick = Configuration { property_set("log.every", 2) },
+  swap = Configuration { on_failure = "hold",
+    pre_conf_state = { "log:unconfigured" },
+    property_set("log.path", "gone/b.csv"),
+    post_conf_state = { "log:running" },
+  },
+}
+"#;
+
+const COORDINATOR: &str = r#"return state {
+  idle = state {},
+  making = state { entry = "make" },
+  up = state {},
+  thinned = state { config = "thin" },
+  leaving = state { entry = "make.undo" },
+  trans { src = "initial", tgt = "idle" },
+  trans { src = "idle", tgt = "making", events = { "e_start" } },
+  trans { src = "making", tgt = "up", events = { "make.ok" } },
+  trans { src = "making", tgt = "leaving", events = { "make.failed", "make.broken", "e_shutdown" } },
+  trans { src = "up", tgt = "thinned", events = { "e_thin" } },
+  trans { src = "thinned", tgt = "up", events = { "e_thick", "thin.failed", "thin.broken" } },
+  trans { src = "up", tgt = "leaving", events = { "e_shutdown" } },
+  trans { src = "thinned", tgt = "leaving", events = { "e_shutdown" } },
+  trans { src = "leaving", tgt = "idle", events = { "make.undone", "make.undo.failed", "make.undo.broken" } },
+}
+"#;
+
+fn files() -> Demo {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", DEPLOYMENT);
+    demo.write("configurations.lua", CONFIGURATIONS);
+    demo.write("coordinator.lua", COORDINATOR);
+    std::fs::create_dir(demo.path("logs")).unwrap();
+    demo
+}
+
+/// A running deployment; taken down whatever the test found.
+struct Deployed(Demo);
+
+impl Deployed {
+    fn new() -> Self {
+        let demo = files();
+        let up = demo.run(&["deploy", "deployment.yaml", "--detach"]);
+        assert_eq!(up.code, 0, "{}{}", up.out, up.err);
+        Self(demo)
+    }
+
+    /// The system is broken: the logger's file cannot be made, and what was done is held.
+    fn broken() -> Self {
+        let deployed = Self::new();
+        let swap = deployed.0.run(&["apply", "swap", "--wait"]);
+        assert_eq!(swap.code, 3, "{}{}", swap.out, swap.err);
+        deployed
+    }
+
+    fn status(&self) -> Value {
+        self.0.run(&["status", "--json"]).json()
+    }
+}
+
+impl Drop for Deployed {
+    fn drop(&mut self) {
+        let _ = self.0.command(&["shutdown", "--force"]).output();
+    }
+}
+
+#[test]
+fn a_broken_deployment_goes_back() {
+    let deployed = Deployed::broken();
+    let run = |args: &[&str]| deployed.0.run(args);
+    let status = run(&["status"]);
+    assert_eq!(status.code, 3, "{}{}", status.out, status.err);
+    let residual = &deployed.status()["residual"];
+    let texts: Vec<&str> = residual.as_array().unwrap().iter().map(|d| d["text"].as_str().unwrap()).collect();
+    assert!(texts.contains(&"property_set log.path = \"gone/b.csv\""), "{residual}");
+    for text in &texts {
+        assert!(status.out.contains(text), "{}", status.out);
+    }
+
+    let drift = run(&["drift", "logged"]);
+    assert_eq!(drift.code, 1, "{}{}", drift.out, drift.err);
+    assert!(drift.out.contains("property_set log.path") && drift.err.contains("davit recover --back"), "{}", drift.out);
+    let differences = run(&["drift", "--json"]).json();
+    let set = differences.as_array().unwrap().iter().find(|d| d["do"] == "property_set").expect("the path differs");
+    assert_eq!(
+        (&set["target"], &set["value"], &set["how"]),
+        (&json!("log.path"), &json!("gone/b.csv"), &json!("differs"))
+    );
+
+    // The first file cannot be made again either: what remains is named, and so is why.
+    std::fs::rename(deployed.0.path("logs"), deployed.0.path("away")).unwrap();
+    let still = run(&["recover", "--back"]);
+    assert_eq!(still.code, 3, "{}{}", still.out, still.err);
+    assert!(still.out.contains("still broken") && still.out.contains("  cleanup log"), "{}", still.out);
+    let still = run(&["recover", "--back", "--json"]);
+    assert_eq!((still.code, &still.json()["recovered"]), (3, &json!(false)), "{}", still.out);
+    assert!(!still.json()["residual"].as_array().unwrap().is_empty());
+
+    std::fs::rename(deployed.0.path("away"), deployed.0.path("logs")).unwrap();
+    let back = run(&["recover", "--back"]);
+    assert_eq!((back.code, back.out.as_str()), (0, "logged: recovered\n"), "{}", back.err);
+    let status = deployed.status();
+    assert_eq!((&status["phase"], &status["residual"]), (&json!("up"), &json!([])));
+    assert_eq!(status["system"]["components"]["log"]["state"], "running");
+    let drift = run(&["drift"]);
+    assert_eq!((drift.code, drift.out.as_str()), (0, "logged: as it should be\n"), "{}", drift.err);
+    assert_eq!(run(&["drift", "--json"]).json(), json!([]));
+    let again = run(&["recover", "--back"]);
+    assert_eq!((again.code, again.out.as_str()), (0, "logged: not broken, nothing to recover\n"), "{}", again.err);
+
+    let log = run(&["log", "--json"]).json();
+    let entries = log.as_array().unwrap();
+    assert!(entries.iter().any(|e| e["ask"] == "recover --back" && e["by"] == "operator"), "{log}");
+    assert!(entries.iter().any(|e| e["what"] == "recovered"), "{log}");
+    assert_eq!(run(&["shutdown"]).code, 0);
+}
+
+#[test]
+fn the_undo_of_what_broke_it_recovers_as_well() {
+    let deployed = Deployed::broken();
+    let undo = deployed.0.run(&["undo", "swap", "--wait"]);
+    assert_eq!(undo.code, 0, "{}{}", undo.out, undo.err);
+    assert_eq!(deployed.status()["phase"], "up");
+}
+
+#[test]
+fn what_is_there_is_taken_as_the_state() {
+    let deployed = Deployed::broken();
+    let accept = deployed.0.run(&["recover", "--accept"]);
+    assert_eq!((accept.code, accept.out.as_str()), (0, "logged: recovered\n"), "{}", accept.err);
+    let status = deployed.status();
+    assert_eq!((&status["phase"], &status["stack"]), (&json!("up"), &json!([])));
+    assert_eq!(status["system"]["components"]["log"]["properties"]["path"], "gone/b.csv");
+    assert_eq!(deployed.0.run(&["drift"]).code, 0);
+    assert_eq!(deployed.0.run(&["apply", "thick", "--wait"]).code, 0, "requests are taken again");
+}
+
+#[test]
+fn a_way_that_is_none_is_refused_in_words() {
+    let deployed = Deployed::broken();
+    let none = deployed.0.run(&["recover"]);
+    assert_eq!(none.code, 2, "{}{}", none.out, none.err);
+    assert!(
+        none.err.contains("--back") && none.err.contains("--accept") && !none.err.contains("--forward"),
+        "{}",
+        none.err
+    );
+    let forward = deployed.0.run(&["recover", "--forward"]);
+    assert_eq!(forward.code, 1, "{}{}", forward.out, forward.err);
+    assert!(forward.err.contains("no journal"), "{}", forward.err);
+    assert_eq!(deployed.0.run(&["recover", "--back", "--accept"]).code, 2);
+    assert_eq!(deployed.status()["phase"], "broken", "nothing was done");
+    for command in [vec!["drift", "lgged"], vec!["recover", "lgged", "--back"], vec!["commit", "lgged"]] {
+        let unknown = deployed.0.run(&command);
+        assert_eq!(unknown.code, 1, "{command:?}: {}", unknown.err);
+        assert!(unknown.err.contains("`logged`"), "{command:?}: {}", unknown.err);
+        let json = deployed.0.run(&[&command[..], &["--json"]].concat());
+        assert_eq!((json.code, &json.json()["ok"]), (1, &json!(false)), "{command:?}");
+    }
+}
+
+#[test]
+fn commit_makes_the_operators_frames_permanent_and_no_others() {
+    let deployed = Deployed::new();
+    let run = |args: &[&str]| deployed.0.run(args);
+    let frames = || {
+        let stack = run(&["stack", "--json"]).json();
+        stack.as_array().unwrap().iter().map(|f| f["configuration"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(run(&["event", "e_thin", "--wait", "thin.ok"]).code, 0);
+    assert_eq!(run(&["apply", "thick", "--wait"]).code, 0);
+    assert_eq!(frames(), ["make", "thin", "thick"]);
+    let refused = run(&["commit"]);
+    assert_eq!(refused.code, 1, "{}{}", refused.out, refused.err);
+    assert!(refused.out.contains("commit.failed") && refused.out.contains("`thin` is in force"), "{}", refused.out);
+    assert_eq!(frames(), ["make", "thin", "thick"], "nothing was done");
+
+    let forced = run(&["commit", "--force", "--json"]);
+    assert_eq!((forced.code, &forced.json()["answer"]), (0, &json!("commit.ok")), "{}", forced.out);
+    assert_eq!(frames(), ["make", "thin"], "the coordinator's frames stay");
+    let undo = run(&["undo", "thick", "--wait"]);
+    assert_eq!(undo.code, 1, "{}{}", undo.out, undo.err);
+    assert_eq!(deployed.status()["system"]["components"]["log"]["properties"]["every"], 2);
+    assert_eq!(run(&["event", "e_thick", "--wait", "thin.undone"]).code, 0, "its own it can undo");
+    assert_eq!(run(&["shutdown"]).code, 0);
+}
+
+#[test]
+fn a_script_recovers() {
+    let demo = files();
+    demo.write(
+        "story.lua",
+        r#"
+deploy("deployment.yaml")
+assert(#drift() == 0)
+recover("back")
+apply("swap")
+wait_answer("swap.broken", 1)
+local found = false
+for _, difference in ipairs(drift()) do
+  found = found or (difference["do"] == "property_set" and difference.target == "log.path")
+end
+assert(found, "the path differs")
+local ok, why = pcall(recover, "forward")
+assert(not ok and tostring(why):find("journal"), tostring(why))
+recover("back")
+assert(#drift() == 0)
+assert_running("log")
+apply("thick")
+wait_answer("thick.ok", 1)
+commit()
+wait_answer("commit.failed", 1)
+commit { force = true }
+wait_answer("commit.ok", 1)
+assert(#stack() == 1, "the coordinator's")
+apply("swap")
+wait_answer("swap.broken", 1)
+recover("accept")
+assert_state("log", "unconfigured")
+"#,
+    );
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let typo = "deploy('deployment.yaml')\nrecover('bak')\n";
+    demo.write("typo.lua", typo);
+    let ran = demo.run(&["run", "typo.lua", "--clock", "simulated"]);
+    assert!(ran.code == 1 && ran.err.contains("`back`"), "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn a_script_tries_a_deployment_out_on_the_simulated_platform() {
+    let demo = files();
+    // What the real component could not do.
+    std::fs::remove_dir(demo.path("logs")).unwrap();
+    demo.write("story.lua", "deploy('deployment.yaml')\nassert_running('log')\n");
+    let run = |more: &[&str]| {
+        let args: Vec<&str> = ["run", "story.lua", "--clock", "simulated"].iter().chain(more).copied().collect();
+        demo.run(&args)
+    };
+    assert_eq!(run(&[]).code, 1, "its own platform has no such folder");
+    let ran = run(&["--platform", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let typo = run(&["--platform", "simulted"]);
+    assert!(typo.code == 2 && typo.err.contains("simulated"), "{}", typo.err);
+}
