@@ -25,6 +25,7 @@ struct Flight {
 }
 
 /// What a transaction is for.
+#[allow(clippy::large_enum_variant)] // nearly always the large one, once for each request
 pub(super) enum Purpose {
     /// Requests of a batch under way on the desk, by its number.
     Requests(u32, Group),

@@ -42,10 +42,10 @@ impl Stack {
 
     /// Pops the top, a frame of a switch whose undo is done, and keeps it for the next push.
     pub fn pop_switch(&mut self) {
-        if let Some(frame) = self.frames.pop() {
-            if self.spares.len() < SPARES {
-                self.spares.push(frame);
-            }
+        if let Some(frame) = self.frames.pop()
+            && self.spares.len() < SPARES
+        {
+            self.spares.push(frame);
         }
     }
 }

@@ -161,8 +161,7 @@ impl System {
                 ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
                 self.remove_component(name);
             }
-            let values =
-                ty.properties.iter().map(|(_, declared)| declared.default.clone().unwrap_or(Value::Bool(false)));
+            let values = ty.properties.values().map(|declared| declared.default.clone().unwrap_or(Value::Bool(false)));
             let values = values.collect();
             self.insert_component(Node::new(name, ty.clone(), component.activity, values));
         }

@@ -204,7 +204,7 @@ impl Transaction {
             faulted,
             quarantined: self.hung(can),
             // Nobody can be asked: what every answer said without a doubt is believed.
-            observed: observed || !(self.doubted || !unsettled.is_empty()),
+            observed: observed || !self.doubted && unsettled.is_empty(),
             ..Residual::of(self.reason())
         };
         self.unsettled = unsettled;

@@ -69,7 +69,7 @@ impl Run {
 
     /// Whether no further step of it begins.
     pub fn stops(&self) -> bool {
-        !self.tries_all && !(self.failures.is_empty() && self.unsettled.is_empty())
+        !(self.tries_all || self.failures.is_empty() && self.unsettled.is_empty())
     }
 
     /// Whether every step is over.
