@@ -229,6 +229,38 @@ fn imports_follow_the_table() {
     assert!(wrong.is_empty(), "imports that are not in the table of ARCHITECTURE.md:\n{}", wrong.join("\n"));
 }
 
+/// Which file of a room needs which other one, by what they name after `super::`; the room's own `mod.rs` apart.
+fn needs(room: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let prefix = format!("src/{room}/");
+    let files: Vec<(String, String)> = (sources("src").into_iter())
+        .filter_map(|(file, text)| Some((file.strip_prefix(&prefix)?.strip_suffix(".rs")?.to_owned(), text)))
+        .filter(|(file, _)| file != "mod" && !file.contains('/'))
+        .collect();
+    let names: BTreeSet<&String> = files.iter().map(|(file, _)| file).collect();
+    let of = |text: &str| rooms_named(text, "super::").into_iter().map(|(_, name)| name).collect::<BTreeSet<String>>();
+    files
+        .iter()
+        .map(|(file, text)| (file.clone(), of(text).into_iter().filter(|name| names.contains(name)).collect()))
+        .collect()
+}
+
+#[test]
+fn no_files_go_round_in_a_circle() {
+    for room in ["check", "configurator", "stack", "transaction"] {
+        let mut needs = needs(room);
+        assert!(
+            needs.len() > 4 && needs.values().any(|needs| !needs.is_empty()),
+            "`{room}` was not understood: {needs:?}"
+        );
+        // What needs nothing that is left is no part of a circle.
+        while let Some(done) = needs.iter().find(|(_, needs)| needs.is_empty()).map(|(file, _)| file.clone()) {
+            needs.remove(&done);
+            needs.values_mut().for_each(|needs| _ = needs.remove(&done));
+        }
+        assert!(needs.is_empty(), "files of `{room}` need each other in a circle: {needs:#?}");
+    }
+}
+
 #[test]
 fn files_hold_one_idea() {
     let long: Vec<String> = sources("src")

@@ -1,15 +1,13 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
-use super::product::{Answers, Failed, Move, Next, Nexts, Product, State, Stop, index};
-use super::reactions::{Asked, Handed, Reaction};
+use super::product::Product;
+use super::reactions::{Handed, Reaction};
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Arrival, Batch, Request, Why};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
-
-/// A request as a step makes it.
-pub type Given = Asked;
 
 impl Product<'_> {
     /// A coordinator hears an event, and comes to rest again.
@@ -112,7 +110,8 @@ impl Product<'_> {
     pub(super) fn take_in(&mut self, mut state: State, batch: Batch) -> State {
         // To come to *down* twice with nothing asked for in between is to come once.
         let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
-        let same = |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
+        let same =
+            |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
         if is_down(&batch) && state.desk.waiting().filter(same).last().is_some_and(is_down) {
             return state;
         }

@@ -31,8 +31,6 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     states(deployment, chart, &mut findings);
     raised(deployment, chart, &mut findings);
     heard(deployment, chart, &mut findings);
-    findings.extend(super::unheard::check(deployment, chart));
-    findings.extend(super::purity::check(deployment));
     findings
 }
 

@@ -6,7 +6,8 @@
 
 use super::beside;
 use super::members::Member;
-use super::product::{Move, Next, Product, State};
+use super::product::Product;
+use super::state::{Move, Next, State};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;

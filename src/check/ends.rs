@@ -1,6 +1,7 @@
 //! How what is under way may end.
 
-use super::product::{Answers, Failed, Nexts, Product, State, Stop, Trouble, Unconfirmed};
+use super::product::Product;
+use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
 use super::world::{Comes, Top, Went};
 use crate::model::{Ask, ConfigId, Verdict};
 use crate::stack::{Batch, Request, Requester, Why};

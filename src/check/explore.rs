@@ -4,7 +4,8 @@
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::Explored;
-use super::product::{Failed, Move, Next, Nexts, Product, State, Trouble};
+use super::product::Product;
+use super::state::{Failed, Move, Next, Nexts, State, Trouble};
 use super::trace::{Answered, Happened, Place, TraceStep};
 use super::world::{EMPTY, Top};
 use crate::limits;

@@ -2,8 +2,8 @@
 
 use super::coordinator::{answers, place};
 use super::explore::{Bound, Graph};
-use super::product::{Failed, State, Trouble};
 use super::reactions::triggers;
+use super::state::{Failed, State, Trouble};
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{

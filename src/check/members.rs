@@ -2,7 +2,7 @@
 
 use super::coordinator::ask_of;
 use super::reactions::{Reaction, Reactions};
-use super::world::Undone;
+use super::shape::Undone;
 use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, OperatorMay};
 use crate::stack::Requester;
 use crate::statechart::{Chart, EventId, NodeId};

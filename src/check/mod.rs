@@ -15,15 +15,19 @@ mod explore;
 mod judge;
 mod members;
 mod monitors;
+mod outside;
 mod product;
 mod purity;
 mod reactions;
 mod safety;
+mod shape;
 mod simulated;
+mod state;
 mod trace;
 mod types;
 mod unheard;
 mod universe;
+mod unknown;
 mod verdict;
 mod ways;
 mod world;
@@ -138,6 +142,8 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
         for (view, chart) in views.iter().zip(&charts) {
             findings.extend(coordinator::check(view, chart));
+            findings.extend(unheard::check(view, chart));
+            findings.extend(purity::check(view));
         }
         // Another one may wait for what starts and ends the deployment, and tell the others.
         beside::forgive_unheard(deployment, &charts, &mut findings);

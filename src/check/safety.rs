@@ -2,7 +2,8 @@
 
 use super::explore::Graph;
 use super::judge::Traced;
-use super::product::{Move, Product, State};
+use super::product::Product;
+use super::state::{Move, State};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::{Ask, EventName, Finding, Severity};

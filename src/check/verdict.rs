@@ -1,7 +1,7 @@
 //! What a check comes to.
 
 use super::explore::Bound;
-use super::product::Failed;
+use super::state::Failed;
 use crate::limits;
 use crate::model::{Finding, Severity, finding};
 use serde::Serialize;

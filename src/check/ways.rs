@@ -2,7 +2,8 @@
 
 use super::drive::{self, Way};
 use super::judge::Traced;
-use super::product::{Product, State};
+use super::product::Product;
+use super::state::State;
 use super::trace::{Happened, TraceStep};
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::{Code, Coordinator, Finding, Severity};

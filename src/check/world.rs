@@ -7,15 +7,16 @@
 //!
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
-use super::alike::{FrameBook, FrameNumber, hash_system, same_system};
+use super::alike::{hash_system, same_system};
+use super::shape::{Counted, Shapes, Undone};
 use crate::limits;
 use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, Verdict};
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
-    Frame, FrameId, Group, Op, Planned, Reason, Request, Requester, Rules, Stack, World, is_kept, take_up, transaction,
+    FrameId, Group, Op, Planned, Reason, Request, Requester, Rules, Stack, World, take_up, transaction,
 };
-use crate::system::{Slot, System, View, step};
+use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
@@ -39,10 +40,6 @@ pub struct Top {
     pub actuator: bool,
 }
 
-/// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
-/// these would take over.
-type Counted = (FrameNumber, bool, Vec<Slot>);
-
 enum Known {
     Exact(Box<Exact>),
     Top(Top),
@@ -53,26 +50,6 @@ struct Exact {
     counted: Vec<Counted>,
     /// The numbers of the counted frames.
     ids: Vec<FrameId>,
-}
-
-/// Which frames count.
-#[derive(Debug, Clone, Default)]
-pub struct Undone {
-    /// Configurations whose frames somebody may undo; none: all.
-    pub ids: Option<FxHashSet<ConfigId>>,
-    /// Those who undo whatever is their newest.
-    pub bare: FxHashSet<Requester>,
-}
-
-impl Undone {
-    fn counts(&self, frame: &Frame) -> bool {
-        let named = |ids: &FxHashSet<ConfigId>| {
-            ids.contains(&frame.configuration) || frame.parts.iter().any(|part| ids.contains(&part.configuration))
-        };
-        self.ids.as_ref().is_none_or(named)
-            || self.bare.contains(&frame.requester)
-            || frame.requester == Requester::Operator
-    }
 }
 
 /// Where something leads to.
@@ -134,12 +111,11 @@ pub struct Worlds<'a> {
     /// What requests may touch, by their text.
     pub claims: Claims,
     context: Context,
-    undone: Undone,
+    shapes: Shapes,
     /// Places of frames are wanted: there are configurations that must be confirmed.
     confirms: bool,
     worlds: Vec<Known>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    frames: FrameBook,
     comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request), Rc<SafeComes>>,
     asked: FxHashSet<ConfigId>,
@@ -161,11 +137,10 @@ impl<'a> Worlds<'a> {
             configurations: deployment.configurations.iter().map(|c| (c.id, c.clone())).collect(),
             claims: Claims::new(deployment.configurations.iter()),
             context: context(deployment),
-            undone,
+            shapes: Shapes::new(undone),
             confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),
             worlds: Vec::new(),
             index: FxHashMap::default(),
-            frames: FrameBook::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             asked: FxHashSet::default(),
@@ -183,6 +158,21 @@ impl<'a> Worlds<'a> {
             Known::Exact(exact) => Some(&exact.world),
             Known::Top(_) => None,
         }
+    }
+
+    /// The world of which this is known.
+    pub fn unknown(&mut self, top: Top) -> WorldId {
+        let mut hasher = FxHasher::default();
+        top.hash(&mut hasher);
+        let hash = hasher.finish();
+        let known = self.index.get(&hash).and_then(|ids| ids.iter().find(|id| self.top(**id) == Some(top)));
+        if let Some(id) = known {
+            return *id;
+        }
+        let id = self.next();
+        self.worlds.push(Known::Top(top));
+        self.index.entry(hash).or_default().push(id);
+        id
     }
 
     /// What is known of a world that is not known.
@@ -353,57 +343,6 @@ impl<'a> Worlds<'a> {
         }
     }
 
-    /// The world after something of `id` ended *broken*.
-    pub fn broken(&mut self, id: WorldId, asks: impl Iterator<Item = Ask>) -> WorldId {
-        let top = Top { safe: self.is_safe(id), actuator: self.has_actuator(id) };
-        self.topped(top, asks)
-    }
-
-    /// The unknown world after these were asked.
-    pub fn topped(&mut self, mut top: Top, asks: impl Iterator<Item = Ask>) -> WorldId {
-        for ask in asks {
-            if let Ask::Apply(id) = ask {
-                top.actuator |= self.creates_actuator(id);
-            }
-        }
-        let mut hasher = FxHasher::default();
-        top.hash(&mut hasher);
-        let hash = hasher.finish();
-        let known = self.index.get(&hash).and_then(|ids| ids.iter().find(|id| self.top(**id) == Some(top)));
-        if let Some(id) = known {
-            return *id;
-        }
-        let id = self.next();
-        self.worlds.push(Known::Top(top));
-        self.index.entry(hash).or_default().push(id);
-        id
-    }
-
-    /// The unknown world after a request was answered.
-    pub fn answered(&mut self, top: Top, request: &Request, verdict: Verdict) -> WorldId {
-        let done = verdict.is_success();
-        let is_safe = |id: ConfigId| self.configurations.get(&id).is_some_and(|c| c.safe);
-        let safe = match request.ask {
-            Ask::Apply(id) => top.safe || is_safe(id) && verdict != request.ask.failed(),
-            Ask::UndoOf(id) => top.safe && !(done && is_safe(id)),
-            _ => top.safe && !done,
-        };
-        // Failed, it is as before, whatever that is.
-        let failed = verdict == request.ask.failed() || verdict == Verdict::Cancelled;
-        self.topped(Top { safe, ..top }, (!failed).then_some(request.ask).into_iter())
-    }
-
-    fn creates_actuator(&self, id: ConfigId) -> bool {
-        let types = self.get(EMPTY).map(|world| world.system.catalogue());
-        let actuator = |ty| types.and_then(|types| types.get(ty)).is_some_and(|ty| ty.actuator);
-        self.configurations.get(&id).is_some_and(|c| {
-            c.changes.iter().any(|change| match &change.kind {
-                crate::model::ChangeKind::Create { ty, .. } => actuator(*ty),
-                _ => false,
-            })
-        })
-    }
-
     /// The number of the frame that counts at that place.
     pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
         match &self.worlds[id as usize] {
@@ -414,8 +353,8 @@ impl<'a> Worlds<'a> {
 
     /// Whether a frame of this configuration by this requester counts.
     pub fn counts(&self, id: ConfigId, by: Requester) -> bool {
-        let named = self.undone.ids.as_ref().is_none_or(|ids| ids.contains(&id));
-        named || self.undone.bare.contains(&by) || by == Requester::Operator
+        let named = self.shapes.undone.ids.as_ref().is_none_or(|ids| ids.contains(&id));
+        named || self.shapes.undone.bare.contains(&by) || by == Requester::Operator
     }
 
     /// Carries out requests that are answered together in a world of the caller's own. False: one is refused.
@@ -490,7 +429,7 @@ impl<'a> Worlds<'a> {
         if !self.confirms {
             return Went { world: self.intern(world), places: None, pushed: SmallVec::new(), deep, left };
         }
-        let (counted, ids) = self.shape(&world.stack);
+        let (counted, ids) = self.shapes.of(&world.stack);
         let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
         let before = match &self.worlds[from as usize] {
             Known::Exact(exact) => exact.ids.clone(),
@@ -506,7 +445,8 @@ impl<'a> Worlds<'a> {
     /// A configuration of which one requester has more frames than that. Those of another one come of other rounds.
     fn more_than(&self, most: usize, world: &World) -> Option<ConfigId> {
         let mut counts: FxHashMap<(ConfigId, Requester), usize> = FxHashMap::default();
-        let frames = world.stack.frames().iter().filter(|frame| self.undone.counts(frame) && !frame.is_squashed());
+        let frames =
+            world.stack.frames().iter().filter(|frame| self.shapes.undone.counts(frame) && !frame.is_squashed());
         let deep = frames.into_iter().find(|frame| {
             let count = counts.entry((frame.configuration, frame.requester)).or_default();
             *count += 1;
@@ -516,7 +456,7 @@ impl<'a> Worlds<'a> {
     }
 
     fn intern(&mut self, world: World) -> WorldId {
-        let (counted, ids) = self.shape(&world.stack);
+        let (counted, ids) = self.shapes.of(&world.stack);
         self.intern_shaped(world, counted, ids)
     }
 
@@ -536,47 +476,5 @@ impl<'a> Worlds<'a> {
         self.worlds.push(Known::Exact(Box::new(Exact { world, counted, ids })));
         self.index.entry(hash).or_default().push(id);
         id
-    }
-
-    /// The frames that count, in a canonical order.
-    fn shape(&mut self, stack: &Stack) -> (Vec<Counted>, Vec<FrameId>) {
-        let frames = stack.frames();
-        let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
-        for (i, frame) in frames.iter().enumerate() {
-            if !self.undone.counts(frame) {
-                continue;
-            }
-            let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
-            let over: FxHashSet<Slot> = above.iter().flat_map(|f| f.saved.iter().map(|s| s.slot)).collect();
-            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(|slot| over.contains(slot)).collect();
-            handed.sort_unstable();
-            handed.dedup();
-            let blocked = !above.is_empty() && is_kept(frame, above.into_iter());
-            kept.push((frame, (self.frames.number(frame), blocked, handed)));
-        }
-        let mut counted = Vec::with_capacity(kept.len());
-        let mut ids = Vec::with_capacity(kept.len());
-        while !kept.is_empty() {
-            // Of those that could as well lie at the bottom, that with the least name.
-            let mut least = 0;
-            for at in 1..kept.len() {
-                let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
-                if smaller && (0..at).all(|below| self.commute(kept[below].0, kept[at].0)) {
-                    least = at;
-                }
-            }
-            let (frame, one) = kept.remove(least);
-            counted.push(one);
-            ids.push(frame.id);
-        }
-        (counted, ids)
-    }
-
-    /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
-    /// one name.
-    fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
-        let one_name = a.requester == b.requester
-            && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
-        !one_name && !self.frames.share(a, b)
     }
 }

@@ -1,14 +1,13 @@
 //! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; and it survives
 //! itself.
 
-use super::AnswerSink;
 use super::control::{Busy, Command, View};
-use super::fast::Fast;
-use super::inbox::{Counts, Mail};
-use super::pool::{Pool, Reply, Ticket};
-use super::progress::{Progress, ProgressSink};
+use super::inbox::{Counts, Mail, Reply, Ticket};
+use super::pool::Pool;
+use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::Running;
+use super::switches::Fast;
 use crate::model::{
     Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, RunState, Snapshot, Verdict,
 };

@@ -8,21 +8,15 @@ use super::engine::Engine;
 use super::progress::{Progress, StepEnd, StepName};
 use super::request::Request;
 use super::running::{Purpose, Running};
+use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::model::{Ask, Cause, ConfigId, Outcome};
 use crate::plan::prepare::Switch;
-use crate::platform::Prepared;
 use crate::stack::{Edits, Frame, Group};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// A switch, prepared on both sides.
-pub(super) struct Fast {
-    switch: Switch,
-    platform: Box<dyn Prepared>,
-}
 
 impl Engine {
     /// Prepares a configuration that has just been applied, if it is a fixed switch.

@@ -3,14 +3,25 @@
 //! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
 //! gets in when the queue of requests is full, and the reply of a worker always does.
 
-use super::pool::{Reply, Ticket};
 use super::request::Batch;
 use crate::limits;
-use crate::model::EventName;
-use crate::platform::PlatformEvent;
+use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
+use crate::platform::{Ended, ObserveError, PlatformEvent};
 use crate::time::{Clock, Receiver, Sender};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// A call of the platform, by its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Ticket(pub u64);
+
+/// What came of a call.
+pub(super) enum Reply {
+    Executed(Outcome),
+    Several(Vec<Ended>),
+    Observed(Result<Snapshot, ObserveError>),
+    ObservedComponent(Result<Option<ComponentSnapshot>, ObserveError>),
+}
 
 /// What comes in.
 pub(super) enum Mail {

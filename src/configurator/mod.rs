@@ -9,10 +9,11 @@
 //! request that is dropped.
 //!
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
-//! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction between its machine and the platform.
-//!   `safe`: what goes first. `fast`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
+//!   platform. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
 //!   `pool`, `inbox`: their tools.
 
+mod carry;
 pub mod control;
 mod engine;
 mod fast;
@@ -24,12 +25,13 @@ pub mod request;
 mod requests;
 mod running;
 mod safe;
+mod switches;
 mod teardown;
 
 pub use crate::stack::answer::WAY_OUT;
 pub use crate::stack::{Requester, Scope, Why};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
-pub use progress::{Progress, ProgressSink, StepEnd, StepName};
+pub use progress::{AnswerSink, Progress, ProgressSink, StepEnd, StepName};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
 
 use crate::limits;
@@ -47,9 +49,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-
-/// Where answers go. Called in the configurator's thread (for a full queue, in the thread that submits): must not block.
-pub type AnswerSink = Arc<dyn Fn(Answer) + Send + Sync>;
 
 /// What a configurator is started with.
 pub struct Setup {

@@ -5,19 +5,15 @@
 //! by the deadline; a worker whose call is not back a while after it is given up and replaced, and its late report is
 //! told apart by its ticket.
 
-use super::inbox::{Mail, Post};
+use super::inbox::{Mail, Post, Reply, Ticket};
 use crate::limits;
-use crate::model::{ComponentName, ComponentSnapshot, Snapshot, Step};
+use crate::model::{ComponentName, Step};
 use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
 use crate::time::{Clock, Receiver, Sender, Time};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-/// A call of the platform, by its number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct Ticket(pub u64);
 
 /// What a worker is to call.
 pub(super) enum Call {
@@ -28,14 +24,6 @@ pub(super) enum Call {
     Observe,
     ObserveSome(Vec<ComponentName>),
     ObserveComponent(ComponentName),
-}
-
-/// What came of it.
-pub(super) enum Reply {
-    Executed(Outcome),
-    Several(Vec<Ended>),
-    Observed(Result<Snapshot, ObserveError>),
-    ObservedComponent(Result<Option<ComponentSnapshot>, ObserveError>),
 }
 
 struct Job {

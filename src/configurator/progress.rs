@@ -109,3 +109,6 @@ pub enum Progress {
 
 /// Hears the progress, in the configurator's thread: must not block.
 pub type ProgressSink = Arc<dyn Fn(&Progress) + Send + Sync>;
+
+/// Where answers go. Called in the configurator's thread (for a full queue, in the thread that submits): must not block.
+pub type AnswerSink = Arc<dyn Fn(Answer) + Send + Sync>;

@@ -2,7 +2,8 @@
 
 use super::control::{Drift, Recovery};
 use super::engine::Engine;
-use super::pool::{Call, Reply};
+use super::inbox::Reply;
+use super::pool::Call;
 use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::teardown::own_plan;

@@ -1,0 +1,152 @@
+//! What comes from outside when nothing lies in the inboxes: events, time, confirmations, losses, operators.
+
+use super::members::Member;
+use super::product::Product;
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
+use crate::model::{Ask, ConfigId, RequestId, Verdict};
+use crate::stack::{Batch, Request, Requester, Why};
+use smallvec::SmallVec;
+use std::collections::BTreeSet;
+
+impl Product<'_> {
+    /// What comes when nothing lies in the inboxes.
+    pub(super) fn from_outside(&mut self, state: &State, nexts: &mut Nexts) {
+        let mut heard: BTreeSet<usize> = BTreeSet::new();
+        let busy: SmallVec<[bool; 4]> =
+            self.members.iter().map(|member| state.outstanding(member.by) >= self.most_waiting).collect();
+        for number in 0..self.members.len() {
+            for event in self.members[number].offers(state.leaves[number]).iter() {
+                let name = self.members[number].name_of(*event);
+                match name.and_then(|name| self.outside.iter().position(|outside| *outside == name)) {
+                    Some(at) => _ = heard.insert(at),
+                    None if busy[number] => nexts.cut = true,
+                    None => self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts),
+                }
+            }
+        }
+        for at in heard {
+            let name = self.outside[at];
+            let takes =
+                |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
+            if self.members.iter_mut().enumerate().any(takes) {
+                nexts.cut = true;
+                continue;
+            }
+            let mut next = state.clone();
+            next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping();
+            self.confirm(&mut next, name);
+            self.spread(&mut next, name, None);
+            let by = Move::Event(u16::try_from(at).unwrap_or(u16::MAX));
+            // If one alone hears it, there is nothing to wait for.
+            if let [(only, event)] = next.inbox[..] {
+                next.inbox.clear();
+                self.hear(next, usize::from(only), event, by, nexts);
+            } else {
+                nexts.all.push(Next::plain(by, next, Failed::Nothing));
+            }
+        }
+        self.notices(state, nexts);
+        self.operators(state, nexts);
+        if self.others && state.is_at_rest() && self.all_down(state) {
+            let world = self.worlds.settle_down(state.world);
+            if world != state.world {
+                let mut next = state.clone();
+                next.world = world;
+                next.unconfirmed.clear();
+                nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
+            }
+        }
+    }
+
+    /// Confirmations that come or do not, and what is lost.
+    fn notices(&mut self, state: &State, nexts: &mut Nexts) {
+        for (at, waits) in state.unconfirmed.iter().enumerate() {
+            let Ask::Apply(id) = waits.request.ask else { continue };
+            let mut next = state.clone();
+            next.unconfirmed.remove(at);
+            nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
+            self.unconfirmed(state, at, id, nexts);
+        }
+        for at in 0..self.holds.len() {
+            let id = self.holds[at];
+            let busy = |request: &Request| matches!(request.ask, Ask::Apply(of) | Ask::UndoOf(of) if of == id);
+            let under_way = state.desk.under_way().iter().any(|turn| turn.batch.requests.iter().any(busy));
+            if state.lost.contains(&id) || under_way || !self.worlds.is_in_force(state.world, id) {
+                continue;
+            }
+            let event = Verdict::Lost.event(Ask::Apply(id));
+            let mut next = state.clone();
+            next.lost.push(id);
+            next.lost.sort_unstable();
+            self.spread(&mut next, event, None);
+            let by = Move::Lost(id);
+            match next.inbox[..] {
+                [] => {
+                    nexts.troubles.push(Trouble::Unheard(id));
+                    nexts.all.push(Next::plain(by, next, Failed::Apply));
+                }
+                [(only, event)] => {
+                    next.inbox.clear();
+                    let from = nexts.all.len();
+                    self.hear(next, usize::from(only), event, by, nexts);
+                    nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Apply));
+                }
+                _ => nexts.all.push(Next::plain(by, next, Failed::Apply)),
+            }
+        }
+    }
+
+    /// A frame is taken back, since its confirmation did not come in time.
+    fn unconfirmed(&mut self, state: &State, at: usize, id: ConfigId, nexts: &mut Nexts) {
+        let waits = state.unconfirmed[at];
+        let confirm = self.worlds.configuration(id).and_then(|c| c.confirm);
+        let (Some(confirm), Some(frame)) = (confirm, self.worlds.frame(state.world, waits.place)) else { return };
+        let why = Why::Unconfirmed(frame, confirm.event, confirm.within);
+        let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
+        let mut left = state.clone();
+        left.unconfirmed.remove(at);
+        let comes = self.worlds.comes(state.world, &[request]);
+        let stays = Answers::from_iter([(Request { why: Why::Asked, ..request }, Verdict::UndoFailed)]);
+        if !comes.refused.is_empty() {
+            let told = Request { why: Why::Asked, ..request };
+            nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(told, why.clone())));
+            self.tell(left, stays, Failed::Undo, nexts);
+            return;
+        }
+        if comes.parts.iter().any(|part| part.failed.is_some()) {
+            self.tell(left.clone(), stays, Failed::Undo, nexts);
+            let mut broken = left.clone();
+            broken.unconfirmed.clear();
+            broken.world = self.worlds.broken(state.world, std::iter::once(request.ask));
+            let answers = Answers::from_iter([(Request { why: Why::Asked, ..request }, Verdict::UndoBroken)]);
+            self.tell(broken, answers, Failed::Broken, nexts);
+        }
+        let mut next = left;
+        self.go(&mut next, &comes.done);
+        let told = Request { ask: Ask::Apply(id), why: Why::Asked, ..request };
+        self.tell(next, Answers::from_iter([(told, Verdict::Reverted)]), Failed::Apply, nexts);
+    }
+
+    /// What an operator may ask for.
+    fn operators(&mut self, state: &State, nexts: &mut Nexts) {
+        if state.stopping || self.worlds.top(state.world).is_some() || state.outstanding(Requester::Operator) > 0 {
+            return;
+        }
+        let asks: Vec<Ask> = match self.worlds.of_operator(state.world) {
+            Some(id) => vec![Ask::UndoOf(id)],
+            None => self.operator.iter().map(|id| Ask::Apply(*id)).collect(),
+        };
+        // Nobody has anything to do with what is not there.
+        if self.worlds.get(state.world).is_some_and(|world| world.system.is_empty()) && state.desk.is_empty() {
+            return;
+        }
+        for ask in asks {
+            let request = Request::new(RequestId(0), ask, Requester::Operator);
+            let by_hand = matches!(ask, Ask::Apply(id) if self.is_safe(id));
+            for next in self.arrive(state.clone(), Batch::one(request)) {
+                let next = Next::plain(Move::Operator(ask), self.settle(next), Failed::Nothing);
+                nexts.all.push(Next { by_hand, ..next });
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Which frames of a stack count, and in what order: what makes two stacks one for whoever asks.
+
+use super::alike::{FrameBook, FrameNumber};
+use crate::model::ConfigId;
+use crate::stack::{Frame, FrameId, Requester, Stack, is_kept};
+use crate::system::Slot;
+use rustc_hash::FxHashSet;
+use std::sync::Arc;
+
+/// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
+/// these would take over.
+pub type Counted = (FrameNumber, bool, Vec<Slot>);
+
+/// Which frames count.
+#[derive(Debug, Clone, Default)]
+pub struct Undone {
+    /// Configurations whose frames somebody may undo; none: all.
+    pub ids: Option<FxHashSet<ConfigId>>,
+    /// Those who undo whatever is their newest.
+    pub bare: FxHashSet<Requester>,
+}
+
+impl Undone {
+    pub fn counts(&self, frame: &Frame) -> bool {
+        let named = |ids: &FxHashSet<ConfigId>| {
+            ids.contains(&frame.configuration) || frame.parts.iter().any(|part| ids.contains(&part.configuration))
+        };
+        self.ids.as_ref().is_none_or(named)
+            || self.bare.contains(&frame.requester)
+            || frame.requester == Requester::Operator
+    }
+}
+
+/// The shapes of stacks.
+#[derive(Default)]
+pub struct Shapes {
+    /// Which frames count.
+    pub undone: Undone,
+    frames: FrameBook,
+}
+
+impl Shapes {
+    /// Shapes in which these frames count.
+    pub fn new(undone: Undone) -> Self {
+        Self { undone, frames: FrameBook::default() }
+    }
+
+    /// The frames that count, in a canonical order.
+    pub fn of(&mut self, stack: &Stack) -> (Vec<Counted>, Vec<FrameId>) {
+        let frames = stack.frames();
+        let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
+        for (i, frame) in frames.iter().enumerate() {
+            if !self.undone.counts(frame) {
+                continue;
+            }
+            let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
+            let over: FxHashSet<Slot> = above.iter().flat_map(|f| f.saved.iter().map(|s| s.slot)).collect();
+            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(|slot| over.contains(slot)).collect();
+            handed.sort_unstable();
+            handed.dedup();
+            let blocked = !above.is_empty() && is_kept(frame, above.into_iter());
+            kept.push((frame, (self.frames.number(frame), blocked, handed)));
+        }
+        let mut counted = Vec::with_capacity(kept.len());
+        let mut ids = Vec::with_capacity(kept.len());
+        while !kept.is_empty() {
+            // Of those that could as well lie at the bottom, that with the least name.
+            let mut least = 0;
+            for at in 1..kept.len() {
+                let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
+                if smaller && (0..at).all(|below| self.commute(kept[below].0, kept[at].0)) {
+                    least = at;
+                }
+            }
+            let (frame, one) = kept.remove(least);
+            counted.push(one);
+            ids.push(frame.id);
+        }
+        (counted, ids)
+    }
+
+    /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
+    /// one name.
+    fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
+        let one_name = a.requester == b.requester
+            && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
+        !one_name && !self.frames.share(a, b)
+    }
+}

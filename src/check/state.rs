@@ -1,0 +1,190 @@
+//! The states of the product, and the moves between them.
+
+use super::world::WorldId;
+use crate::model::{Ask, ConfigId, Findings, Verdict};
+use crate::stack::{Batch, Desk, Request, Requester, Why};
+use crate::statechart::{EventId, NodeId};
+use smallvec::SmallVec;
+use std::rc::Rc;
+
+/// The worst that failed on a way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Failed {
+    /// Nothing did.
+    Nothing,
+    /// A configuration was not applied, or did not stay: to be expected, and the coordinator's to deal with.
+    Apply,
+    /// Something could not be undone: it stays in force, and not every coordinator can go on from there. A shutdown that
+    /// gets stuck on it is forced.
+    Undo,
+    /// Something is left in between, and nothing is known any more.
+    Broken,
+}
+
+/// What stops a batch under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stop {
+    /// This undo of one of its requests.
+    GivenUp(Request),
+    /// A safe configuration.
+    Interrupted,
+}
+
+/// A frame that waits for its confirmation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Unconfirmed {
+    /// Its place among the frames that count.
+    pub place: u8,
+    /// The request that pushed it.
+    pub request: Request,
+}
+
+/// A state of the product.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct State {
+    /// Where each coordinator is.
+    pub leaves: SmallVec<[NodeId; 2]>,
+    /// System and stack.
+    pub world: WorldId,
+    /// What waits and what is under way.
+    pub desk: Desk,
+    /// Batches under way that are stopped, by their numbers.
+    pub stopped: SmallVec<[(u32, Stop); 1]>,
+    /// Safe configurations that are being applied, in their order.
+    pub safe: SmallVec<[Request; 1]>,
+    /// Answers on their way.
+    pub due: SmallVec<[(Request, Verdict); 1]>,
+    /// Answers that are being given; none in a state between moves.
+    pub telling: SmallVec<[(Request, Verdict); 2]>,
+    /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
+    pub stayed: bool,
+    /// Events on their way to a coordinator, those of one in order.
+    pub inbox: SmallVec<[(u8, EventId); 2]>,
+    /// Frames that wait for their confirmation.
+    pub unconfirmed: SmallVec<[Unconfirmed; 1]>,
+    /// Configurations that were lost, and are not applied anew.
+    pub lost: SmallVec<[ConfigId; 1]>,
+    /// Coordinators that have come to *down* and asked for nothing since, by their bits.
+    pub down: u64,
+    /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.
+    pub stopping: bool,
+    /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
+    pub flight: Vec<Batch>,
+}
+
+impl State {
+    /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.
+    pub fn outstanding(&self, by: Requester) -> usize {
+        let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);
+        let under_way = self.desk.under_way().iter().map(|turn| &turn.batch);
+        let (downs, batches): (Vec<&Batch>, Vec<&Batch>) =
+            under_way.chain(self.desk.waiting()).filter(first).partition(|batch| batch.requests[0].why == Why::Down);
+        let due = usize::from(self.due.iter().any(|(request, _)| request.requester == by));
+        let safe = self.safe.iter().filter(|request| request.requester == by).count();
+        let given_up = self.undos().filter(|undo| undo.requester == by).count();
+        batches.len() + downs.len().saturating_sub(1) + due + safe + given_up
+    }
+
+    /// Undos that give something up.
+    fn undos(&self) -> impl Iterator<Item = &Request> {
+        self.stopped.iter().filter_map(|(_, stop)| match stop {
+            Stop::GivenUp(undo) => Some(undo),
+            Stop::Interrupted => None,
+        })
+    }
+
+    /// How many requests are not answered.
+    pub fn waiting(&self) -> usize {
+        let under_way: usize = self.desk.under_way().iter().map(|turn| turn.batch.requests.len()).sum();
+        self.desk.len() + under_way + self.safe.len() + self.due.len() + self.undos().count()
+    }
+
+    /// Whether nothing waits to be answered or heard.
+    pub fn is_at_rest(&self) -> bool {
+        self.desk.is_empty()
+            && self.safe.is_empty()
+            && self.due.is_empty()
+            && self.inbox.is_empty()
+            && self.flight.is_empty()
+    }
+}
+
+/// What leads from one state to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Move {
+    /// An event comes from outside, by its place among them.
+    Event(u16),
+    /// Time passes for a coordinator.
+    Time(u8, EventId),
+    /// A coordinator takes what lies in its inbox.
+    Taken(u8, EventId),
+    /// Requests are answered.
+    Answer,
+    /// A confirmation comes.
+    Confirmed(ConfigId),
+    /// What a configuration stands for is no longer so.
+    Lost(ConfigId),
+    /// An operator asks for something.
+    Operator(Ask),
+    /// Coordinators that have nothing to do with these are down as well.
+    OthersDown,
+}
+
+/// The answers that a move gives.
+pub type Answers = SmallVec<[(Request, Verdict); 2]>;
+
+/// A state that follows.
+#[derive(Debug, Clone)]
+pub struct Next {
+    /// What leads there.
+    pub by: Move,
+    /// The answers given.
+    pub answers: Answers,
+    /// The state.
+    pub state: State,
+    /// What failed.
+    pub failed: Failed,
+    /// A configuration of which there are more frames than are followed, and more than are followed behind undoings that
+    /// failed.
+    pub deep: (Option<ConfigId>, Option<ConfigId>),
+    /// An operator asks for a safe configuration.
+    pub by_hand: bool,
+}
+
+/// What is wrong with a move.
+#[derive(Debug, Clone)]
+pub enum Trouble {
+    /// The request is refused.
+    Refused(Request, Rc<Findings>),
+    /// Nobody hears that this is lost.
+    Unheard(ConfigId),
+}
+
+/// All that follows from a state.
+#[derive(Debug, Default)]
+pub struct Nexts {
+    /// The states.
+    pub all: Vec<Next>,
+    /// What is wrong.
+    pub troubles: Vec<Trouble>,
+    /// Events were heard here and not followed, since too many requests wait.
+    pub cut: bool,
+}
+
+impl Next {
+    /// A state that comes without an answer.
+    pub(super) fn plain(by: Move, state: State, failed: Failed) -> Self {
+        Self::answered(by, Answers::new(), state, failed)
+    }
+
+    /// A state that comes with answers.
+    pub(super) fn answered(by: Move, answers: Answers, mut state: State, failed: Failed) -> Self {
+        let failed = if std::mem::take(&mut state.stayed) { failed.max(Failed::Undo) } else { failed };
+        Self { by, answers, state, failed, deep: (None, None), by_hand: false }
+    }
+}
+
+/// A coordinator's number as a state has it.
+pub fn index(number: usize) -> u8 {
+    u8::try_from(number).unwrap_or(u8::MAX)
+}

@@ -1,0 +1,250 @@
+//! A transaction between its machine and the platform: calls that are out, awaited and given up.
+
+use super::engine::Engine;
+use super::inbox::Reply;
+use super::pool::{self, Call};
+use super::progress::{Progress, StepEnd, StepName};
+use super::running::{Flight, Purpose, Running};
+use crate::limits;
+use crate::model::{Cause, Execution, Outcome, Snapshot, Step};
+use crate::platform::Ended;
+use crate::time::Time;
+use crate::transaction::{Can, Input, Poll};
+use smallvec::{SmallVec, smallvec};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+impl Engine {
+    /// Lets a transaction go on as far as it can without waiting. True: it did something.
+    pub(super) fn advance(&mut self, at: usize) -> bool {
+        let mut running = self.running.remove(at);
+        // Taken out, so that what it does may touch everything else; a panic on the way must not lose it.
+        let before = self.steps;
+        let went = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.go_on(&mut running)));
+        self.running.insert(at, running);
+        match went {
+            Ok(did) => did || self.steps != before,
+            Err(payload) => std::panic::resume_unwind(payload),
+        }
+    }
+
+    fn go_on(&mut self, running: &mut Running) -> bool {
+        let mut did = self.land(running);
+        let platform = self.platform.clone();
+        let execution = |step: &Step| platform.execution(step);
+        let mut now = self.clock.now();
+        let mut inline = 0;
+        loop {
+            if !running.is_safe() && self.urgent() {
+                running.stop_brief();
+                // Steps that are begun one by one in this thread stop here; what is out is told by whoever is urgent.
+                if inline > 0 {
+                    return true;
+                }
+            }
+            let room = self.has_room(running);
+            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined };
+            match running.machine.poll(&mut self.world.system, now, &can) {
+                Poll::Over => {
+                    running.over = true;
+                    return true;
+                }
+                Poll::Wait => return did,
+                Poll::Cancel(step) => {
+                    did = true;
+                    self.cancel(running, step);
+                }
+                Poll::Read(components) => {
+                    did = true;
+                    let deadline = self.clock.now() + self.limits.step_timeout;
+                    let ticket = self.pool.start(Call::ObserveSome(components), deadline);
+                    running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
+                }
+                Poll::Begin(steps) => {
+                    did = true;
+                    let first = &running.machine.step(steps[0]).step;
+                    if steps.len() == 1 && platform.execution(first) == Execution::Immediate {
+                        self.inline(running, steps[0], &mut now);
+                        inline += 1;
+                        if inline % 64 == 0 {
+                            self.glance();
+                        }
+                    } else {
+                        self.launch(running, steps);
+                        now = self.clock.now();
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a call that takes time may begin: one worker stays free for each of the others that has none.
+    fn has_room(&self, running: &Running) -> bool {
+        let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
+        self.pool.has_room_beside(if running.flights.is_empty() { 0 } else { others })
+    }
+
+    /// Carries out an immediate step, from `at` on, which becomes the time of its end: of steps that follow each other one
+    /// begins where the one before has ended, since a look at the clock costs as much as half a step.
+    fn inline(&mut self, running: &mut Running, number: u32, at: &mut Time) {
+        let step = &running.machine.step(number).step;
+        let started = *at;
+        self.tell_started(step);
+        let deadline = running.machine.deadline(started);
+        let outcome = pool::execute(&*self.platform, step, deadline, running.is_safe());
+        *at = self.clock.now();
+        self.tell(running, number, StepEnd::from(&outcome), Some(at.since(started)));
+        running.machine.on(Input::Ended { step: number, outcome }, &mut self.world.system);
+        self.steps += 1;
+    }
+
+    /// Hands steps to a worker: one of any kind, or several brief ones. Their preconditions hold.
+    fn launch(&mut self, running: &mut Running, steps: SmallVec<[u32; 1]>) {
+        let started = self.clock.now();
+        let stop = Arc::<AtomicBool>::default();
+        let step = |i: &u32| &running.machine.step(*i).step;
+        steps.iter().for_each(|i| self.tell_started(step(i)));
+        let deadline = running.machine.deadline(started);
+        let patience = running.machine.spec().patience;
+        let (call, deadline) = match *steps {
+            [i] => (Call::Execute(step(&i).clone(), running.is_safe()), deadline),
+            // The last of them begins within the turn.
+            _ => {
+                let several = steps.iter().map(|i| step(i).clone()).collect();
+                let until = (deadline + limits::BRIEF_TURN).min(running.machine.spec().until);
+                (Call::Several(several, patience, stop.clone()), until)
+            }
+        };
+        let ticket = self.pool.start(call, deadline);
+        running.flights.push(Flight { ticket, steps, started, deadline, stop });
+    }
+
+    /// A call is given up: it is told so, and is waited for no longer than a step may take.
+    fn cancel(&mut self, running: &mut Running, step: u32) {
+        let until = self.clock.now() + self.limits.step_timeout;
+        if let Some(flight) = running.flights.iter_mut().find(|flight| flight.steps.contains(&step)) {
+            flight.deadline = flight.deadline.min(until);
+            flight.stop.store(true, Ordering::Release);
+            self.platform.cancel(&running.machine.step(step).step);
+        }
+    }
+
+    /// Takes in the calls that are back, and those given up. True: there were some.
+    fn land(&mut self, running: &mut Running) -> bool {
+        let mut did = false;
+        let now = self.clock.now();
+        if let Some((ticket, until)) = running.read {
+            let seen: Option<Option<Snapshot>> = match self.take_reply(ticket) {
+                Some(Reply::Observed(Ok(seen))) => Some(Some(seen)),
+                Some(_) => Some(None),
+                None if now >= until => {
+                    self.give_up(ticket);
+                    Some(None)
+                }
+                None => None,
+            };
+            if let Some(seen) = seen {
+                running.read = None;
+                self.note_quarantine();
+                running.machine.on(Input::Seen(seen), &mut self.world.system);
+                did = true;
+            }
+        }
+        let unknown = |cause| Ended { outcome: Outcome::Unknown(cause), took: None };
+        let mut at = 0;
+        while at < running.flights.len() {
+            let flight = &running.flights[at];
+            let several = flight.steps.len();
+            let ended: SmallVec<[Ended; 1]> = match self.take_reply(flight.ticket) {
+                Some(Reply::Executed(outcome)) => smallvec![Ended { outcome, took: None }],
+                Some(Reply::Several(ended)) => SmallVec::from_vec(ended),
+                Some(_) => smallvec![unknown(Cause::Lost("the answer was to another question".to_owned())); several],
+                None if now >= flight.deadline + limits::PLATFORM_GRACE => {
+                    self.give_up(flight.ticket);
+                    smallvec![unknown(Cause::Timeout); several]
+                }
+                None => {
+                    at += 1;
+                    continue;
+                }
+            };
+            did = true;
+            self.note_quarantine();
+            let flight = running.flights.remove(at);
+            let mut ended = ended.into_iter().fuse();
+            for (place, step) in flight.steps.into_iter().enumerate() {
+                let silent = || (place == 0).then(|| unknown(Cause::Lost("the platform said nothing".to_owned())));
+                let Some(Ended { outcome, took }) = ended.next().or_else(silent) else {
+                    running.machine.on(Input::NotBegun(step), &mut self.world.system);
+                    continue;
+                };
+                let took = took.unwrap_or_else(|| now.since(flight.started));
+                self.tell(running, step, StepEnd::from(&outcome), Some(took));
+                running.machine.on(Input::Ended { step, outcome }, &mut self.world.system);
+                self.steps += 1;
+            }
+        }
+        did
+    }
+
+    /// Lets everything that is under way go on, until the transaction of that number is over; it is taken off the list.
+    /// Requests that come meanwhile wait, safe ones do not.
+    pub(super) fn complete(&mut self, number: u64) -> Running {
+        loop {
+            self.serve_safe();
+            let did = self.advance_all();
+            if let Some(at) = self.running.iter().position(|running| running.number == number && running.over) {
+                return self.running.remove(at);
+            }
+            if !did {
+                self.pump(self.running_until());
+            }
+        }
+    }
+
+    /// Everything that is under way goes on, safe configurations first. True: something happened.
+    pub(super) fn advance_all(&mut self) -> bool {
+        let mut did = false;
+        let mut order: BTreeMap<(bool, u64), ()> = BTreeMap::new();
+        for running in self.running.iter().filter(|running| !running.over) {
+            order.insert((!running.is_safe(), running.number), ());
+        }
+        for ((_, number), ()) in order {
+            if let Some(at) = self.running.iter().position(|running| running.number == number && !running.over) {
+                did |= self.advance(at);
+            }
+        }
+        while let Some(at) =
+            self.running.iter().position(|running| running.over && !matches!(running.purpose, Purpose::Own))
+        {
+            let running = self.running.remove(at);
+            self.ended(running);
+            did = true;
+        }
+        did
+    }
+
+    /// When something that is under way must be looked at again.
+    pub(super) fn running_until(&self) -> Time {
+        self.running.iter().filter(|running| !running.over).map(Running::until).min().unwrap_or(Time::NEVER)
+    }
+
+    fn tell_started(&self, step: &Step) {
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Started(StepName::of(step)));
+        }
+    }
+
+    fn tell(&self, running: &Running, number: u32, end: StepEnd, took: Option<std::time::Duration>) {
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Ended {
+                request: running.serves(number),
+                step: StepName::of(&running.machine.step(number).step),
+                end,
+                took,
+                undoing: running.machine.is_going_back(),
+            });
+        }
+    }
+}
