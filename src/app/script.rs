@@ -261,7 +261,7 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
         let path = host.folder.join(file);
         let read = super::read(&path, &host.options.load, &host.options.libraries);
         let checked = read.and_then(|mut read| {
-            read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
+            read.deployment.platform = host.options.platform.filter(|_| !crate::mutant(54)).unwrap_or(read.deployment.platform);
             super::check(read)
         });
         (path, checked)

@@ -55,12 +55,12 @@ pub fn faults(deployment: &Deployment) -> simulated::Faults {
 pub(super) fn rule(fault: &StepFault) -> FaultRule {
     let what = match fault.how {
         FaultKind::Fail => Fault::Fail,
-        FaultKind::Hang => Fault::Hang { returns: None },
-        FaultKind::Late => Fault::Hang { returns: Some(limits::FAULT_LATE) },
-        FaultKind::Lost => Fault::LostRequest,
-        FaultKind::Lie => Fault::FalseDone,
+        FaultKind::Hang => Fault::Hang { returns: crate::mutant(44).then_some(limits::FAULT_LATE) },
+        FaultKind::Late => Fault::Hang { returns: if crate::mutant(43) { None } else { Some(limits::FAULT_LATE) } },
+        FaultKind::Lost => if crate::mutant(42) { Fault::LostAnswer } else { Fault::LostRequest },
+        FaultKind::Lie => if crate::mutant(45) { Fault::Fail } else { Fault::FalseDone },
     };
-    FaultRule::on(&fault.step, what).times(fault.times)
+    FaultRule::on(&fault.step, what).times(if crate::mutant(46) { u32::MAX } else if crate::mutant(47) { 1 } else { fault.times })
 }
 
 /// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
@@ -86,8 +86,8 @@ pub(super) fn start_open(
         "embedded" => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
         "simulated" => {
             let options = simulated::Options {
-                faults: faults(deployment),
-                reactions: reactions(deployment),
+                faults: if crate::mutant(48) { simulated::Faults::default() } else { faults(deployment) },
+                reactions: if crate::mutant(49) { Vec::new() } else { reactions(deployment) },
                 blocking: steered,
                 ..simulated::Options::default()
             };

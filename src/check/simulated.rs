@@ -63,7 +63,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
 /// would test nothing. (States, properties and in-ports are also moved and set by other hands: operators, a teardown.)
 pub fn fault(fault: &StepFault, deployment: &Deployment, universe: &Universe) -> Findings {
     let wrong = step(&fault.step, fault.origin, universe);
-    if !wrong.is_empty() {
+    if crate::mutant(53) || !wrong.is_empty() {
         return wrong;
     }
     never_done(fault, deployment, universe).into_iter().collect()

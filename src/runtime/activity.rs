@@ -93,7 +93,7 @@ impl Activity {
     /// A component runs no longer.
     pub(crate) fn stopped(&self, cell: &Cell) {
         self.running.fetch_sub(1, Ordering::SeqCst);
-        if cell.beat.restless.load(Ordering::Acquire) > 0 {
+        if !crate::mutant(28) && cell.beat.restless.load(Ordering::Acquire) > 0 {
             // It is at rest now: what was kept back goes on.
             self.signal.notify();
         }
@@ -272,11 +272,11 @@ impl Activity {
     /// Serves a request, or keeps it back: until its component has come to rest from a call that was given up, it begins no
     /// other; and requests of one component keep their order.
     fn admit(&self, request: Request, held: &mut VecDeque<Request>) {
-        let waits = !request.safe
-            && (request.cell.is_restless() || held.iter().any(|other| Arc::ptr_eq(&other.cell, &request.cell)));
+        let waits = !crate::mutant(4) && (crate::mutant(5) || !request.safe)
+            && (request.cell.is_restless() || (!crate::mutant(30) && held.iter().any(|other| Arc::ptr_eq(&other.cell, &request.cell))));
         if !waits {
             self.serve(request);
-        } else if held.len() < limits::ACTIVITY_REQUESTS {
+        } else if crate::mutant(31) || held.len() < limits::ACTIVITY_REQUESTS {
             held.push_back(request);
         } else {
             request.call.0.answer(Reply::Refused(format!("too many operations wait for the activity `{}`", self.name)));

@@ -53,7 +53,7 @@ impl Progress {
 
     /// The component's code is about to be called; false: it must not be.
     pub(crate) fn begin(&self) -> bool {
-        self.bits.compare_exchange(0, BEGUN, Ordering::AcqRel, Ordering::Acquire).is_ok()
+        (self.bits.compare_exchange(0, BEGUN, Ordering::AcqRel, Ordering::Acquire).is_ok() || crate::mutant(32))
     }
 
     /// The component's code has come back.
@@ -97,7 +97,7 @@ impl Progress {
 
     /// Gives the call up from outside: takes it back, or says so to who carries it out. Never waits.
     pub(crate) fn cancel(&self) {
-        if self.withdraw() {
+        if !crate::mutant(11) && self.withdraw() {
             let _ = self.reply.try_send(Reply::Withdrawn);
         } else {
             self.tell();
@@ -113,14 +113,14 @@ impl Progress {
         }
         let given_up = before & TOLD != 0;
         let _ = self.reply.try_send(match reply {
-            Reply::Failed(_) if given_up => Reply::HalfWay,
+            Reply::Failed(_) if ((given_up && !crate::mutant(1)) || crate::mutant(2)) => Reply::HalfWay,
             other => other,
         });
         if given_up
             && before & BEGUN != 0
             && let Some(beat) = &self.holds
         {
-            beat.restless.fetch_sub(1, Ordering::AcqRel);
+            if !crate::mutant(29) { beat.restless.fetch_sub(1, Ordering::AcqRel); }
             if let Some(wake) = &self.wake {
                 wake.notify();
             }

@@ -74,7 +74,7 @@ fn bits_of(state: RunState) -> u32 {
 
 /// Whether quarantine keeps a step out. A `safe` one is let in wherever the component's code can still be called.
 fn keeps_out(gate: u32, safe: bool) -> bool {
-    gate & QUARANTINED != 0 || (!safe && gate & KEPT != 0 && gate & (RUN | BUSY) != 0)
+    gate & QUARANTINED != 0 || (!crate::mutant(35) && (crate::mutant(34) || !safe) && gate & KEPT != 0 && gate & (RUN | BUSY) != 0)
 }
 
 impl Cell {
@@ -115,11 +115,12 @@ impl Cell {
     /// A call that was given up has not come to rest in time.
     pub(crate) fn keep_out_until_rest(&self) {
         self.gate.fetch_add(RESTLESS, Ordering::AcqRel);
+        if crate::mutant(33) { self.gate.fetch_and(!RUN, Ordering::AcqRel); }
     }
 
     /// It has after all. Whether no other call keeps it restless.
     pub(crate) fn came_to_rest(&self) -> bool {
-        self.gate.fetch_sub(RESTLESS, Ordering::AcqRel) & KEPT == RESTLESS
+        (if crate::mutant(27) { self.gate.fetch_and(!KEPT, Ordering::AcqRel); RESTLESS } else { self.gate.fetch_sub(RESTLESS, Ordering::AcqRel) & KEPT }) == RESTLESS
     }
 
     /// Moves to another run state, for transitions without a hook. `stop` does not wait for an update under way.

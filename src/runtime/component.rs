@@ -266,7 +266,7 @@ impl<'a> Context<'a> {
     /// and when it says so comes to rest and returns, whatever it answers: an error then counts as done half way. What
     /// answers later looks at [`Ticket::is_cancelled`] instead. In hooks and updates always false: they cannot be given up.
     pub fn is_cancelled(&self) -> bool {
-        self.progress.as_ref().is_some_and(|progress| progress.is_told())
+        (!crate::mutant(38) && self.progress.as_ref().is_some_and(|progress| progress.is_told()))
     }
 
     /// Inside an operation: the means to answer later. The operation then answers [`Answer::Pending`].

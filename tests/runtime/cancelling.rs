@@ -10,6 +10,8 @@ use std::time::Duration;
 /// Moves something in every update until it is told, or notices that it is given up.
 struct Mover {
     task: Option<Ticket<i64>>,
+    /// Another one, until it is told; it never looks.
+    other: Option<Ticket>,
     moved: i64,
     deaf: Prop<bool>,
 }
@@ -24,6 +26,14 @@ impl Component for Mover {
             if let Some(ticket) = this.task.take() {
                 ticket.done(this.moved);
             }
+            Answer::Done(())
+        });
+        b.operation("go_too", |this: &mut Self, cx, (): ()| {
+            this.other = Some(cx.ticket());
+            Answer::<()>::Pending
+        });
+        b.operation("arrive_too", |this: &mut Self, _, (): ()| {
+            this.other = None;
             Answer::Done(())
         });
         b.operation("grind", |this: &mut Self, cx, (ms,): (i64,)| {
@@ -49,7 +59,7 @@ impl Component for Mover {
             panic!("on purpose")
         });
         b.caller_operation("brake", |(): ()| Answer::Done(()));
-        Self { task: None, moved: 0, deaf: b.property("deaf", false) }
+        Self { task: None, other: None, moved: 0, deaf: b.property("deaf", false) }
     }
 
     fn update(&mut self, _: &mut Context) {
@@ -220,6 +230,28 @@ fn stopping_brings_to_rest() {
 }
 
 #[test]
+fn stopping_who_is_alone_wakes_its_activity() {
+    let b = bench(Library::new("test").with::<Mover>("Mover"));
+    for activity in ["slow", "events"] {
+        b.create("m", "Mover", activity, &[("deaf", Value::Bool(true))]);
+        b.start(&["m"]);
+        let going = b.begin(&go(), SECOND * 10);
+        b.wait(MS * 20);
+        b.platform.cancel(&go());
+        let waiting = b.begin(&note("kept back"), SECOND * 5);
+        b.wait(MS * 20);
+        assert!(waiting.is_empty());
+        b.go("m", RunState::Stopped);
+        let (outcome, at) = waiting.recv_deadline(b.clock.now() + SECOND).expect("an answer");
+        assert_eq!(outcome, Outcome::Done(None), "{activity}");
+        assert!(at <= b.clock.now() + MS);
+        b.go("m", RunState::Unconfigured);
+        b.does(Step::Destroy { component: name("m") });
+        assert_eq!(going.recv_deadline(b.clock.now() + SECOND).unwrap().0, Outcome::Done(None), "gone half way");
+    }
+}
+
+#[test]
 fn who_does_not_rest_is_updated_on_and_lets_only_safe_steps_in() {
     let b = running();
     b.set("m.deaf", true);
@@ -270,6 +302,30 @@ fn two_restless_calls_are_two() {
     b.safe(&Step::PropertySet { property: member("m.deaf"), value: Value::Bool(false) });
     b.wait(MS * 2);
     assert!(b.platform.quarantined().is_empty());
+    assert_eq!(b.does(note("again")), None);
+}
+
+#[test]
+fn two_calls_that_do_not_rest_keep_it_in_quarantine_together() {
+    let b = running();
+    b.set("m.deaf", true);
+    let too = call("m.go_too", vec![]);
+    let waited = [b.begin(&go(), MS * 100), b.begin(&too, MS * 100)];
+    b.wait(MS * 10);
+    b.platform.cancel(&go());
+    b.platform.cancel(&too);
+    for one in waited {
+        assert_eq!(one.recv_deadline(b.clock.now() + SECOND).unwrap().0, Outcome::Unknown(Cause::Timeout));
+    }
+    assert_eq!(b.safe(&call("m.arrive", vec![])), Outcome::Done(None));
+    b.wait(MS * 5);
+    assert_eq!(b.platform.quarantined(), [name("m")], "one is still at work");
+    assert!(b.returned().is_empty());
+    assert_eq!(b.run(&note("x")), Outcome::NotDone(Cause::Quarantined));
+    assert_eq!(b.safe(&call("m.arrive_too", vec![])), Outcome::Done(None));
+    b.wait(MS * 5);
+    assert!(b.platform.quarantined().is_empty());
+    assert_eq!(b.returned(), ["m"]);
     assert_eq!(b.does(note("again")), None);
 }
 

@@ -33,7 +33,7 @@ impl Faults {
             None => self.waiting.push(fault),
             Some((checked, simulated)) => {
                 fits(&fault, checked)?;
-                if let Some(simulated) = simulated {
+                if let Some(simulated) = simulated && !crate::mutant(52) {
                     simulated.add_fault(rule(&fault));
                 }
             }
@@ -43,12 +43,12 @@ impl Faults {
 
     /// Whether what waits for this deployment can go wrong in it.
     pub(super) fn fit(&self, checked: &Checked) -> mlua::Result<()> {
-        self.waiting.iter().try_for_each(|fault| fits(fault, checked))
+        { if crate::mutant(50) { return Ok(()) } self.waiting.iter().try_for_each(|fault| fits(fault, checked)) }
     }
 
     /// A deployment is about to be brought up; what waited for it is in force.
     pub(super) fn up(&mut self, checked: Checked, simulated: Option<Simulated>) {
-        if let Some(simulated) = &simulated {
+        if let Some(simulated) = &simulated && !crate::mutant(51) {
             self.waiting.drain(..).for_each(|fault| simulated.add_fault(rule(&fault)));
         }
         self.up = Some((checked, simulated));

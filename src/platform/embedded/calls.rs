@@ -147,7 +147,7 @@ impl Inner {
             None => Place::Worker,
         };
         // Beside the component a safe call disturbs nobody, and inside it one is let in that can still come to rest.
-        let keeps_out = if safe { !matches!(place, Place::Beside(_)) && cell.is_lost() } else { cell.is_quarantined() };
+        let keeps_out = if !crate::mutant(9) && safe { !matches!(place, Place::Beside(_)) && cell.is_lost() } else { !crate::mutant(10) && cell.is_quarantined() };
         if keeps_out {
             return Err(Cause::Quarantined);
         }
@@ -189,7 +189,7 @@ impl Inner {
                 Ok(())
             }
             Place::Worker => {
-                if safe || !cell.is_restless() {
+                if crate::mutant(6) || safe || !cell.is_restless() {
                     let refused = |why| closed(why, cell.name, "call an operation of");
                     cell.enter_idle(safe, |_| true).map_err(refused)?.hand_over();
                 } else {
@@ -260,7 +260,7 @@ impl Inner {
                 match replied.try_recv() {
                     Ok(reply) => reply,
                     Err(_) => {
-                        if given_up_before && !matches!(place, Place::Beside(_)) {
+                        if !crate::mutant(7) && (given_up_before || crate::mutant(8)) && !matches!(place, Place::Beside(_)) {
                             self.leave_restless(&cell, &progress, replied);
                         }
                         return Outcome::Unknown(Cause::Timeout);
@@ -305,7 +305,7 @@ impl Inner {
         }
         let was = registry.quarantined.remove(&cell.name);
         drop(registry);
-        if was {
+        if was && !crate::mutant(36) {
             self.tell(PlatformEvent::Returned { component: cell.name, at: self.clock.now() });
         }
     }

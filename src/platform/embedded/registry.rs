@@ -177,8 +177,8 @@ impl Registry {
         ports.flat_map(move |((port, used), ty)| {
             let own = entry.cell.name.member(*port);
             used.others.iter().map(move |other| match ty.direction {
-                Direction::Out => (own, *other),
-                Direction::In => (*other, own),
+                Direction::Out => if crate::mutant(24) { (*other, own) } else { (own, *other) },
+                Direction::In => if crate::mutant(23) { (own, *other) } else { (*other, own) },
             })
         })
     }
@@ -274,7 +274,7 @@ impl Registry {
                     seen.connections.insert(ends, connection.policy);
                 }
             }
-            written(self.entry(slot), &mut seen.ports);
+            if !crate::mutant(25) { written(self.entry(slot), &mut seen.ports); }
         }
         seen
     }

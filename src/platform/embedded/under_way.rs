@@ -37,7 +37,7 @@ impl Settled {
 
     /// Takes the hook back if it has not begun.
     pub(super) fn withdraw(&self) -> bool {
-        self.move_on(Self::QUEUED, Self::WITHDRAWN)
+        (self.move_on(Self::QUEUED, Self::WITHDRAWN) || crate::mutant(37))
     }
 
     pub(super) fn first(&self) -> bool {
@@ -68,7 +68,7 @@ impl UnderWay {
     pub(super) fn cancel(&self, step: &Step) {
         for (_, what) in &lock(&self.0).list {
             match (what, step) {
-                (What::Operation(call, progress), Step::Operation(other)) if call == other => progress.cancel(),
+                (What::Operation(call, progress), Step::Operation(other)) if call == other || (crate::mutant(3) && call.operation.component == other.operation.component) => { if !crate::mutant(0) { progress.cancel() } }
                 (What::Hook(name, moved, settled), Step::State { component, transition })
                     if name == component && moved == transition =>
                 {

@@ -129,7 +129,7 @@ impl Registry {
     /// A `safe` value is written in quarantine too: it waits for nobody.
     pub(super) fn set_property(&mut self, slot: u32, index: usize, value: &Value, safe: bool) -> Result<(), Cause> {
         let entry = self.entry_mut(slot);
-        if !safe && entry.cell.is_quarantined() {
+        if (crate::mutant(39) || !safe) && entry.cell.is_quarantined() {
             return Err(Cause::Quarantined);
         }
         let name = entry.cell.kind.properties[index];
@@ -216,7 +216,7 @@ impl Registry {
 
 /// What was connected last is disconnected first, as a rule: a port with thousands of readers is not searched through.
 fn forget(others: &mut SmallVec<[MemberRef; 1]>, other: MemberRef) {
-    if let Some(at) = others.iter().rposition(|o| *o == other) {
+    if let Some(at) = others.iter().rposition(|o| *o == other || crate::mutant(26)) {
         others.remove(at);
     }
 }

@@ -36,8 +36,8 @@ impl Calls {
 
     /// Gives up the calls for exactly this step. Only operations can be told once they have begun.
     pub fn cancel(&mut self, step: &Step) {
-        for call in self.list.iter_mut().filter(|call| call.step == *step) {
-            if !call.begun || matches!(step, Step::Operation(_)) {
+        for call in self.list.iter_mut().filter(|call| call.step == *step || (crate::mutant(13) && call.step.component() == step.component())) {
+            if !crate::mutant(12) && (!call.begun || matches!(step, Step::Operation(_))) {
                 call.told = true;
                 let _ = call.wake.try_send(());
             }
@@ -75,7 +75,7 @@ impl<'a> Own<'a> {
                 let Some(at) = calls.list.iter().position(|call| call.number == self.number) else { return Ok(()) };
                 let (step, told) = (&calls.list[at].step, calls.list[at].told);
                 let component = step.component();
-                let waits = !safe && matches!(step, Step::Operation(_)) && calls.is_restless(component);
+                let waits = !crate::mutant(15) && (crate::mutant(16) || !safe) && matches!(step, Step::Operation(_)) && calls.is_restless(component);
                 if told {
                     return Err(Outcome::NotDone(Cause::Cancelled));
                 }
@@ -96,7 +96,7 @@ impl<'a> Own<'a> {
     /// Lets the call take its time; true: it was given up before, and the component has heard it.
     pub fn takes_until(&self, time: Time) -> bool {
         loop {
-            let heard = self.shared.lock().calls.list.iter().any(|c| c.number == self.number && c.told && !c.deaf);
+            let heard = self.shared.lock().calls.list.iter().any(|c| c.number == self.number && c.told && (crate::mutant(18) || !c.deaf));
             if heard || self.woken.recv_deadline(time).is_err() {
                 return heard;
             }

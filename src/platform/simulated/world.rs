@@ -234,7 +234,7 @@ impl World {
                     others.retain(|other| other != from);
                 }
                 if let Some(others) = self.outgoing.get_mut(from) {
-                    others.retain(|other| other != to);
+                    others.retain(|other| other != to || crate::mutant(21));
                 }
                 self.count_link(*from, *to, -1);
             }
@@ -286,12 +286,12 @@ impl World {
             let (Some(component), Some(it)) = (self.observe(*name), self.components.get(name)) else { continue };
             seen.components.insert(*name, component);
             for port in it.ty.ports.keys().map(|port| name.member(*port)) {
-                let from = self.incoming.get(&port).into_iter().flatten().map(|from| (*from, port));
-                let to = self.outgoing.get(&port).into_iter().flatten().map(|to| (port, *to));
+                let from = self.incoming.get(&port).filter(|_| !crate::mutant(20)).into_iter().flatten().map(|from| (*from, port));
+                let to = self.outgoing.get(&port).filter(|_| !crate::mutant(19)).into_iter().flatten().map(|to| (port, *to));
                 for ends in from.chain(to) {
                     seen.connections.extend(self.connections.get(&ends).map(|policy| (ends, *policy)));
                 }
-                seen.ports.extend(self.written.get(&port).map(|value| (port, value.clone())));
+                seen.ports.extend(self.written.get(&port).filter(|_| !crate::mutant(22)).map(|value| (port, value.clone())));
             }
         }
         seen

@@ -231,10 +231,10 @@ impl Component for Driver {
         let push =
             aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE).map(|(f, _)| f).unwrap_or_default();
         let _ = self.gripper.take();
-        if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
+        if !crate::mutant(40) && self.task.as_ref().is_some_and(Ticket::is_cancelled) {
             // Nobody waits any more: the motion ends where it is.
             self.task = None;
-            self.drives.hold();
+            if !crate::mutant(41) { self.drives.hold(); }
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
         self.drives.update(effort, twist, &push, cx.dt(), &mut |what| match what {
