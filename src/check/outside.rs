@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 impl Product<'_> {
     /// What comes when nothing lies in the inboxes.
-    pub(super) fn from_outside(&mut self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn comes_from_outside(&mut self, state: &State, nexts: &mut Nexts) {
         let mut heard: BTreeSet<usize> = BTreeSet::new();
         let busy: SmallVec<[bool; 4]> =
             self.members.iter().map(|member| state.outstanding(member.by) >= self.most_waiting).collect();

@@ -153,7 +153,7 @@ impl<'a> Product<'a> {
             self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
         }
         if state.inbox.is_empty() {
-            self.from_outside(state, &mut nexts);
+            self.comes_from_outside(state, &mut nexts);
         }
         nexts
     }
