@@ -26,6 +26,12 @@ pub struct Args {
     /// Exit with 1 for everything but *sound*.
     #[arg(long)]
     strict: bool,
+    /// Show notes whole, not a line each.
+    #[arg(long)]
+    notes: bool,
+    /// Show the shortest way to the N-th finding, and nothing else.
+    #[arg(long, value_name = "N", conflicts_with_all = ["json", "notes"])]
+    trace: Option<usize>,
 }
 
 impl Run for Args {
@@ -66,15 +72,27 @@ impl Run for Args {
             return Ok(exit);
         }
         let out = &context.out;
-        out.findings(&report.findings, &read.sources);
-        if let Some((number, trace)) = first_trace(&report) {
-            out.error(format!("the way to `{}`, the first of these that has one:\n", report.findings[number].code));
+        if let Some(number) = self.trace {
+            return Ok(show_way(context, &report, number, exit));
+        }
+        // Errors come first, notes last.
+        let notes = report.findings.iter().position(|f| f.severity == Severity::Info).filter(|_| !self.notes);
+        let (found, notes) = report.findings.split_at(notes.unwrap_or(report.findings.len()));
+        out.findings(found, &read.sources);
+        for (number, line) in (found.len() + 1..).zip(one_line_each(notes, &read.sources)) {
+            out.error(format!("note {number}: {line}\n"));
+        }
+        if let Some((number, trace)) = first_trace(&report, self.notes) {
+            out.error(format!("the way to finding {}, `{}`:\n", number + 1, report.findings[number].code));
             for line in trace {
                 out.error(format!("  {line}\n"));
             }
             out.error("\n");
         }
         count(context, &report.findings);
+        if !notes.is_empty() {
+            out.error("`--notes` shows notes whole, `--trace N` the way to one\n");
+        }
         let style = match report.verdict {
             Verdict::Sound | Verdict::Followed { .. } => Style::Good,
             Verdict::Warnings => Style::Care,
@@ -98,10 +116,41 @@ impl Run for Args {
     }
 }
 
-/// The first way there is, with the number of its finding.
-fn first_trace(report: &Report) -> Option<(usize, &[TraceStep])> {
-    let traces = report.traces.iter().enumerate();
-    traces.filter(|(_, trace)| !trace.is_empty()).map(|(number, trace)| (number, trace.as_slice())).next()
+/// The way to the N-th finding, counted from 1.
+fn show_way(context: &Context, report: &Report, number: usize, exit: Exit) -> Exit {
+    let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
+    let Some((finding, trace)) = found else {
+        let there = report.findings.len();
+        context.out.error(format!("there is no finding {number}: there are {there}, counted from 1\n"));
+        return Exit::Usage;
+    };
+    context.out.line(format!("{}: {}", finding.code, finding.message));
+    if trace.is_empty() {
+        context.out.line("  it stands in the text: no way leads to it");
+    }
+    trace.iter().for_each(|step| context.out.line(format!("  {step}")));
+    exit
+}
+
+/// Findings in short: where and what.
+fn one_line_each(findings: &[Finding], sources: &SourceMap) -> Vec<String> {
+    let json = to_json(findings, sources);
+    let line = |finding: &serde_json::Value| {
+        let message = finding["message"].as_str().unwrap_or_default();
+        match (finding["file"].as_str(), finding["line"].as_u64()) {
+            (Some(file), Some(line)) => format!("{file}:{line}: {message}"),
+            _ => message.to_owned(),
+        }
+    };
+    json.as_array().into_iter().flatten().map(line).collect()
+}
+
+/// The way to the worst finding that has one, with its number; that to a note only with `notes`.
+fn first_trace(report: &Report, notes: bool) -> Option<(usize, &[TraceStep])> {
+    let traces = report.findings.iter().zip(&report.traces).enumerate();
+    let shown = |finding: &Finding| notes || finding.severity != Severity::Info;
+    let mut worth = traces.filter(|(_, (finding, trace))| shown(finding) && !trace.is_empty());
+    worth.next().map(|(number, (_, trace))| (number, trace.as_slice()))
 }
 
 fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
@@ -112,7 +161,7 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
         }
     }
     let trace: Vec<String> =
-        first_trace(report).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
+        first_trace(report, true).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
     context.out.json(&json!({
         "ok": report.verdict != Verdict::Refused,
         "verdict": report.verdict.word(),

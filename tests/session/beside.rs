@@ -190,12 +190,14 @@ fn the_top_and_the_groups_of_another_are_left_alone() {
     let greedy = |name: &str| {
         format!(
             "return state {{
-              idle = state {{}}, on = state {{}},
+              idle = state {{}}, on = state {{ plain = state {{}}, mode = state {{}}, popped = state {{}},
+                trans {{ src = \"initial\", tgt = \"plain\" }},
+                trans {{ src = \"plain\", tgt = \"mode\", events = {{ \"e_{name}_mode\" }}, effect = \"{name}_mode\" }},
+                trans {{ src = \"mode\", tgt = \"popped\", events = {{ \"e_{name}_pop\" }}, effect = \"undo\" }},
+              }},
               trans {{ src = \"initial\", tgt = \"idle\" }},
               trans {{ src = \"idle\", tgt = \"on\", events = {{ \"e_start\" }}, effect = \"{name}_base\" }},
-              trans {{ src = \"on\", tgt = \"on\", events = {{ \"e_{name}_mode\" }}, effect = \"{name}_mode\" }},
-              trans {{ src = \"on\", tgt = \"on\", events = {{ \"e_{name}_pop\" }}, effect = \"undo\" }},
-              trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = \"{name}_base.undo\" }},
+              trans {{ src = \"on\", tgt = \"idle\", events = {{ \"e_shutdown\" }}, effect = {{ \"{name}_mode.undo\", \"{name}_base.undo\" }} }},
             }}"
         )
     };

@@ -93,15 +93,19 @@ fn every_series_goes_up_and_comes_down_to_nothing() {
     }
 }
 
-/// `davit check` has nothing to warn of, and follows each coordinator to the end.
+/// `davit check` has nothing to warn of, and follows each coordinator as far as its bounds of waiting requests say: a
+/// coordinator that hears `e_5dof` and `e_8dof` while it waits may have asked for any number of switches.
 #[test]
-fn every_deployment_is_followed_to_the_end() {
+fn every_deployment_is_followed_within_the_bounds() {
     for name in DEPLOYMENTS {
         let (deployment, catalogue) = deployment(name);
         let report = davit::check::run(deployment, &catalogue);
         let told: Vec<_> = report.findings.iter().filter(|f| f.severity > davit::model::Severity::Info).collect();
         assert!(told.is_empty(), "{name}: {told:#?}");
-        assert!(report.explored.complete && report.explored.unfollowed == 0, "{name}: {:?}", report.explored);
+        assert!(report.explored.unfollowed == 0, "{name}: {:?}", report.explored);
+        let named =
+            |line: &String| line.contains("batch of a coordinator") || line.contains("batches of one coordinator");
+        assert!(report.left.iter().all(named), "{name}: {:?}", report.left);
         assert!(report.explored.states > 300, "{name}: {:?}", report.explored);
     }
 }
