@@ -182,12 +182,16 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     }
     function!("deploy", String, |h, _lua, file| deploy(h, &file));
     function!("raise", String, |h, _lua, event| raise(h, &event));
-    function!("apply", String, |h, _lua, id| request(h, Some(&id), Ask::Apply));
-    function!("undo", Option<String>, |h, _lua, id| request(h, id.as_deref(), Ask::UndoOf));
+    function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
+        request(h, Some(&id), Ask::Apply, forced(options)?)
+    });
+    function!("undo", (Option<String>, Option<Table>), |h, _lua, (id, options)| {
+        request(h, id.as_deref(), Ask::UndoOf, forced(options)?)
+    });
     function!("commit", Option<Table>, |h, _lua, options| {
         let session = session(h)?;
         listen_anew(h, &session);
-        session.request(Ask::Commit { force: forced(options)? }, "operator");
+        session.request(Ask::Commit { force: forced(options)? }, "operator", false);
         Ok(())
     });
     function!("drift", (), |h, lua, ()| {
@@ -255,8 +259,24 @@ fn error(message: impl Into<String>) -> mlua::Error {
 }
 
 /// `{ force = true }`
+/// Every key of a table of options is one of these.
+fn option_names(options: &Table, known: &[&'static str]) -> mlua::Result<()> {
+    for pair in options.pairs::<mlua::Value, mlua::Value>() {
+        let key = pair?.0.to_string()?;
+        if !known.contains(&key.as_str()) {
+            return Err(error(format!(
+                "there is no option `{key}`: {}",
+                did_you_mean(&key, "options", known.iter().copied())
+            )));
+        }
+    }
+    Ok(())
+}
+
 fn forced(options: Option<Table>) -> mlua::Result<bool> {
-    options.map_or(Ok(false), |o| o.get::<Option<bool>>("force").map(|f| f.unwrap_or(false)))
+    let Some(options) = options else { return Ok(false) };
+    option_names(&options, &["force"])?;
+    options.get::<Option<bool>>("force").map(|force| force.unwrap_or(false))
 }
 
 fn clock(host: &Shared) -> Clock {
@@ -343,7 +363,7 @@ fn listen_anew(host: &Shared, session: &Session) {
     host.taken.clear();
 }
 
-fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::Result<()> {
+fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: bool) -> mlua::Result<()> {
     let session = session(host)?;
     let ask = match id {
         None => Ask::Undo,
@@ -356,7 +376,7 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask) -> mlua::R
         }
     };
     listen_anew(host, &session);
-    session.request(ask, "operator");
+    session.request(ask, "operator", force);
     Ok(())
 }
 

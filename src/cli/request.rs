@@ -51,6 +51,9 @@ impl Run for EventArgs {
 pub struct ApplyArgs {
     /// The configuration.
     configuration: String,
+    /// Also when it moves something while a safe configuration is in force.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
@@ -62,7 +65,7 @@ pub struct ApplyArgs {
 
 impl Run for ApplyArgs {
     fn run(self, context: &Context) -> Answer {
-        let params = json!({ "configuration": self.configuration });
+        let params = json!({ "configuration": self.configuration, "force": self.force });
         request(context, "apply", params, &self.which, &self.wait, self.json)
     }
 }
@@ -76,6 +79,10 @@ pub struct UndoArgs {
     /// Undo until so many frames are left.
     #[arg(long, value_name = "N", conflicts_with = "configuration")]
     to: Option<usize>,
+    /// Also frames of coordinators, and what moves while a safe configuration is in force. The coordinator is not told, and
+    /// goes on as if its frame were there.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
@@ -87,7 +94,7 @@ pub struct UndoArgs {
 
 impl Run for UndoArgs {
     fn run(self, context: &Context) -> Answer {
-        let params = json!({ "configuration": self.configuration, "to": self.to });
+        let params = json!({ "configuration": self.configuration, "to": self.to, "force": self.force });
         request(context, "undo", params, &self.which, &self.wait, self.json)
     }
 }

@@ -70,11 +70,11 @@ impl Service for SessionService {
             "drift" => drift(&session, params),
             "recover" => recover(&session, params),
             "commit" => {
-                let force = optional(params, "force")?.unwrap_or(false);
+                let force = forced(params)?;
                 request(&session, Ask::Commit { force }, params)
             }
             "shutdown" => {
-                let force = optional(params, "force")?.unwrap_or(false);
+                let force = forced(params)?;
                 let wait = optional(params, "wait")?.unwrap_or(false);
                 session.command(Command::Shutdown { force });
                 if !wait {
@@ -165,10 +165,14 @@ fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
     })
 }
 
+fn forced(params: &Json) -> Result<bool, RpcError> {
+    Ok(optional(params, "force")?.unwrap_or(false))
+}
+
 fn request(session: &Session, ask: Ask, params: &Json) -> Result<Json, RpcError> {
     let wait: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params)?;
-    let request = session.request(ask, "operator");
+    let request = session.request(ask, "operator", forced(params)?);
     if !wait {
         return Ok(json!({ "request": request }));
     }

@@ -154,10 +154,11 @@ impl Session {
         }
     }
 
-    /// Makes a request in the name of an operator.
-    pub fn request(&self, ask: Ask, by: &str) -> RequestId {
+    /// Makes a request in the name of an operator. `force`: also one that undoes a coordinator's frame, or moves while a safe
+    /// configuration is in force.
+    pub fn request(&self, ask: Ask, by: &str, force: bool) -> RequestId {
         let id = self.hub.request(ask, by);
-        let request = Request { force: true, ..Request::new(id, ask, Requester::Operator) };
+        let request = Request { force, ..Request::new(id, ask, Requester::Operator) };
         // A full queue has answered it already.
         let _ = self.configurator.submit(Batch::one(request));
         id

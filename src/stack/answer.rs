@@ -9,7 +9,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// The way out of *broken*, as it is told wherever something is.
-pub const WAY_OUT: &str = "`davit undo ID` takes back what is left of that configuration, `davit recover --back` all that is; \
+pub const WAY_OUT: &str = "`davit undo ID` takes back what is left of that configuration (with `--force` where a coordinator \
+                           asked for it), `davit recover --back` all that is; \
                            `davit recover --accept` takes what is there as the state; `davit drift` shows what differs";
 
 /// The answer to a request. Every request gets exactly one; a later [`Verdict::Reverted`] (or an undo verdict in its

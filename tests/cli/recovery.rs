@@ -210,6 +210,24 @@ fn commit_makes_the_operators_frames_permanent_and_no_others() {
 }
 
 #[test]
+fn a_coordinators_frame_is_undone_by_force_only() {
+    let deployed = Deployed::new();
+    let run = |args: &[&str]| deployed.0.run(args);
+    assert_eq!(run(&["event", "e_thin", "--wait", "thin.ok"]).code, 0);
+    for args in [&["undo", "thin", "--wait"][..], &["undo", "--to", "1", "--wait"]] {
+        let refused = run(args);
+        assert_eq!(refused.code, 1, "{}{}", refused.out, refused.err);
+        assert!(refused.out.contains("`thin` is a frame of a coordinator"), "{}{}", refused.out, refused.err);
+    }
+    let every = || deployed.status()["system"]["components"]["log"]["properties"]["every"].clone();
+    assert_eq!(every(), 5, "nothing was done");
+    let forced = run(&["undo", "thin", "--force", "--wait"]);
+    assert_eq!(forced.code, 0, "{}{}", forced.out, forced.err);
+    assert_ne!(every(), 5);
+    assert_eq!(run(&["shutdown"]).code, 0);
+}
+
+#[test]
 fn a_script_recovers() {
     let demo = files();
     demo.write(

@@ -196,7 +196,7 @@ fn what_the_inbox_cannot_hold_is_counted_and_told_and_an_operator_goes_first() {
             }
         }));
         let burst = ConfigId::new("burst").unwrap();
-        flooded.session.request(Ask::Apply(burst), "operator");
+        flooded.session.request(Ask::Apply(burst), "operator", false);
         flooded.clock.sleep(Duration::from_secs(3));
         let raised = flooded.count(|what| is_event(what, "e_burst"));
         assert_eq!(raised, 6000);
@@ -226,7 +226,7 @@ fn what_the_inbox_cannot_hold_is_counted_and_told_and_an_operator_goes_first() {
         flooded.session.raise(event("e_back"), "test");
         flooded.clock.sleep(Duration::from_secs(1));
         assert!(flooded.session.in_state("on"), "it still listens");
-        flooded.session.request(Ask::UndoOf(burst), "operator");
+        flooded.session.request(Ask::UndoOf(burst), "operator", false);
         flooded.clock.sleep(Duration::from_millis(100));
     });
 }

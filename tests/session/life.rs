@@ -215,6 +215,25 @@ fn answers_may_be_waited_for_in_any_order_each_once() {
 }
 
 #[test]
+fn an_operator_meddles_with_a_coordinator_only_by_force() {
+    let (failure, clean) = run_text(
+        "deploy('@generic_arm.yaml') wait_answer('five_DOF.ok', 1) raise('e_aligned') wait_answer('eight_DOF.ok', 1)
+         undo('eight_DOF') wait_answer('eight_DOF.undo.failed', 1) assert(property('follower.cart_share') == 0.5)
+         undo('eight_DOF', {force = true}) wait_answer('eight_DOF.undone', 1) assert(property('follower.cart_share') ~= 0.5)
+         -- Nothing moves while a safe configuration is in force.
+         apply('safe_hold') wait_answer('safe_hold.ok', 1)
+         apply('unfold') wait_answer('unfold.failed', 1)
+         apply('unfold', {force = true}) wait_answer('unfold.ok', 20)
+         undo() wait_answer('undo.failed', 1)
+         undo('unfold', {force = true}) wait_answer('unfold.undone', 20)
+         undo() wait_answer('undo.done', 1)
+         local ok, why = pcall(apply, 'five_DOF', {forc = true})
+         assert(not ok and tostring(why):find('did you mean `force`?'), tostring(why))",
+    );
+    assert_eq!((failure, clean), (None, Some(true)));
+}
+
+#[test]
 fn a_script_sees_all_coordinators() {
     let folder = tempfile::tempdir().unwrap();
     let coordinator = |on: &str| {
@@ -267,9 +286,9 @@ fn an_operator_pushes_and_undoes() {
         }
         session.hub().answer(request).unwrap()
     };
-    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator")).answer, "profile_soft.ok");
+    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", false)).answer, "profile_soft.ok");
     assert_ne!(session.system(), before);
-    assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator")).answer, "undo.done");
+    assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator", false)).answer, "undo.done");
     assert_eq!(session.system(), before);
     assert_eq!(session.status().stack.len(), frames);
     assert!(session.take_down(false).is_clean());
