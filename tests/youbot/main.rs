@@ -6,6 +6,7 @@ mod coupling;
 mod files;
 mod golden;
 mod robot;
+mod two;
 
 #[global_allocator]
 static ALLOCATOR: bench::Counting = bench::Counting;
