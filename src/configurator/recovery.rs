@@ -174,7 +174,7 @@ impl Engine {
             let hung = |step: &Step| self.world.quarantined.contains(&step.component());
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
-            let moves = steps.iter().any(|step| step::moves(step, &self.world.system));
+            let moves = system::diff::moves_any(&steps, &self.world.system);
             if !steps.is_empty() && (asked || !moves) {
                 let list = in_order(&self.world.system, steps).unwrap_or_default();
                 let plan = own_plan(list, &self.world.system);

@@ -1,7 +1,7 @@
 //! The steps from one system to another. One mechanism for repair of drift, a return to a saved system, forced teardown
 //! and the comparison of two systems (design §4).
 
-use super::{Node, System, View};
+use super::{Node, Overlay, System, View, step};
 use crate::model::{ComponentName, MemberRef, Policy, RunState, Step, Value, Wanted};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,6 +13,16 @@ pub fn diff(from: &System, to: &System) -> Vec<Step> {
     let mut diff = Diff { steps: Vec::new(), states: BTreeMap::new(), sets: Vec::new() };
     diff.compare(from, to);
     diff.steps
+}
+
+/// Whether one of these steps, done one after the other, moves hardware: also one of a component that an earlier one makes.
+pub fn moves_any(steps: &[Step], system: &System) -> bool {
+    let mut view = Overlay::new(system);
+    steps.iter().any(|step| {
+        let moves = step::moves(step, &view);
+        let _ = step::apply(step, &mut view);
+        moves
+    })
 }
 
 /// What is demanded of a component that is to be as one in `state`.

@@ -12,7 +12,7 @@ mod system_graph;
 pub mod touch;
 mod violation;
 
-pub use diff::diff;
+pub use diff::{diff, moves_any};
 pub use node::{Driven, Link, Node, Written};
 pub use overlay::Overlay;
 pub use step::{Reversibility, Undo};

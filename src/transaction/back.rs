@@ -6,7 +6,7 @@ use super::run::Run;
 use crate::model::{ComponentName, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
 use crate::system::touch::{Slot, components};
-use crate::system::{Reversibility, System, Undo, View as _, diff, step};
+use crate::system::{Overlay, Reversibility, System, Undo, View as _, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
@@ -112,6 +112,8 @@ impl Transaction {
                 followers[*before as usize].push(i);
             }
         }
+        // What a component that is made again does is known only then.
+        let mut view = Overlay::new(live);
         let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
         for i in forward.done.iter().rev().copied() {
             if held || self.taken_back.contains(&i) || self.part_of(i) < part {
@@ -125,7 +127,7 @@ impl Transaction {
             after.dedup();
             for back in self.steps_back(i, part) {
                 let touched = !late && self.touched.has(back);
-                if !late && !self.may_move(i) && step::moves(back, live) {
+                if !late && !self.may_move(i) && step::moves(back, &view) {
                     way.withheld = Some(back.clone());
                     return way;
                 }
@@ -133,6 +135,7 @@ impl Transaction {
                     way.superseded.push(i);
                     continue;
                 }
+                let _ = step::apply(back, &mut view);
                 let id = way.list.len() as u32;
                 way.list.push(item(back.clone(), id, waves - original.wave, after));
                 way.takes_back.push(Some(i));

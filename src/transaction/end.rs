@@ -5,7 +5,7 @@ use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::stack::{FrameId, Inverse, Reason, Residual};
-use crate::system::{System, Undo, View as _, diff, step, touch};
+use crate::system::{System, Undo, View as _, diff, moves_any, step, touch};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
@@ -157,7 +157,7 @@ impl Transaction {
                 .into_iter()
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
-            if !steps.is_empty() && (asked || !steps.iter().any(|step| step::moves(step, live))) {
+            if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
                 return self.mend(steps, (wanted, whole));
             }
         }

@@ -20,14 +20,26 @@ pub struct Bench {
     asked: usize,
     fails: Vec<usize>,
     picks: Vec<u8>,
+    /// Steps back that moved something.
+    pub moved_back: Vec<Step>,
+    /// How many steps were taken back.
+    pub back: usize,
 }
 
 impl Bench {
-    fn new(system: &System, fails: Vec<usize>, picks: Vec<u8>) -> Self {
-        Self { model: system.clone(), platform: system.clone(), asked: 0, fails, picks }
+    pub fn new(system: &System, fails: Vec<usize>, picks: Vec<u8>) -> Self {
+        Self {
+            model: system.clone(),
+            platform: system.clone(),
+            asked: 0,
+            fails,
+            picks,
+            moved_back: Vec::new(),
+            back: 0,
+        }
     }
 
-    fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
+    pub fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
         let spec = Spec {
             until: Time::NEVER,
             timeout: Duration::ZERO,
@@ -56,7 +68,12 @@ impl Bench {
                     let outcome = if self.fails.contains(&self.asked) {
                         Outcome::NotDone(Cause::Failed("as told".to_owned()))
                     } else {
-                        step::apply(&machine.step(number).step, &mut self.platform).expect("soundness");
+                        let step = &machine.step(number).step;
+                        if machine.is_going_back() {
+                            self.back += 1;
+                            self.moved_back.extend(step::moves(step, &self.platform).then(|| step.clone()));
+                        }
+                        step::apply(step, &mut self.platform).expect("soundness");
                         Outcome::Done(None)
                     };
                     machine.on(Input::Ended { step: number, outcome }, &mut self.model);

@@ -9,6 +9,7 @@ mod atomicity;
 mod difference;
 mod generate;
 mod machine;
+mod motion;
 mod plain;
 mod plans;
 mod prepared;

@@ -1,0 +1,78 @@
+//! Nothing moves that nobody asked to move: no automatic rollback moves anything, unless the configuration says so.
+
+use crate::atomicity::Bench;
+use crate::generate::{self, context, read};
+use crate::plans::operator;
+use crate::settings;
+use davit::model::{Catalogue, OnFailure};
+use davit::stack::{Op, Stack, transaction};
+use davit::system::{System, step};
+use davit::transaction::PartEnd;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use std::cell::Cell;
+use std::sync::Arc;
+
+/// The same types, of which starting, stopping and half of the operations move something.
+fn moving(catalogue: &Catalogue) -> Arc<Catalogue> {
+    let mut all = Catalogue::new();
+    for ty in catalogue.iter() {
+        let mut ty = (**ty).clone();
+        (ty.moves.start, ty.moves.stop) = (true, true);
+        ty.operations.values_mut().step_by(2).for_each(|operation| operation.moves = true);
+        assert!(all.insert(ty).is_none(), "each once");
+    }
+    Arc::new(all)
+}
+
+#[test]
+fn no_automatic_rollback_moves_anything() {
+    let (rollbacks, withheld, moved) = (Cell::new(0), Cell::new(0), Cell::new(0));
+    let cases = (
+        generate::types(),
+        generate::configs(2..6),
+        any::<bool>(),
+        any::<bool>(),
+        1usize..12,
+        prop::collection::vec(any::<u8>(), 24),
+    );
+    let mut runner = TestRunner::new(settings());
+    let ran = runner.run(&cases, |(types, genes, undo, asked, fail, picks)| {
+        let mut system = System::new(moving(&generate::catalogue(&types, false)));
+        let mut stack = Stack::new(8);
+        let (last, first) = genes.split_last().unwrap();
+        for gene in first {
+            let conf = read(gene, &system);
+            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
+            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
+            stack.commit(push);
+        }
+        let mut conf = read(last, &system);
+        if asked {
+            conf.on_failure = OnFailure::Rollback;
+        }
+        let op = if undo { Op::UndoTop } else { operator(&conf) };
+        let Ok(planned) = transaction(&system, &stack, &[op], &context()) else { return Ok(()) };
+        let mut bench = Bench::new(&system, vec![fail], picks);
+        let ends = bench.drive(planned);
+        rollbacks.set(rollbacks.get() + usize::from(bench.back > 0));
+        let broken = ends.iter().find_map(|end| match end {
+            PartEnd::Broken(broken) => Some(broken),
+            _ => None,
+        });
+        let held_back = broken.and_then(|broken| broken.residual.withheld.clone());
+        withheld.set(withheld.get() + usize::from(held_back.is_some()));
+        if asked && !undo {
+            // Asked for, it goes back whatever moves.
+            prop_assert_eq!(held_back, None);
+            moved.set(moved.get() + usize::from(!bench.moved_back.is_empty()));
+        } else {
+            prop_assert!(bench.moved_back.is_empty(), "{:?}", bench.moved_back);
+        }
+        Ok(())
+    });
+    ran.unwrap_or_else(|failed| panic!("{failed}"));
+    let (rollbacks, withheld, moved) = (rollbacks.get(), withheld.get(), moved.get());
+    let enough = crate::cases() as usize / 10;
+    assert!(rollbacks >= enough && withheld >= enough / 4 && moved >= enough / 8, "{rollbacks} {withheld} {moved}");
+}
