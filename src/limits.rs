@@ -312,6 +312,10 @@ pub const CHECK_CIRCLE: usize = 128;
 /// round for ever.
 pub const CHECK_DRIVEN: usize = 10_000;
 
+/// Between two moves of a way that a script replays: what is to happen at one instant on the way must not happen then by
+/// chance in another order.
+pub const REPLAY_STEP: Duration = Duration::from_millis(20);
+
 /// Circles of answers that are told; more of them say nothing new.
 pub const CHECK_TOLD: usize = 4;
 

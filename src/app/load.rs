@@ -114,10 +114,28 @@ fn read_loaded(loaded: Loaded, libraries: &Libraries) -> Result<Read, Refused> {
 /// # Errors
 /// [`Refused`] with everything that reading and checking found.
 pub fn check(read: Read) -> Result<Checked, Refused> {
+    checked(read, |report| report.checked.take())
+}
+
+/// The same for a deployment that is to go a way that `davit check` found, on the simulated platform: what was found by
+/// following its coordinators does not refuse it.
+///
+/// # Errors
+/// [`Refused`] with all other findings.
+pub fn check_to_replay(read: Read) -> Result<Checked, Refused> {
+    checked(read, |report| report.replayed.take())
+}
+
+fn checked(
+    read: Read,
+    take: impl FnOnce(&mut Report) -> Option<check::Checked<crate::model::Deployment>>,
+) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, sources, findings: before } = read;
-    let Report { checked, mut findings, .. } = check::run(deployment, &catalogue);
+    let mut report = check::run(deployment, &catalogue);
+    let taken = take(&mut report);
+    let mut findings = report.findings;
     findings.extend(before);
-    match checked {
+    match taken {
         Some(deployment) => Ok(Checked { deployment, catalogue, libraries, sources, findings }),
         None => Err(Refused { findings, sources, unreadable: false }),
     }

@@ -5,5 +5,5 @@ mod load;
 pub mod script;
 mod start;
 
-pub use load::{Checked, Read, Refused, check, read, read_but_for};
+pub use load::{Checked, Read, Refused, check, check_to_replay, read, read_but_for};
 pub use start::{PLATFORMS, StartError, faults, reactions, start, start_on};

@@ -180,7 +180,16 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
             )?;
         }};
     }
-    function!("deploy", String, |h, _lua, file| deploy(h, &file));
+    function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| {
+        let replay = match options {
+            None => false,
+            Some(options) => {
+                option_names(&options, &["replay"])?;
+                options.get::<Option<bool>>("replay")?.unwrap_or(false)
+            }
+        };
+        deploy(h, &file, replay)
+    });
     function!("raise", String, |h, _lua, event| raise(h, &event));
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
         request(h, Some(&id), Ask::Apply, forced(options)?)
@@ -225,8 +234,8 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         (h.borrow().options.say)(&text);
         Ok(())
     });
-    function!("fault", (String, String, Option<f64>), |h, _lua, (step, how, times)| {
-        h.borrow_mut().faults.add(&step, &how, times)
+    function!("fault", (String, String, Option<f64>, Option<f64>), |h, _lua, (step, how, times, takes)| {
+        h.borrow_mut().faults.add(&step, &how, times, takes)
     });
     function!("shutdown", Option<Table>, |h, _lua, options| {
         let force = forced(options)?;
@@ -294,7 +303,7 @@ fn deadline(host: &Shared, seconds: f64) -> mlua::Result<Time> {
     Ok(clock(host).now() + Duration::from_secs_f64(seconds))
 }
 
-fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
+fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     if host.borrow().session.is_some() {
         return Err(error("a deployment is already up: call shutdown() before the next deploy"));
     }
@@ -304,10 +313,16 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
         let read = super::read(&path, &host.options.load, &host.options.libraries);
         let checked = read.and_then(|mut read| {
             read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
-            super::check(read)
+            if replay { super::check_to_replay(read) } else { super::check(read) }
         });
         (path, checked)
     };
+    if let Ok(checked) = &checked
+        && replay
+        && (checked.deployment.platform.as_str() != "simulated" || !clock(host).is_simulated())
+    {
+        return Err(error("a way is replayed with `--platform simulated --clock simulated` only"));
+    }
     let checked = checked.map_err(|refused| {
         host.borrow_mut().refused = Some((path, Box::new(refused)));
         error(format!("{file} is refused"))
@@ -320,7 +335,8 @@ fn deploy(host: &Shared, file: &str) -> mlua::Result<()> {
     if let Some(observer) = &host.borrow().options.observer {
         session.hub().observe(observer.clone());
     }
-    match session.bring_up() {
+    // A replay raises the events itself.
+    match if replay { Ok(()) } else { session.bring_up() } {
         Ok(()) => {
             let mut host = host.borrow_mut();
             host.mark = 0;

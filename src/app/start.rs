@@ -59,6 +59,7 @@ pub(super) fn rule(fault: &StepFault) -> FaultRule {
         FaultKind::Late => Fault::Hang { returns: Some(limits::FAULT_LATE) },
         FaultKind::Lost => Fault::LostRequest,
         FaultKind::Lie => Fault::FalseDone,
+        FaultKind::Slow => Fault::Slow(fault.takes),
     };
     FaultRule::on(&fault.step, what).times(fault.times)
 }

@@ -5,6 +5,7 @@
 
 use super::Explored;
 use super::product::Product;
+use super::replay::Replay;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
 use super::trace::{Answered, Happened, Place, TraceStep};
 use super::world::{EMPTY, Top};
@@ -353,19 +354,23 @@ impl Graph<'_, '_> {
             to = edge.from;
         }
         edges.reverse();
-        let mut steps = vec![TraceStep { what: Happened::Start, states: self.places(&self.states[0]) }];
-        for edge in edges {
-            let states = self.places(&self.states[edge.to as usize]);
-            let Some(place) = edge.place else {
-                let times = self.product.deployment.limits.stack;
-                steps.push(TraceStep { what: Happened::Rounds { times }, states });
-                continue;
-            };
-            if let Some(next) = self.nexts(edge.from).all.into_iter().nth(place as usize) {
-                steps.push(TraceStep { what: self.product.told(&next), states });
-            }
+        let start =
+            TraceStep { what: Happened::Start, states: self.places(&self.states[0]), replay: Replay::default() };
+        let mut way: Vec<(u32, Next)> = Vec::with_capacity(edges.len());
+        for edge in &edges {
+            let next = edge.place.and_then(|place| self.nexts(edge.from).all.into_iter().nth(place as usize));
+            let round = || Next::plain(Move::Rounds, self.states[edge.to as usize].clone(), Failed::Nothing);
+            let next = next.unwrap_or_else(round);
+            way.push((edge.from, Next { state: self.states[edge.to as usize].clone(), ..next }));
         }
-        steps
+        let pairs: Vec<(&State, &Next)> = way.iter().map(|(from, next)| (&self.states[*from as usize], next)).collect();
+        let replays = self.product.replay(&pairs);
+        let told = way.iter().zip(replays).map(|((_, next), replay)| TraceStep {
+            what: self.product.told(next),
+            states: self.product.places(&next.state),
+            replay,
+        });
+        std::iter::once(start).chain(told).collect()
     }
 
     fn find_ways(&mut self, class: Failed) {
@@ -466,6 +471,7 @@ impl Product<'_> {
                 },
             },
             Move::OthersDown => Happened::Down,
+            Move::Rounds => Happened::Rounds { times: self.deployment.limits.stack },
         }
     }
 }

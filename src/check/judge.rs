@@ -57,7 +57,10 @@ impl Graph<'_, '_> {
             if !said.insert((request.requester, request.ask, first.code, first.message.clone())) {
                 continue;
             }
-            let trace = self.trace(at);
+            let mut trace = self.trace(at);
+            if let Some(last) = trace.last_mut() {
+                last.replay.then = Some(request.ask.failed().event(request.ask));
+            }
             let finding = self.refused(at, &request, &reasons);
             // The reasons are findings of their own, each at its place.
             let number = self.product.member(request.requester);

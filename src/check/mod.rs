@@ -19,6 +19,7 @@ mod outside;
 mod product;
 mod purity;
 mod reactions;
+pub mod replay;
 mod safety;
 mod shape;
 mod simulated;
@@ -100,6 +101,9 @@ impl Explored {
 pub struct Report {
     /// The deployment, if nothing refuses it.
     pub checked: Option<Checked<Deployment>>,
+    /// The deployment, if whatever refuses it was found by following its coordinators: fit to be replayed on the simulated
+    /// platform, where the ways to that can be gone, and for nothing else.
+    pub replayed: Option<Checked<Deployment>>,
     /// Everything found, errors first.
     pub findings: Findings,
     /// Of each finding the shortest way to it from the start; empty: it needs none.
@@ -134,6 +138,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let mut traced: Traced = findings.into_iter().map(|finding| (finding, Vec::new())).collect();
     let mut explored = Explored::default();
     let mut left: BTreeSet<String> = BTreeSet::new();
+    let mut replayed = None;
     if charts.len() == all {
         let charts: Vec<&Chart> = charts.iter().collect();
         let mut findings = monitors::events(deployment, &charts);
@@ -150,6 +155,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         traced.extend(findings.into_iter().map(|finding| (finding, Vec::new())));
         // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
+            replayed = Some(Checked(shared.clone()));
             explored = follow(deployment, &views, &charts, catalogue, &mut traced, &mut left);
         }
     }
@@ -158,7 +164,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
     let left: Vec<String> = left.into_iter().collect();
     let verdict = Verdict::of(&findings, charts.len() == all, left.clone());
     let checked = (verdict != Verdict::Refused).then(|| Checked(shared.clone()));
-    Report { checked, findings, traces, explored, left, verdict }
+    Report { checked, replayed, findings, traces, explored, left, verdict }
 }
 
 /// Follows the coordinators, those together that have to do with each other. `left` is told what was left out.

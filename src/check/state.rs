@@ -128,6 +128,8 @@ pub enum Move {
     Operator(Ask),
     /// Coordinators that have nothing to do with these are down as well.
     OthersDown,
+    /// The same circle again and again, until frames are squashed.
+    Rounds,
 }
 
 /// The answers that a move gives.

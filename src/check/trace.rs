@@ -1,5 +1,6 @@
 //! Ways: how the deployment comes from its start to what a finding is about.
 
+use super::replay::Replay;
 use crate::model::Verdict;
 use serde::Serialize;
 use std::fmt;
@@ -12,6 +13,9 @@ pub struct TraceStep {
     pub what: Happened,
     /// The innermost states of the coordinators then, in the order of the deployment.
     pub states: Vec<Place>,
+    /// What a script does to bring it about.
+    #[serde(skip)]
+    pub replay: Replay,
 }
 
 /// Where a coordinator is.
@@ -89,6 +93,16 @@ pub struct Answered {
     pub answer: String,
     /// How it ended.
     pub verdict: Verdict,
+}
+
+impl TraceStep {
+    /// The answers that are given, as events.
+    pub fn answers(&self) -> Vec<&str> {
+        match &self.what {
+            Happened::Answer { answers } => answers.iter().map(|answered| answered.answer.as_str()).collect(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 impl fmt::Display for TraceStep {

@@ -3,7 +3,8 @@
 use super::drive::{self, Way};
 use super::judge::Traced;
 use super::product::Product;
-use super::state::State;
+use super::replay::Replay;
+use super::state::{Next, State};
 use super::trace::{Happened, TraceStep};
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::{Code, Coordinator, Finding, Severity};
@@ -48,13 +49,27 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
 /// The ways one after the other, as a trace from the start.
 fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
     let mut steps = Vec::new();
-    for (number, way) in ways.iter().enumerate() {
-        if number == 0 {
-            steps.push(TraceStep { what: Happened::Start, states: product.places(&way.from) });
+    let mut pairs: Vec<(&State, &Next)> = Vec::new();
+    for way in ways {
+        let mut from = &way.from;
+        for next in &way.moves {
+            pairs.push((from, next));
+            from = &next.state;
         }
-        let told =
-            way.moves.iter().map(|next| TraceStep { what: product.told(next), states: product.places(&next.state) });
-        steps.extend(told);
+    }
+    if let Some(first) = ways.first() {
+        let states = product.places(&first.from);
+        steps.push(TraceStep { what: Happened::Start, states, replay: Replay::default() });
+    }
+    let replays = product.replay(&pairs);
+    steps.extend(pairs.iter().zip(replays).map(|((_, next), replay)| TraceStep {
+        what: product.told(next),
+        states: product.places(&next.state),
+        replay,
+    }));
+    let refused = ways.last().and_then(|way| way.refused.as_ref());
+    if let (Some(last), Some((request, _))) = (steps.last_mut(), refused) {
+        last.replay.then = Some(request.ask.failed().event(request.ask));
     }
     steps
 }

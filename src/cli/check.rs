@@ -3,12 +3,13 @@
 use super::exit::Exit;
 use super::input::Input;
 use super::output::Style;
-use super::{Answer, Context, Run};
+use super::{Answer, Context, Run, replay};
 use crate::check::{self, Explored, Report, TraceStep, Verdict};
 use crate::diagnostics::{SourceMap, to_json};
 use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS};
 use crate::model::{Finding, Severity};
 use serde_json::json;
+use std::path::PathBuf;
 
 /// Check everything that can be known before a deployment runs: names, types, units, limits, configurations, and the
 /// coordinator through every order of events and answers.
@@ -16,6 +17,9 @@ use serde_json::json;
 /// What it comes to is *sound* (everything was followed, nothing found but notes), *sound as far as followed* (a bound was
 /// hit, and which), *has warnings* or *refused*. Exit status: 0 nothing refuses it; 1 it is refused (with `--strict`: it is
 /// not *sound*); 2 a file is missing or does not parse.
+///
+/// `--trace N` shows the shortest way to the N-th finding, and with `--as way.lua` writes a script that goes it:
+/// `davit run way.lua --clock simulated --platform simulated`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -32,6 +36,9 @@ pub struct Args {
     /// Show the shortest way to the N-th finding, and nothing else.
     #[arg(long, value_name = "N", conflicts_with_all = ["json", "notes"])]
     trace: Option<usize>,
+    /// With `--trace`: write a script to this file that goes that way on the simulated platform.
+    #[arg(long = "as", value_name = "SCRIPT", requires = "trace")]
+    script: Option<PathBuf>,
 }
 
 impl Run for Args {
@@ -41,6 +48,7 @@ impl Run for Args {
             Err(failure) if self.json => {
                 let report = Report {
                     checked: None,
+                    replayed: None,
                     traces: Vec::new(),
                     findings: failure.findings,
                     explored: Explored::default(),
@@ -73,7 +81,7 @@ impl Run for Args {
         }
         let out = &context.out;
         if let Some(number) = self.trace {
-            return Ok(show_way(context, &report, number, exit));
+            return self.way(context, &report, number, exit);
         }
         // Errors come first, notes last.
         let notes = report.findings.iter().position(|f| f.severity == Severity::Info).filter(|_| !self.notes);
@@ -116,14 +124,34 @@ impl Run for Args {
     }
 }
 
-/// The way to the N-th finding, counted from 1.
-fn show_way(context: &Context, report: &Report, number: usize, exit: Exit) -> Exit {
-    let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
-    let Some((finding, trace)) = found else {
-        let there = report.findings.len();
-        context.out.error(format!("there is no finding {number}: there are {there}, counted from 1\n"));
-        return Exit::Usage;
-    };
+impl Args {
+    /// The way to the N-th finding, counted from 1, shown or as a script.
+    fn way(&self, context: &Context, report: &Report, number: usize, exit: Exit) -> Answer {
+        let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
+        let Some((finding, trace)) = found else {
+            let there = report.findings.len();
+            context.out.error(format!("there is no finding {number}: there are {there}, counted from 1\n"));
+            return Ok(Exit::Usage);
+        };
+        let Some(to) = &self.script else { return Ok(show_way(context, finding, trace, exit)) };
+        let file = std::fs::canonicalize(&self.input.file).unwrap_or_else(|_| self.input.file.clone());
+        let text = match replay::script(&file, finding, trace) {
+            Ok(text) => text,
+            Err(why) => {
+                context.out.error(format!("finding {number}: {why}\n"));
+                return Ok(Exit::No);
+            }
+        };
+        if let Err(e) = std::fs::write(to, text) {
+            context.out.error(format!("{}: {e}\n", to.display()));
+            return Ok(Exit::Usage);
+        }
+        context.out.line(format!("{}: davit run {0} --clock simulated --platform simulated", to.display()));
+        Ok(exit)
+    }
+}
+
+fn show_way(context: &Context, finding: &Finding, trace: &[TraceStep], exit: Exit) -> Exit {
     context.out.line(format!("{}: {}", finding.code, finding.message));
     if trace.is_empty() {
         context.out.line("  it stands in the text: no way leads to it");

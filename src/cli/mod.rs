@@ -23,6 +23,7 @@ mod plan_view;
 mod progress;
 mod recover;
 mod remote;
+mod replay;
 mod request;
 mod run;
 mod shutdown;

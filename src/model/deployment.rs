@@ -112,6 +112,8 @@ pub struct StepFault {
     pub how: FaultKind,
     /// How many times, 1 or more; after that the step goes well.
     pub times: u32,
+    /// How long it takes, where it is slow; zero else.
+    pub takes: Duration,
     /// Where it was written.
     pub origin: Origin,
 }
@@ -132,12 +134,20 @@ pub enum FaultKind {
     Lost,
     /// It is not done, and the answer says at once that it was.
     Lie,
+    /// It takes so long ([`StepFault::takes`]), and can be given up meanwhile. What else goes wrong with it does so then.
+    Slow,
 }
 
 impl FaultKind {
     /// All, with the words they are written by.
-    pub const NAMES: [(&'static str, Self); 5] =
-        [("fail", Self::Fail), ("hang", Self::Hang), ("late", Self::Late), ("lost", Self::Lost), ("lie", Self::Lie)];
+    pub const NAMES: [(&'static str, Self); 6] = [
+        ("fail", Self::Fail),
+        ("hang", Self::Hang),
+        ("late", Self::Late),
+        ("lost", Self::Lost),
+        ("lie", Self::Lie),
+        ("slow", Self::Slow),
+    ];
 
     /// Its word.
     pub fn word(self) -> &'static str {
@@ -147,6 +157,7 @@ impl FaultKind {
             Self::Late => "late",
             Self::Lost => "lost",
             Self::Lie => "lie",
+            Self::Slow => "slow",
         }
     }
 }

@@ -397,6 +397,12 @@ impl Chart {
         self.timers.get(self.nodes[state.index()].timer as usize).map(|timer| timer.event)
     }
 
+    /// How long a time event takes from the entry of its state, where it takes always the same.
+    pub fn time_of(&self, event: EventId) -> Option<std::time::Duration> {
+        let timer = self.timers.iter().find(|timer| timer.event == event && timer.relative)?;
+        u64::try_from(timer.nanos).ok().map(std::time::Duration::from_nanos)
+    }
+
     /// The text of an event (`other` for those that the chart does not know).
     pub fn event_text(&self, event: EventId) -> String {
         match event {

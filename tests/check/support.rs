@@ -68,8 +68,31 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
 
     /// What `check` says.
     pub fn check(&self) -> Said {
-        let ran = self.demo.run(&["check", "small.yaml", "--json"]);
-        Said(ran.json())
+        let said = Said(self.demo.run(&["check", "small.yaml", "--json"]).json());
+        self.replay(&said);
+        said
+    }
+
+    /// Goes the way to each finding by its script: the same answers come, and it ends in the same states.
+    fn replay(&self, said: &Said) {
+        for (number, finding) in (1..).zip(said.0["findings"].as_array().unwrap()) {
+            let Some(trace) = finding["trace"].as_array().filter(|trace| !trace.is_empty()) else { continue };
+            let (number, script) = (number.to_string(), format!("way{number}.lua"));
+            let made = self.demo.run(&["check", "small.yaml", "--trace", &number, "--as", &script]);
+            if made.err.contains("no script goes this way") {
+                let cannot = ["lost", "rounds", "down"];
+                let told = trace.iter().any(|step| cannot.contains(&step["what"].as_str().unwrap()));
+                assert!(
+                    told || ["on its way", "at once", "at different times"].iter().any(|why| made.err.contains(why)),
+                    "{}",
+                    made.err
+                );
+                continue;
+            }
+            let ran = self.demo.run(&["run", &script, "--clock", "simulated", "--platform", "simulated"]);
+            let text = std::fs::read_to_string(self.demo.path(&script)).unwrap();
+            assert!(!ran.err.contains("davit::script"), "{finding:#}\n{text}\n{}{}", ran.out, ran.err);
+        }
     }
 }
 

@@ -411,8 +411,12 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             SimulatedReaction { after, delay, raise, component, origin: Origin::NONE }
         });
     let how = prop::sample::select(FaultKind::NAMES.to_vec()).prop_map(|(_, how)| how);
-    let fault = ("(start|stop|property_set) [a-z]{1,4}(\\.[a-z])?", how, 1_u32..4)
-        .prop_map(|(step, how, times)| StepFault { step, how, times, origin: Origin::NONE });
+    let fault = ("(start|stop|property_set) [a-z]{1,4}(\\.[a-z])?", how, 1_u32..4, time()).prop_map(
+        |(step, how, times, takes)| {
+            let takes = if how == FaultKind::Slow { takes } else { Duration::ZERO };
+            StepFault { step, how, times, takes, origin: Origin::NONE }
+        },
+    );
     let limits = (1_usize..100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
     let may = prop_oneof![config_id().prop_map(OperatorMay::Apply), member().prop_map(OperatorMay::Set)];
     let watched = (btree_set(event(), 0..3).prop_map(placed), btree_set(may, 0..3).prop_map(placed));

@@ -8,6 +8,7 @@ use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{FaultKind, Origin, StepFault};
 use crate::platform::simulated::Simulated;
+use std::time::Duration;
 
 /// What a script lets go wrong.
 #[derive(Default)]
@@ -20,7 +21,7 @@ pub(super) struct Faults {
 
 impl Faults {
     /// From now on this goes wrong; without a deployment, from the beginning of the next one.
-    pub(super) fn add(&mut self, step: &str, how: &str, times: Option<f64>) -> mlua::Result<()> {
+    pub(super) fn add(&mut self, step: &str, how: &str, times: Option<f64>, takes: Option<f64>) -> mlua::Result<()> {
         // One blank between words, as steps are printed.
         let step = step.split_whitespace().collect::<Vec<_>>().join(" ");
         let kind = FaultKind::NAMES.iter().find(|(word, _)| *word == how);
@@ -28,7 +29,20 @@ impl Faults {
             let help = did_you_mean(how, "kinds of fault", FaultKind::NAMES.map(|(word, _)| word));
             error(format!("`{how}` is no kind of fault: {help}"))
         })?;
-        let fault = StepFault { step, how, times: whole(times.unwrap_or(1.0))?, origin: Origin::NONE };
+        let takes = match (how, takes) {
+            (FaultKind::Slow, Some(takes)) if (0.0..=1e6).contains(&takes) => Duration::from_secs_f64(takes),
+            (FaultKind::Slow, Some(takes)) => {
+                return Err(error(format!("{takes} is not a number of seconds from 0 to 1000000")));
+            }
+            (FaultKind::Slow, None) => {
+                return Err(error(
+                    "how long does it take? Write it like fault(\"start a\", \"slow\", 1, 0.5), in seconds",
+                ));
+            }
+            (_, Some(_)) => return Err(error("only what is \"slow\" takes time")),
+            (_, None) => Duration::ZERO,
+        };
+        let fault = StepFault { step, how, times: whole(times.unwrap_or(1.0))?, takes, origin: Origin::NONE };
         match &self.up {
             None => self.waiting.push(fault),
             Some((checked, simulated)) => {

@@ -72,8 +72,17 @@ fn fault(cx: &mut Cx, node: Node) -> Option<StepFault> {
     let how = how.and_then(|node| choice(cx, &node, "`how`", &FaultKind::NAMES));
     let times =
         fields.take("times").map(|node| whole(cx, &node, "`times`", 1..=i64::from(limits::FAULT_TIMES), "times: 1"));
+    let takes = match (how, fields.take("takes_s")) {
+        (_, Some(node)) if how.is_some_and(|how| how != FaultKind::Slow) => {
+            cx.wrong(&node, "`takes_s`", "nothing: only `slow` takes time", "how: slow, takes_s: 0.5");
+            None
+        }
+        (_, Some(node)) => time(cx, &node, "`takes_s`", Unit::Seconds, "takes_s: 0.5"),
+        (Some(FaultKind::Slow), None) => fields.required(cx, "takes_s", "takes_s: 0.5").and(None),
+        (_, None) => Some(std::time::Duration::ZERO),
+    };
     fields.finish(cx);
     let times = times.unwrap_or(Some(1)).and_then(|n| u32::try_from(n).ok());
     let (step, origin) = step?;
-    Some(StepFault { step, how: how?, times: times?, origin })
+    Some(StepFault { step, how: how?, times: times?, takes: takes?, origin })
 }

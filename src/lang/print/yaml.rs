@@ -416,7 +416,8 @@ pub fn deployment_yaml(
     }
     for fault in &d.faults {
         let times = if fault.times == 1 { String::new() } else { format!(", times: {}", fault.times) };
-        _ = writeln!(out, "  - {{ step: {}, how: {}{times} }}", text(&fault.step), fault.how.word());
+        let takes = if fault.takes.is_zero() { String::new() } else { format!(", takes_s: {}", seconds(fault.takes)) };
+        _ = writeln!(out, "  - {{ step: {}, how: {}{takes}{times} }}", text(&fault.step), fault.how.word());
     }
     out
 }

@@ -60,6 +60,8 @@ pub enum Fault {
     Panic,
     /// It takes as long as [`Delays`] say, and when it is given up the component takes no notice.
     Deaf,
+    /// It takes so long instead of what [`Delays`] say. The first other fault that fits hits it as well.
+    Slow(Duration),
 }
 
 /// Which executed step a fault hits: all conditions given must hold.

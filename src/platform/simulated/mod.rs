@@ -140,21 +140,31 @@ impl Shared {
 }
 
 impl State {
-    /// The fault that hits the step asked for now, if one does.
-    fn fault(&mut self, step: &Step) -> Option<Fault> {
+    /// The fault that hits the step asked for now, if one does, and how long it takes, if it is slow.
+    fn fault(&mut self, step: &Step) -> (Option<Fault>, Option<Duration>) {
         self.asked += 1;
         let (asked, chance) = (self.asked, &mut self.chance);
+        let (mut found, mut slow) = (None, None);
         for (rule, fired) in self.faults.rules.iter().zip(&mut self.fired) {
-            let hit = *fired < rule.times
+            let takes = if let Fault::Slow(takes) = rule.fault { Some(takes) } else { None };
+            let known = if takes.is_some() { slow.is_some() } else { found.is_some() };
+            let hit = !known
+                && *fired < rule.times
                 && rule.when.nth.is_none_or(|nth| nth == asked)
                 && rule.when.pattern.as_ref().is_none_or(|pattern| pattern.matches(step))
                 && rule.when.chance.is_none_or(|p| chance.unit() < p);
             if hit {
                 *fired += 1;
-                return Some(rule.fault.clone());
+                match takes {
+                    Some(_) => slow = takes,
+                    None => found = Some(rule.fault.clone()),
+                }
+            }
+            if found.is_some() && slow.is_some() {
+                break;
             }
         }
-        None
+        (found, slow)
     }
 
     fn delay(&mut self, step: &Step) -> Duration {

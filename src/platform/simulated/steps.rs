@@ -27,11 +27,11 @@ impl Simulated {
                 }
                 return Self::now(&mut state, step);
             }
-            let fault = state.fault(step);
+            let (fault, slow) = state.fault(step);
             if state.quarantined(step, safe) {
                 return Outcome::NotDone(Cause::Quarantined);
             }
-            (fault, state.delay(step), state.calls.is_empty())
+            (fault, slow.unwrap_or_else(|| state.delay(step)), state.calls.is_empty())
         };
         if delay.is_zero() && alone {
             return self.carry_out(step, fault, None, deadline);

@@ -1,0 +1,221 @@
+//! How a way is gone on the simulated platform: when what is to be raised, and which steps must be slow or go wrong so that
+//! the answers come as they do on the way.
+//!
+//! One thing happens at a time: the moves of a way are [`limits::REPLAY_STEP`] apart, and a batch that is under way for
+//! several of them has a slow step as long. What has no step takes no time: a way on which such a batch is still under way
+//! when something else happens is gone in another order, and a script that replays it fails there.
+
+use super::product::Product;
+use super::state::{Move, Next, State};
+use crate::limits;
+use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
+use crate::stack::Request;
+use smallvec::SmallVec;
+use std::time::Duration;
+
+/// What a move of a way needs.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Replay {
+    /// When it happens, from the beginning.
+    pub at: Duration,
+    /// What is armed before it: the text of a step, how it goes, and how long it takes.
+    pub arms: Vec<(String, FaultKind, Duration)>,
+    /// What is to be done for it.
+    pub does: Does,
+    /// At the end of a way: an answer that comes there at once, without being part of it.
+    pub then: Option<EventName>,
+}
+
+/// What is to be done for a move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Does {
+    /// It comes by itself.
+    #[default]
+    Nothing,
+    /// This event is raised.
+    Raise(EventName),
+    /// An operator asks for this.
+    Ask(Ask),
+    /// No script brings it about, and why.
+    Cannot(&'static str),
+}
+
+/// A batch that begins on a way.
+struct Begun {
+    /// At which move.
+    at: usize,
+    requests: SmallVec<[Request; 2]>,
+    /// At which move it is over; none: it is still under way at the end.
+    over: Option<usize>,
+    /// It has no step to do: it is answered at once.
+    idle: bool,
+}
+
+impl Product<'_> {
+    /// What each move of a way needs. `way` has the state before each move.
+    pub fn replay(&self, way: &[(&State, &Next)]) -> Vec<Replay> {
+        let begun = self.begun(way);
+        let times = self.times(way, &begun);
+        let mut all: Vec<Replay> = (way.iter().zip(&times))
+            .map(|((_, next), at)| Replay { at: *at, arms: Vec::new(), does: self.does(next), then: None })
+            .collect();
+        // What comes at the instant of something else is armed before that.
+        let own_time = |k: usize| k == 0 || times[k] > times[k - 1];
+        for k in (0..way.len()).filter(|k| own_time(*k) && !way[*k].0.inbox.is_empty()) {
+            all[k].does = Does::Cannot("coordinators hear at different times of one event");
+        }
+        for batch in &begun {
+            let last = times.last().copied().unwrap_or_default() + limits::REPLAY_STEP;
+            let until = batch.over.map_or(last, |at| times[at]);
+            let answers = batch.over.map_or(&[][..], |at| &way[at].1.answers);
+            if batch.idle && until > times[batch.at] && batch.over.is_some() {
+                all[batch.at].does = Does::Cannot("what has nothing to do is answered at once");
+            }
+            // As it is planned when it is answered; at the end of the way it may have become one that is refused.
+            let state = batch.over.map_or(&way[way.len() - 1].1.state, |at| way[at].0);
+            let arms = self.arms(state, &batch.requests, answers, until.saturating_sub(times[batch.at]));
+            let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);
+            all[armed].arms.extend(arms);
+        }
+        all
+    }
+
+    /// When each move happens.
+    fn times(&self, way: &[(&State, &Next)], begun: &[Begun]) -> Vec<Duration> {
+        let mut times: Vec<Duration> = Vec::with_capacity(way.len());
+        for (k, (_, next)) in way.iter().enumerate() {
+            let before = times.last().copied().unwrap_or_default();
+            let of = |request: &Request| begun.iter().find(|b| b.over == Some(k) && b.requests.contains(request));
+            let at_once = match next.by {
+                Move::Taken(..) => true,
+                Move::Answer => next.answers.iter().all(|(request, _)| of(request).is_none_or(|batch| batch.idle)),
+                _ => false,
+            };
+            let mut at = if at_once { before } else { before + limits::REPLAY_STEP };
+            for (request, verdict) in &next.answers {
+                let since = match verdict {
+                    Verdict::Reverted => self.applied_at(way, &times, k, request.ask),
+                    // Nobody knows what became of a call until its time is over.
+                    Verdict::Broken | Verdict::UndoBroken => {
+                        of(request).and_then(|b| times.get(b.at)).map(|at| *at + self.patience(request.ask))
+                    }
+                    _ => None,
+                };
+                at = at.max(since.map_or(at, |since| since + limits::REPLAY_STEP));
+            }
+            if let Move::Time(number, event) = next.by {
+                at += self.members[usize::from(number)].chart.time_of(event).unwrap_or_default();
+            }
+            times.push(at);
+        }
+        times
+    }
+
+    /// The batches that begin on a way, and safe configurations.
+    fn begun(&self, way: &[(&State, &Next)]) -> Vec<Begun> {
+        let mut all: Vec<Begun> = Vec::new();
+        for (k, (before, next)) in way.iter().enumerate() {
+            let known = under_way(before);
+            for requests in under_way(&next.state) {
+                if known.iter().any(|other| same(other, &requests)) {
+                    continue;
+                }
+                let gone = |next: &Next| !under_way(&next.state).iter().any(|other| same(other, &requests));
+                let over = way[k + 1..].iter().position(|(_, next)| gone(next)).map(|after| k + 1 + after);
+                let group = self.worlds.group(next.state.world, &requests);
+                let idle = group.is_some_and(|group| group.planned.is_none_or(|planned| planned.steps.is_empty()));
+                // As they are when they are answered: whoever asked may have left the state that hears it.
+                let requests = over.map_or(requests.clone(), |at| {
+                    under_way(way[at].0).into_iter().find(|other| same(other, &requests)).unwrap_or(requests.clone())
+                });
+                all.push(Begun { at: k, requests, over, idle });
+            }
+        }
+        all
+    }
+
+    /// What must be slow or go wrong for a batch that begins in a state.
+    fn arms(
+        &self,
+        state: &State,
+        requests: &[Request],
+        answers: &[(Request, Verdict)],
+        takes: Duration,
+    ) -> Vec<(String, FaultKind, Duration)> {
+        let mut arms = Vec::new();
+        let Some(group) = self.worlds.group(state.world, requests) else { return arms };
+        let Some(planned) = &group.planned else { return arms };
+        let text = |at: usize| pattern(&planned.steps[at].step);
+        if let Some(first) = planned.steps.first()
+            && !takes.is_zero()
+        {
+            arms.push((pattern(&first.step), FaultKind::Slow, takes));
+        }
+        for (part, place) in group.places.iter().enumerate() {
+            let request = requests[*place];
+            let how = match answers.iter().find(|(r, _)| *r == request).map(|(_, verdict)| *verdict) {
+                Some(Verdict::Failed | Verdict::UndoFailed) => FaultKind::Fail,
+                Some(Verdict::Broken | Verdict::UndoBroken) => FaultKind::Hang,
+                _ => continue,
+            };
+            let first = (0..planned.steps.len()).find(|at| planned.part_of(planned.place(*at)) == part);
+            arms.extend(first.map(|at| (text(at), how, Duration::ZERO)));
+        }
+        arms
+    }
+
+    fn does(&self, next: &Next) -> Does {
+        if !next.state.flight.is_empty() {
+            return Does::Cannot("an answer comes while what would stop it is on its way");
+        }
+        match next.by {
+            Move::Event(at) => Does::Raise(self.outside[usize::from(at)]),
+            Move::Confirmed(id) => match self.worlds.configuration(id).and_then(|c| c.confirm) {
+                Some(confirm) => Does::Raise(confirm.event),
+                None => Does::Nothing,
+            },
+            Move::Operator(ask) => Does::Ask(ask),
+            Move::Lost(_) => Does::Cannot("what a configuration stands for is lost by what components do"),
+            Move::Rounds => Does::Cannot("the same happens again and again, until frames are squashed"),
+            Move::OthersDown => Does::Cannot("other coordinators go down"),
+            Move::Time(..) | Move::Taken(..) | Move::Answer => Does::Nothing,
+        }
+    }
+
+    /// When the frame whose confirmation did not come is taken back.
+    fn applied_at(&self, way: &[(&State, &Next)], times: &[Duration], before: usize, ask: Ask) -> Option<Duration> {
+        let Ask::Apply(id) = ask else { return None };
+        let within = self.worlds.configuration(id)?.confirm?.within;
+        let applied = |k: &usize| way[*k].1.answers.iter().any(|(r, verdict)| r.ask == ask && *verdict == Verdict::Ok);
+        (0..before).rev().find(applied).map(|k| times[k] + within)
+    }
+
+    /// How long a step of a request may take.
+    fn patience(&self, ask: Ask) -> Duration {
+        let of = |id: ConfigId| self.worlds.configuration(id).and_then(|c| c.timeout);
+        let own = match ask {
+            Ask::Apply(id) | Ask::UndoOf(id) => of(id),
+            _ => None,
+        };
+        own.unwrap_or(self.deployment.limits.step_timeout)
+    }
+}
+
+/// The text of a step without its values: which, not how.
+fn pattern(step: &Step) -> String {
+    let text = step.to_string();
+    let end = ["(", " = ", " : "].iter().filter_map(|mark| text.find(mark)).min().unwrap_or(text.len());
+    text[..end].trim_end().to_owned()
+}
+
+/// The requests of each batch under way, and each safe configuration that is being applied.
+fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
+    let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
+    batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
+}
+
+/// Whether two lists ask for the same.
+fn same(a: &[Request], b: &[Request]) -> bool {
+    let what = |request: &Request| (request.ask, request.requester);
+    a.iter().map(what).eq(b.iter().map(what))
+}
