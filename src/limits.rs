@@ -312,6 +312,10 @@ pub const CHECK_CIRCLE: usize = 128;
 /// round for ever.
 pub const CHECK_DRIVEN: usize = 10_000;
 
+/// How often what is there is taken away by force, where something is left of it: once more for what failed by chance, and
+/// once for what that uncovers.
+pub const FORCE_ROUNDS: usize = 3;
+
 /// Between two moves of a way that a script replays: what is to happen at one instant on the way must not happen then by
 /// chance in another order.
 pub const REPLAY_STEP: Duration = Duration::from_millis(20);

@@ -93,6 +93,13 @@ impl Engine {
 
     /// Recovers what is broken; the error is what remains.
     pub(super) fn recover(&mut self, direction: Recovery) -> Result<(), Arc<Residual>> {
+        let partial = self.world.stack.frames().iter().any(|frame| frame.partial);
+        if self.world.broken.is_empty() && !partial {
+            return Ok(());
+        }
+        if !self.running.is_empty() {
+            return Err(Arc::new(Residual::of(Reason::Busy)));
+        }
         match direction {
             Recovery::Back => self.recover_back(),
             Recovery::Accept => match self.look() {

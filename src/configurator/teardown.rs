@@ -4,6 +4,7 @@ use super::control::{Command, TakenDown};
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
+use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlannedStep, Stage};
 use crate::stack::{Broken, Effort, Op, Part, Planned, Requester, Residual, Why, effort, transaction};
@@ -179,8 +180,21 @@ impl Engine {
         Spec { until, timeout: Duration::ZERO, patience: self.limits.step_timeout, best_effort: true, asked_back: true }
     }
 
-    /// Removes what is there by the difference to nothing.
+    /// Removes what is there by the difference to nothing, again where something is left: a step that failed once need not
+    /// fail twice.
     fn remove_all(&mut self, down: &mut TakenDown, deadline: Time) {
+        let before = down.troubles.len();
+        for _ in 0..limits::FORCE_ROUNDS {
+            down.troubles.truncate(before);
+            self.remove(down, deadline);
+            let hung = &down.quarantined;
+            if down.observed && down.left.components.keys().all(|component| hung.contains(component)) {
+                return;
+            }
+        }
+    }
+
+    fn remove(&mut self, down: &mut TakenDown, deadline: Time) {
         if let Some(seen) = self.look()
             && let Err(unknown) = self.adopt(&seen)
         {
@@ -197,7 +211,7 @@ impl Engine {
         );
         let machine = Transaction::new(own_plan(work, &self.world.system), self.effort(deadline));
         let done = self.carry_out(machine);
-        down.forced = done.done_so_far().map(|(planned, _)| planned.step.clone()).collect();
+        down.forced.extend(done.done_so_far().map(|(planned, _)| planned.step.clone()));
         down.troubles.extend(troubles_of(done));
         match self.look() {
             Some(seen) => {

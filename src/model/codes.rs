@@ -557,6 +557,9 @@ codes! {
         "While a frame of a `safe` configuration is in force nothing moves, except by a request that the coordinator raises in \
          a later step: an undo raised in the same step as the safe configuration is refused when a step of it moves, and so \
          is an operator's request without `--force`. Nothing was done.";
+    MOVES_UNASKED = "run::moves_unasked", "something would move that nobody asked to move",
+        "A confirmation did not come in time, and taking the configuration back would move hardware. Nobody asked for that: the \
+         frame stays, the answer is `ID.undo.failed`. `on_failure = \"rollback\"` in the configuration lets it move.";
     BUSY = "run::busy", "what the request needs is being worked on",
         "Undoing down to a number of frames, committing, recovering and undoing the frame of somebody else need that nothing \
          is under way or waiting that concerns the same components. Nothing was done. Ask again when it is quiet.";

@@ -70,6 +70,8 @@ pub enum Reason {
     SafeCame(ConfigId),
     /// It would move something while a `safe` configuration is in force.
     Moves(Step),
+    /// Something would move that nobody asked to move.
+    MovesUnasked(Step),
     /// What it needs is being worked on.
     Busy,
     /// A coordinator's frames are in force, and force was not asked for.
@@ -194,6 +196,9 @@ impl Reason {
             Self::Moves(_) => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
                 "let the coordinator ask for it in a later step, when it is meant to move again; an operator says `--force`",
             ),
+            Self::MovesUnasked(_) => Finding::error(codes::MOVES_UNASKED, self.to_string()).help(
+                "undo it when it may move, or write `on_failure = \"rollback\"` where it always may",
+            ),
             Self::Busy => Finding::error(codes::BUSY, self.to_string()).help("ask again when `davit status` shows nothing outstanding"),
             Self::NeedsForce(_) => Finding::error(codes::NEEDS_FORCE, self.to_string())
                 .help("undo only your own, or say `--force` if the coordinator's is meant"),
@@ -232,6 +237,7 @@ impl fmt::Display for Reason {
             Self::GivenUp => f.write_str("given up: its undo was asked for"),
             Self::SafeCame(by) => write!(f, "the safe configuration `{by}` was asked for while it waited"),
             Self::Moves(step) => write!(f, "`{step}` moves, and a safe configuration is in force"),
+            Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),
             Self::NeedsForce(id) => write!(f, "`{id}` is a frame of a coordinator"),
             Self::Broken(residual) => write!(f, "{residual}"),

@@ -8,7 +8,7 @@
 use super::work::{Op, Planned, Work};
 use super::{FrameId, Reason, Request, Requester, Why, World, claims, may_commit, share};
 
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, Step, Verdict, codes};
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
 use crate::system::Overlay;
 use crate::time::Time;
@@ -107,7 +107,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                     continue 'anew;
                 }
                 Ok(planned) => {
-                    if let Some((part, reason)) = forbidden(world, requests, &group, &planned) {
+                    if let Some((part, reason)) = forbidden(world, requests, &group, &planned, rules) {
                         let place = group.places[part];
                         refused.push(no(place, &requests[place], reason));
                         continue 'anew;
@@ -275,24 +275,40 @@ fn foreign(frames: &[std::sync::Arc<super::Frame>], request: &Request) -> Option
 
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would
 /// move that nobody may move.
-fn forbidden(world: &World, requests: &[Request], group: &Group, planned: &Planned) -> Option<(usize, Reason)> {
+fn forbidden(
+    world: &World,
+    requests: &[Request],
+    group: &Group,
+    planned: &Planned,
+    rules: &Rules<'_>,
+) -> Option<(usize, Reason)> {
     if !world.quarantined.is_empty() {
         let hindered = hindered(world, planned.steps.iter());
         if let Some((at, findings)) = hindered {
             return Some((planned.part_of(planned.place(at)), Reason::Refused(findings)));
         }
     }
+    // Nobody asked for a revert: it moves only where the configuration says so.
+    let unasked = |part: usize, request: &Request| {
+        let of = planned.parts[part].frame.as_ref().and_then(|frame| rules.configurations.get(&frame.configuration));
+        let may = of.is_some_and(|configuration| configuration.on_failure == OnFailure::Rollback);
+        matches!(request.why, Why::Unconfirmed(..)) && !may
+    };
     let safe = world.stack.safe().next().is_some();
     let still = |request: &Request| {
         request.still
             || safe && (request.requester == Requester::Operator || request.why != Why::Asked) && !request.force
     };
-    for (part, place) in group.places.iter().enumerate().filter(|(_, place)| still(&requests[**place])) {
-        let _ = place;
+    for (part, place) in group.places.iter().enumerate() {
+        let unasked = unasked(part, &requests[*place]);
+        if !unasked && !still(&requests[*place]) {
+            continue;
+        }
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
         if let Some((_, moving)) = own.find(|(_, planned)| planned.moves) {
-            return Some((part, Reason::Moves(moving.step.clone())));
+            let step = moving.step.clone();
+            return Some((part, if unasked { Reason::MovesUnasked(step) } else { Reason::Moves(step) }));
         }
     }
     None
