@@ -115,7 +115,8 @@ impl Transaction {
         // What a component that is made again does is known only then.
         let mut view = Overlay::new(live);
         let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
-        for i in forward.done.iter().rev().copied() {
+        // What may have happened counts as done: its compensation takes it back.
+        for i in self.perhaps_done().into_iter().rev().chain(forward.done.iter().rev().copied()) {
             if held || self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
@@ -148,6 +149,16 @@ impl Transaction {
             self.finish_before(part, live, &mut way);
         }
         way
+    }
+
+    /// Calls of which nobody knows whether they happened, and that a compensation takes back.
+    pub(super) fn perhaps_done(&self) -> Vec<u32> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let compensated = |i: &u32| {
+            let planned = &forward.list[*i as usize];
+            matches!((&planned.step, &planned.undo), (Step::Operation(_), Undo::One(Step::Operation(_))))
+        };
+        forward.unsettled.iter().copied().filter(compensated).collect()
     }
 
     /// Whether what was done of a part stays when it fails.

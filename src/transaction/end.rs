@@ -175,8 +175,8 @@ impl Transaction {
     /// Names the end. `whole`: `wanted` has nothing of what was done.
     fn judge(&mut self, part: usize, wanted: &System, whole: bool, observed: bool, live: &System, can: &Can<'_>) {
         let forward = self.forward.as_ref().expect("it was carried out");
-        let mut unsettled: Vec<Step> =
-            forward.unsettled.iter().map(|i| forward.list[*i as usize].step.clone()).collect();
+        let open = forward.unsettled.iter().filter(|i| !self.taken_back.contains(i));
+        let mut unsettled: Vec<Step> = open.map(|i| forward.list[*i as usize].step.clone()).collect();
         unsettled.append(&mut self.unsettled);
         let difference = diff(wanted, live);
         let mut faulted: Vec<ComponentName> = Vec::new();
@@ -272,7 +272,8 @@ impl Transaction {
             let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));
             open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
         } else {
-            let left = self.remaining(part).into_iter().filter(|i| self.part_of(*i) == part).rev();
+            let perhaps = self.perhaps_done().into_iter().filter(|i| !self.taken_back.contains(i));
+            let left = self.remaining(part).into_iter().chain(perhaps).filter(|i| self.part_of(*i) == part).rev();
             left.flat_map(|i| {
                 let of = &forward.list[i as usize];
                 self.steps_back(i, part).iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()

@@ -9,6 +9,7 @@ mod explored;
 mod faults;
 mod hot_swap;
 mod monitor;
+mod motion;
 mod recovery;
 mod several;
 mod simulated;

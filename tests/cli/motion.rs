@@ -1,0 +1,97 @@
+//! What moves, what nobody knows of, and what is taken away by force: scripts over a small deployment on the simulated
+//! platform.
+
+use crate::demo::Demo;
+
+const DEPLOYMENT: &str = "davit: 1
+name: small
+platform: simulated
+types:
+  T:
+    properties: { k: { type: float, default: 0.0 } }
+    operations:
+      up: { effect: { undo: dn }, moves: true }
+      dn: { effect: { undo: up }, moves: true }
+      open: { effect: { undo: close } }
+      close: { effect: { undo: open } }
+configurations: [conf.lua]
+coordinator: coordinator.lua
+deploy:   { event: e_start, up: up, within_s: 5 }
+shutdown: { event: e_stop, down: idle, within_s: 5 }
+";
+
+const CONFIGURATIONS: &str = r#"ConfiguratorConf {
+  base  = Configuration { create("a", "T"), post_conf_state = { "a:running" } },
+  lift  = Configuration { operation_call("a.up") },
+  open  = Configuration { operation_call("a.open") },
+  tried = Configuration { confirm = { event = "e_conf", within = 1.0 }, operation_call("a.up") },
+  meant = Configuration { confirm = { event = "e_conf", within = 1.0 }, on_failure = "rollback", operation_call("a.up") },
+}
+"#;
+
+const COORDINATOR: &str = r#"return state {
+  idle = state {}, building = state { entry = "base" }, up = state {}, removing = state { entry = "base.undo" },
+  trans { src = "initial", tgt = "idle" },
+  trans { src = "idle", tgt = "building", events = { "e_start" } },
+  trans { src = "building", tgt = "up", events = { "base.ok" } },
+  trans { src = "building", tgt = "removing", events = { "base.failed", "base.broken", "e_stop" } },
+  trans { src = "up", tgt = "removing", events = { "e_stop" } },
+  trans { src = "removing", tgt = "idle", events = { "base.undone", "base.undo.failed", "base.undo.broken" } },
+}
+"#;
+
+/// What a script says on stdout, with the steps of each answer; it must end well.
+fn run(script: &str) -> String {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", DEPLOYMENT);
+    demo.write("conf.lua", CONFIGURATIONS);
+    demo.write("coordinator.lua", COORDINATOR);
+    demo.write("story.lua", &format!("deploy('deployment.yaml')\n{script}"));
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--json"]);
+    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
+    ran.out
+}
+
+/// The steps of an answer, as the log has them.
+fn steps(log: &str, answer: &str) -> Vec<String> {
+    let lines = log.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let mut answered = lines.filter(|line| line["answer"] == answer);
+    let found = answered.next().unwrap_or_else(|| panic!("no `{answer}`: {log}"));
+    let steps = found["steps"].as_array().cloned().unwrap_or_default();
+    steps.iter().map(|step| step["step"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn a_call_that_may_have_happened_is_taken_back_by_its_compensation() {
+    // It does not move: at once.
+    let log = run("fault('operation_call a.open', 'lost') apply('open') wait_answer('open.failed', 5)");
+    assert_eq!(steps(&log, "open.failed"), ["operation_call a.open", "undo: operation_call a.close"]);
+    // It moves: when somebody asks for it, and what it was is told meanwhile.
+    let log = run("fault('operation_call a.up', 'lost') apply('lift') wait_answer('lift.broken', 5)
+        undo('lift') wait_answer('lift.undone', 5) assert(#stack() == 1)");
+    assert_eq!(steps(&log, "lift.broken"), ["operation_call a.up"]);
+    assert_eq!(steps(&log, "lift.undone"), ["operation_call a.dn"]);
+}
+
+#[test]
+fn a_confirmation_that_runs_out_moves_nothing_unasked() {
+    let log = run("apply('tried') wait_answer('tried.ok', 1) wait_answer('tried.undo.failed', 2) assert(#stack() == 2)
+        undo('tried') wait_answer('tried.undone', 1)");
+    assert!(steps(&log, "tried.undo.failed").is_empty(), "{log}");
+    assert!(log.contains("nobody asked for that"), "{log}");
+    let log = run("apply('meant') wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)");
+    assert_eq!(steps(&log, "meant.reverted"), ["operation_call a.dn"]);
+}
+
+#[test]
+fn force_tries_again_what_failed_once() {
+    for (step, how) in [("stop a", "fail"), ("destroy a", "fail"), ("destroy a", "lie"), ("cleanup a", "lost")] {
+        run(&format!("fault('{step}', '{how}') shutdown{{force = true}}"));
+    }
+}
+
+#[test]
+fn recover_leaves_alone_what_is_whole() {
+    run("apply('lift') wait_answer('lift.ok', 1) recover('accept') assert(#stack() == 2)
+        undo('lift') wait_answer('lift.undone', 1) recover('back') assert(#stack() == 1)");
+}
