@@ -55,7 +55,7 @@ impl Product<'_> {
         state.desk.requests_mut().for_each(gone);
         state.safe.iter_mut().for_each(gone);
         state.due.iter_mut().for_each(|(request, _)| gone(request));
-        state.due.retain(|(request, _)| request.tag.0 != 0);
+        state.due.retain(|(request, _)| self.tells_all || request.tag.0 != 0);
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
@@ -163,13 +163,13 @@ impl Product<'_> {
         self.due(state, undo, Verdict::Undone);
     }
 
-    /// An answer is on its way, if anybody waits for it.
+    /// An answer is on its way, if anybody waits for it (or all are to be given).
     fn due(&self, state: &mut State, request: Request, verdict: Verdict) {
         let listens = |number: usize| {
             let event = self.members[number].chart.event(verdict.event(request.ask));
             request.tag.0 != 0 && event != EventId::OTHER
         };
-        if self.member(request.requester).is_some_and(listens) {
+        if self.tells_all || self.member(request.requester).is_some_and(listens) {
             state.due.push((request, verdict));
         }
     }

@@ -45,6 +45,8 @@ pub struct Product<'a> {
     pub most_waiting: usize,
     /// Configurations that stand for something.
     pub holds: Vec<ConfigId>,
+    /// Answers that nobody hears are given as well.
+    pub tells_all: bool,
 }
 
 impl<'a> Product<'a> {
@@ -82,6 +84,7 @@ impl<'a> Product<'a> {
             races: true,
             most_waiting: limits::CHECK_WAITING,
             holds,
+            tells_all: false,
         };
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(&views[*number], charts, *number);
@@ -120,6 +123,15 @@ impl<'a> Product<'a> {
 
     /// All that follows from a state.
     pub fn nexts(&mut self, state: &State) -> Nexts {
+        let mut nexts = self.goes_on(state);
+        if state.flight.is_empty() && state.inbox.is_empty() {
+            self.comes_from_outside(state, &mut nexts);
+        }
+        nexts
+    }
+
+    /// What follows from a state without anything coming from outside.
+    pub(super) fn goes_on(&mut self, state: &State) -> Nexts {
         let mut nexts = Nexts::default();
         if let Some(batch) = state.flight.first() {
             // It comes once one of those that it would stop is over.
@@ -151,9 +163,6 @@ impl<'a> Product<'a> {
             let mut next = state.clone();
             let (_, event) = next.inbox.remove(at);
             self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
-        }
-        if state.inbox.is_empty() {
-            self.comes_from_outside(state, &mut nexts);
         }
         nexts
     }
