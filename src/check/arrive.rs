@@ -144,11 +144,14 @@ impl Product<'_> {
 
     /// What is under way is given up by its own undo.
     fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
-        let Some(turn) = state.desk.under_way().iter().find(|turn| turn.number == number) else { return };
-        let requests = turn.batch.requests.clone();
+        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
+        let requests = turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default();
         let Ask::UndoOf(id) = undo.ask else { return };
         let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
-        let Some(place) = requests.iter().position(fits) else { return };
+        let Some(place) = requests.iter().position(fits) else {
+            // Another undo of the same step has given it up already.
+            return self.due(state, undo, Verdict::Undone);
+        };
         let begun = match self.worlds.top(state.world) {
             Some(_) => place == 0,
             None => self.comes(state, &requests).parts.iter().any(|part| part.place == place),

@@ -171,7 +171,7 @@ impl Product<'_> {
             let mut given: Given = comes.told.clone();
             given.extend(comes.parts.iter().map(|part| (part.place, Some(requests[part.place].ask.failed()))));
             given.sort_by_key(|(place, _)| *place);
-            let went = comes.parts.first().map_or(&comes.done, |part| part.failed.as_ref().unwrap_or(&part.before));
+            let went = &comes.interrupted;
             // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
             let undo = comes.parts.iter().any(|part| part.undo);
             let class = if undo { Failed::Undo } else { Failed::Nothing };
@@ -222,20 +222,23 @@ impl Product<'_> {
         }
         let comes = self.worlds.safe(state.world, request);
         let from = nexts.all.len();
-        match &comes.done {
-            Ok(went) => {
-                let mut next = over.clone();
-                self.go(&mut next, went);
-                self.applied(&mut next, request, Verdict::Ok, went);
-                self.tell(next, Answers::from_iter([(*request, Verdict::Ok)]), Failed::Nothing, nexts);
-                nexts.all[from..].iter_mut().for_each(|next| next.deep = (went.deep, went.left));
-            }
-            Err(reasons) if request.requester != Requester::Operator => {
-                nexts.troubles.push(Trouble::Refused(*request, reasons.clone()));
-            }
-            Err(_) => {}
+        if !comes.troubles.is_empty() && request.requester != Requester::Operator {
+            nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
         }
-        if comes.may_fail {
+        // Where a piece of it cannot be planned, it is done as far as it goes, and all is known of that.
+        let (verdict, class) = match comes.troubles.is_empty() {
+            true => (Verdict::Ok, Failed::Nothing),
+            false => (Verdict::Broken, Failed::Broken),
+        };
+        let mut next = over.clone();
+        self.go(&mut next, &comes.done);
+        self.applied(&mut next, request, verdict, &comes.done);
+        self.tell(next, Answers::from_iter([(*request, verdict)]), class, nexts);
+        nexts.all[from..].iter_mut().for_each(|next| next.deep = (comes.done.deep, comes.done.left));
+        // What is under way may have made or changed what it finds, and goes on while it is applied.
+        let claim = self.worlds.claims.of([request]);
+        let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
+        if comes.may_fail || meets {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));

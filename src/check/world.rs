@@ -14,7 +14,7 @@ use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Fi
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
-    FrameId, Group, Op, Planned, Reason, Request, Requester, Rules, Stack, World, take_up, transaction,
+    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, take_up,
 };
 use crate::system::{System, View, step};
 use crate::time::Time;
@@ -91,6 +91,8 @@ pub struct Comes {
     pub parts: Vec<PartOf>,
     /// When all is done.
     pub done: Went,
+    /// When it is interrupted and taken back: frames that were to be undone with their states stay without them.
+    pub interrupted: Went,
     /// So many requests are settled then.
     pub takes: usize,
 }
@@ -98,8 +100,10 @@ pub struct Comes {
 /// What a safe configuration comes to.
 #[derive(Debug, Clone)]
 pub struct SafeComes {
-    /// The world with it; none: it is refused.
-    pub done: Result<Went, Rc<Findings>>,
+    /// When all of it is done that can be.
+    pub done: Went,
+    /// What of it cannot be done there: then it ends *broken*.
+    pub troubles: Rc<Findings>,
     /// Whether a step of it can fail.
     pub may_fail: bool,
 }
@@ -251,11 +255,13 @@ impl<'a> Worlds<'a> {
             };
             Some((told.place, Rc::new(reasons)))
         });
+        let nowhere = Went { world: id, places: None, pushed: SmallVec::new(), deep: None, left: None };
         let mut comes = Comes {
             told: group.told.iter().map(|told| (told.place, told.verdict)).collect(),
             refused: refused.collect(),
             parts: Vec::new(),
-            done: Went { world: id, places: None, pushed: SmallVec::new(), deep: None, left: None },
+            done: nowhere.clone(),
+            interrupted: nowhere,
             takes: group.takes.max(1),
         };
         let Some(planned) = group.planned else { return comes };
@@ -268,26 +274,27 @@ impl<'a> Worlds<'a> {
         for at in 0..planned.steps.len() {
             may_fail[planned.part_of(planned.place(at))] = true;
         }
+        let mut all_stay: Vec<FrameId> = Vec::new();
         for (k, part) in planned.parts.iter().enumerate() {
             let place = group.places[k];
             let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
-            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, None) };
-            let failed = (may_fail[k] || holds).then(|| {
-                let request = &requests[place];
-                let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
-                match stays {
-                    Some(frame) => self.after(id, &planned, k, Some(frame.id)),
-                    None => before.clone(),
-                }
+            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, &[]) };
+            let request = &requests[place];
+            let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
+            all_stay.extend(stays.map(|frame| frame.id));
+            let failed = (may_fail[k] || holds).then(|| match stays {
+                Some(frame) => self.after(id, &planned, k, &[frame.id]),
+                None => before.clone(),
             });
             comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
         }
-        comes.done = self.after(id, &planned, planned.parts.len(), None);
+        comes.done = self.after(id, &planned, planned.parts.len(), &[]);
+        comes.interrupted = self.after(id, &planned, 0, &all_stay);
         comes
     }
 
-    /// The world after the first `parts` of a plan. `stays`: a frame that was to be undone with the state it belonged to.
-    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stays: Option<FrameId>) -> Went {
+    /// The world after the first `parts` of a plan. `stay`: frames that were to be undone with the state they belonged to.
+    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stay: &[FrameId]) -> Went {
         let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
         let mut world = before.clone();
         if parts == planned.parts.len() {
@@ -298,9 +305,7 @@ impl<'a> Worlds<'a> {
         }
         let edits = planned.parts[..parts].iter().map(|part| &part.edits);
         let pushed = world.stack.apply(edits, &[]);
-        if let Some(frame) = stays {
-            world.stack.unscope(frame);
-        }
+        stay.iter().for_each(|frame| world.stack.unscope(*frame));
         self.went(id, world, &pushed)
     }
 
@@ -312,20 +317,17 @@ impl<'a> Worlds<'a> {
         }
         let Ask::Apply(configuration) = request.ask else { unreachable!("safe configurations are applied") };
         self.asked.insert(configuration);
-        let planned = self.get(id).map(|world| {
-            let configuration = &self.configurations[&configuration];
-            let op =
-                Op::Push { configuration, requester: request.requester, at: Time::default(), scope: request.scope };
-            transaction(&world.system, &world.stack, &[op], &self.context)
-        });
-        let comes = match planned {
-            Some(Ok(planned)) => {
-                let may_fail = !planned.steps.is_empty();
-                SafeComes { done: Ok(self.after(id, &planned, planned.parts.len(), None)), may_fail }
-            }
-            Some(Err(refusal)) => SafeComes { done: Err(Rc::new(refusal.findings)), may_fail: true },
-            None => unreachable!("planned in a world that is known"),
-        };
+        let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
+        let configuration = &self.configurations[&configuration];
+        let Effort { planned, frame, troubles } =
+            effort(&before.system, &before.stack, configuration, request, Time::default(), &self.context);
+        let mut world = before.clone();
+        planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+        let pops = planned.parts[0].edits.pops.clone();
+        let pushed = world.stack.push_safe(pops, Frame { partial: !troubles.is_empty(), ..frame });
+        let may_fail = !planned.steps.is_empty();
+        let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
+        let comes = SafeComes { done: self.went(id, world, &[pushed]), troubles, may_fail };
         let comes = Rc::new(comes);
         self.safes.insert(key, comes.clone());
         comes

@@ -245,33 +245,32 @@ impl Engine {
     /// What is under way is given up by its own undo.
     pub(super) fn give_up_request(&mut self, number: u32, undo: Request) {
         let Ask::UndoOf(id) = undo.ask else { return };
-        self.giving_up.push((number, undo));
         let of_batch = |running: &&mut Running| matches!(&running.purpose, Purpose::Requests(of, _) if *of == number);
         let requests = match self.desk.under_way().iter().find(|turn| turn.number == number) {
             Some(turn) => turn.batch.requests.clone(),
-            None => return,
+            None => SmallVec::new(),
         };
         let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
-        let place = requests.iter().position(fits);
-        let running = self.running.iter_mut().find(of_batch);
-        let part = match (&running, place) {
-            (Some(running), Some(place)) => match &running.purpose {
-                Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
-                _ => None,
-            },
-            _ => None,
+        let Some(place) = requests.iter().position(fits) else {
+            // Another undo of the same step has given it up already.
+            return self.answer(undo, Verdict::Undone, None);
         };
-        match (running, part, place) {
-            (Some(running), Some(part), _) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
+        self.giving_up.push((number, undo));
+        let running = self.running.iter_mut().find(of_batch);
+        let part = running.as_ref().and_then(|running| match &running.purpose {
+            Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
+            _ => None,
+        });
+        match (running, part) {
+            (Some(running), Some(part)) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
             // It stands behind in its batch and has not begun.
-            (_, None, Some(place)) => {
+            _ => {
                 let request = requests[place];
                 self.desk.answered(number, place);
                 self.shift_places(number, place);
                 self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
                 self.answer_giving_up(number, &request, Some(Verdict::Cancelled));
             }
-            _ => {}
         }
     }
 
@@ -288,25 +287,26 @@ impl Engine {
         }
     }
 
-    /// Answers the undo that gave `request` up.
+    /// Answers the undos that gave `request` up.
     fn answer_giving_up(&mut self, number: u32, request: &Request, verdict: Option<Verdict>) {
         let fits = |(of, undo): &(u32, Request)| {
             *of == number && matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b)
         };
-        let Some(at) = self.giving_up.iter().position(fits) else { return };
-        let (_, undo) = self.giving_up.remove(at);
-        match verdict {
-            // It was through before it could be given up: the undo is a request like others.
-            Some(Verdict::Ok) => {
-                self.forget(undo);
-                self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
-                let _ = self.desk.arrive(Batch::one(undo), |_| false, &self.claims);
+        while let Some(at) = self.giving_up.iter().position(fits) {
+            let (_, undo) = self.giving_up.remove(at);
+            match verdict {
+                // It was through before it could be given up: the undo is a request like others.
+                Some(Verdict::Ok) => {
+                    self.forget(undo);
+                    self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
+                    let _ = self.desk.arrive(Batch::one(undo), |_| false, &self.claims);
+                }
+                Some(Verdict::Broken) => {
+                    let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
+                    self.answer(undo, Verdict::UndoBroken, reason);
+                }
+                _ => self.answer(undo, Verdict::Undone, None),
             }
-            Some(Verdict::Broken) => {
-                let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
-                self.answer(undo, Verdict::UndoBroken, reason);
-            }
-            _ => self.answer(undo, Verdict::Undone, None),
         }
     }
 

@@ -270,6 +270,13 @@ impl Stack {
         id
     }
 
+    /// Pushes the frame of a safe configuration that has been applied as far as it goes; `pops` go with it.
+    pub fn push_safe(&mut self, pops: Vec<(FrameId, HandOver)>, frame: Frame) -> FrameId {
+        let push = Some(Arc::new(Frame { safe: true, ..frame }));
+        let pushed = self.apply([&Edits { pops, push }], &[]);
+        pushed.first().copied().unwrap_or(FrameId(0))
+    }
+
     /// Pushes a frame as it is, but for its number.
     pub fn push(&mut self, frame: Frame) -> FrameId {
         let pushed = self.apply([&Edits { pops: Vec::new(), push: Some(Arc::new(frame)) }], &[]);

@@ -389,7 +389,7 @@ impl Transaction {
             failed = self.took_back(&run, &way);
         }
         let part = self.failed_part();
-        if self.between.is_none() && part > 0 && !self.planned.whole.is_empty() {
+        if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
         }
         let way = self.way_back(part, live);
