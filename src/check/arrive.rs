@@ -5,7 +5,7 @@ use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
-use crate::stack::{Arrival, Batch, Request, Why};
+use crate::stack::{Arrival, Batch, Request, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -122,21 +122,21 @@ impl Product<'_> {
             state.stayed |= *verdict == Verdict::UndoFailed;
             self.due(&mut state, *request, *verdict);
         }
+        for (number, undo) in arrival.given_up {
+            self.owed(&mut state, &undo);
+            self.give_up(&mut state, number, undo);
+        }
         if !arrival.safe.is_empty() {
             for turn in state.desk.under_way() {
-                let stopped = state.stopped.iter().any(|(of, stop)| *of == turn.number && *stop == Stop::Interrupted);
-                if !stopped {
-                    state.stopped.push((turn.number, Stop::Interrupted));
+                let interrupted = |(of, stop): &(u32, Stop)| *of == turn.number && matches!(stop, Stop::Interrupted(_));
+                if !state.stopped.iter().any(interrupted) {
+                    state.stopped.push((turn.number, Stop::Interrupted(state.world)));
                 }
             }
         }
         for request in arrival.safe {
             self.owed(&mut state, &request);
             state.safe.push(request);
-        }
-        for (number, undo) in arrival.given_up {
-            self.owed(&mut state, &undo);
-            self.give_up(&mut state, number, undo);
         }
         self.begin(&mut state);
         state
@@ -146,9 +146,7 @@ impl Product<'_> {
     fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
         let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
         let requests = turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default();
-        let Ask::UndoOf(id) = undo.ask else { return };
-        let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
-        let Some(place) = requests.iter().position(fits) else {
+        let Some(place) = given_up_of(&undo, &requests) else {
             // Another undo of the same step has given it up already.
             return self.due(state, undo, Verdict::Undone);
         };

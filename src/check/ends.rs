@@ -2,9 +2,9 @@
 
 use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
-use super::world::{Comes, Top, Went};
-use crate::model::{Ask, ConfigId, Verdict};
-use crate::stack::{Batch, Request, Requester, Why};
+use super::world::{Comes, Top, Went, WorldId};
+use crate::model::{Ask, Verdict};
+use crate::stack::{Batch, Request, Requester, Why, given_up_of};
 use smallvec::SmallVec;
 
 /// Requests of a batch that are answered: place and verdict; none: nobody is told.
@@ -105,7 +105,7 @@ impl Product<'_> {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
             answers.push((request, verdict));
-            let fits = |undo: &Request| matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b);
+            let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
                 let undo = given_up.remove(at);
@@ -145,55 +145,30 @@ impl Product<'_> {
         if requests.is_empty() {
             return;
         }
+        // In the order in which they came.
+        let mut given_up: SmallVec<[usize; 1]> = SmallVec::new();
+        let mut interrupted = None;
+        for (_, stop) in state.stopped.iter().filter(|(of, _)| *of == number) {
+            match stop {
+                Stop::GivenUp(undo) if interrupted.is_none() => given_up.extend(given_up_of(undo, &requests)),
+                Stop::GivenUp(_) => {}
+                Stop::Interrupted(planned) => interrupted = Some(*planned),
+            }
+        }
+        if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
+            return self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+        }
         if let Some(top) = self.worlds.top(state.world) {
-            let given_up = state.stopped.iter().find_map(|(of, stop)| match stop {
-                Stop::GivenUp(undo) if *of == number => Some(*undo),
-                _ => None,
-            });
-            let verdict = if given_up.is_some() { Verdict::Cancelled } else { requests[0].ask.failed() };
-            for verdict in [verdict, requests[0].ask.broken()] {
+            let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
+            for verdict in [ask.done(), ask.failed(), ask.broken()].into_iter().chain(cancelled) {
                 let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
-                self.ended(
-                    state,
-                    number,
-                    &requests,
-                    Given::from_iter([(0, Some(verdict))]),
-                    &went,
-                    Failed::Nothing,
-                    nexts,
-                );
+                let given = Given::from_iter([(0, Some(verdict))]);
+                self.ended(state, number, &requests, given, &went, Failed::Nothing, nexts);
             }
             return;
         }
         let comes = self.comes(state, &requests);
-        let interrupted = state.stopped.iter().any(|(of, stop)| *of == number && *stop == Stop::Interrupted);
-        if interrupted {
-            let mut given: Given = comes.told.clone();
-            given.extend(comes.parts.iter().map(|part| (part.place, Some(requests[part.place].ask.failed()))));
-            given.sort_by_key(|(place, _)| *place);
-            let went = &comes.interrupted;
-            // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
-            let undo = comes.parts.iter().any(|part| part.undo);
-            let class = if undo { Failed::Undo } else { Failed::Nothing };
-            self.ended(state, number, &requests, given.clone(), went, class, nexts);
-            if let Some(part) = comes.parts.iter().find(|part| part.failed.is_some()) {
-                let broken = |(place, verdict): (usize, Option<Verdict>)| {
-                    (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
-                };
-                self.broke(state, number, &requests, given.into_iter().map(broken).collect(), nexts);
-            }
-            return;
-        }
-        let given_up: SmallVec<[ConfigId; 1]> = state
-            .stopped
-            .iter()
-            .filter_map(|(of, stop)| match stop {
-                Stop::GivenUp(Request { ask: Ask::UndoOf(id), .. }) if *of == number => Some(*id),
-                _ => None,
-            })
-            .collect();
-        let is_given_up = |place: usize| matches!(requests[place].ask, Ask::Apply(id) if given_up.contains(&id));
-        let Some(k) = comes.parts.iter().position(|part| is_given_up(part.place)) else {
+        let Some(k) = comes.parts.iter().position(|part| given_up.contains(&part.place)) else {
             // It is refused by now, or was.
             return self.ends(state, number, nexts);
         };
@@ -205,6 +180,36 @@ impl Product<'_> {
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
             self.broke(state, number, &requests, broken, nexts);
+        }
+    }
+
+    /// How a batch may end that a safe configuration has interrupted: it is taken back, as far as it was planned in the world
+    /// from before.
+    fn interrupted_ends(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        planned: WorldId,
+        given_up: &[usize],
+        nexts: &mut Nexts,
+    ) {
+        let comes = self.worlds.comes(planned, requests);
+        let end = |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
+        let mut given: Given = comes.told.clone();
+        given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
+        given.sort_by_key(|(place, _)| *place);
+        // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
+        let undo = comes.parts.iter().any(|part| part.undo);
+        let class = if undo { Failed::Undo } else { Failed::Nothing };
+        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
+        let world = self.worlds.stay(state.world, undone);
+        self.ended(state, number, requests, given.clone(), &world, class, nexts);
+        if let Some(part) = comes.parts.first().filter(|_| comes.parts.iter().any(|part| part.failed.is_some())) {
+            let broken = |(place, verdict): (usize, Option<Verdict>)| {
+                (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
+            };
+            self.broke(state, number, requests, given.into_iter().map(broken).collect(), nexts);
         }
     }
 

@@ -273,7 +273,7 @@ fn open(state: &State) -> Vec<String> {
     let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
     let given_up = state.stopped.iter().filter_map(|(_, stop)| match stop {
         super::state::Stop::GivenUp(undo) => Some(undo),
-        super::state::Stop::Interrupted => None,
+        super::state::Stop::Interrupted(_) => None,
     });
     let all = under_way.chain(waiting).chain(&state.safe).chain(given_up);
     let told = all.filter(|request| request.why == Why::Asked).map(|r| format!("{} by {}", r.ask, r.requester));

@@ -26,8 +26,8 @@ pub enum Failed {
 pub enum Stop {
     /// This undo of one of its requests.
     GivenUp(Request),
-    /// A safe configuration.
-    Interrupted,
+    /// A safe configuration; it was planned in this world.
+    Interrupted(WorldId),
 }
 
 /// A frame that waits for its confirmation.
@@ -89,7 +89,7 @@ impl State {
     fn undos(&self) -> impl Iterator<Item = &Request> {
         self.stopped.iter().filter_map(|(_, stop)| match stop {
             Stop::GivenUp(undo) => Some(undo),
-            Stop::Interrupted => None,
+            Stop::Interrupted(_) => None,
         })
     }
 

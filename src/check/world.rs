@@ -91,8 +91,6 @@ pub struct Comes {
     pub parts: Vec<PartOf>,
     /// When all is done.
     pub done: Went,
-    /// When it is interrupted and taken back: frames that were to be undone with their states stay without them.
-    pub interrupted: Went,
     /// So many requests are settled then.
     pub takes: usize,
 }
@@ -255,13 +253,11 @@ impl<'a> Worlds<'a> {
             };
             Some((told.place, Rc::new(reasons)))
         });
-        let nowhere = Went { world: id, places: None, pushed: SmallVec::new(), deep: None, left: None };
         let mut comes = Comes {
             told: group.told.iter().map(|told| (told.place, told.verdict)).collect(),
             refused: refused.collect(),
             parts: Vec::new(),
-            done: nowhere.clone(),
-            interrupted: nowhere,
+            done: Went::to(id),
             takes: group.takes.max(1),
         };
         let Some(planned) = group.planned else { return comes };
@@ -274,14 +270,12 @@ impl<'a> Worlds<'a> {
         for at in 0..planned.steps.len() {
             may_fail[planned.part_of(planned.place(at))] = true;
         }
-        let mut all_stay: Vec<FrameId> = Vec::new();
         for (k, part) in planned.parts.iter().enumerate() {
             let place = group.places[k];
             let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
             let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, &[]) };
             let request = &requests[place];
             let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
-            all_stay.extend(stays.map(|frame| frame.id));
             let failed = (may_fail[k] || holds).then(|| match stays {
                 Some(frame) => self.after(id, &planned, k, &[frame.id]),
                 None => before.clone(),
@@ -289,7 +283,6 @@ impl<'a> Worlds<'a> {
             comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
         }
         comes.done = self.after(id, &planned, planned.parts.len(), &[]);
-        comes.interrupted = self.after(id, &planned, 0, &all_stay);
         comes
     }
 
@@ -307,6 +300,26 @@ impl<'a> Worlds<'a> {
         let pushed = world.stack.apply(edits, &[]);
         stay.iter().for_each(|frame| world.stack.unscope(*frame));
         self.went(id, world, &pushed)
+    }
+
+    /// The world in which these undos were taken back: frames that were to be undone with the states they belonged to stay
+    /// without these.
+    pub fn stay(&mut self, id: WorldId, undos: impl Iterator<Item = Request>) -> Went {
+        let Some(before) = self.get(id) else { return Went::to(id) };
+        let frames = before.stack.frames();
+        let of = |undo: &Request| {
+            let fits = |frame: &&Arc<Frame>| {
+                frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration) && frame.requester == undo.requester
+            };
+            frames.iter().rev().find(fits).map(|frame| frame.id)
+        };
+        let stay: SmallVec<[FrameId; 2]> = undos.filter(|undo| undo.scope.is_some()).filter_map(|undo| of(&undo)).collect();
+        if stay.is_empty() {
+            return Went::to(id);
+        }
+        let mut world = before.clone();
+        stay.iter().for_each(|frame| world.stack.unscope(*frame));
+        self.went(id, world, &[])
     }
 
     /// What a safe configuration comes to in a world that is known.

@@ -228,7 +228,7 @@ impl Transaction {
                 // Once it is on its way back, that goes on.
                 if self.phase == Phase::Forward {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
-                    self.given_up = Some(part);
+                    self.given_up = Some(self.given_up.map_or(part, |other| other.min(part)));
                     self.asked_back = true;
                     self.cancel();
                 }
