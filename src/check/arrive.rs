@@ -5,7 +5,7 @@ use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
-use crate::stack::{Arrival, Batch, Request, Why, given_up_of};
+use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -92,7 +92,13 @@ impl Product<'_> {
         if self.races && !stops.is_empty() {
             states.push(State { flight: vec![batch.clone()], ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
-            if batch.requests.iter().any(is_safe) {
+            // Given up alone and once, it is answered the same way at whatever time.
+            let among = |turn: &Turn| {
+                let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
+                let twice = batch.requests.iter().filter(gives_up).count() > 1;
+                stops.contains(&turn.number) && (turn.batch.requests.len() > 1 || twice)
+            };
+            if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 let mut waits = state.clone();
                 stops.iter().rev().for_each(|number| waits.desk.put_back(*number));
                 states.push(self.take_in(waits, batch.clone()));
@@ -137,6 +143,7 @@ impl Product<'_> {
         for request in arrival.safe {
             self.owed(&mut state, &request);
             state.safe.push(request);
+            state.crowded = state.safe.len() > 1;
         }
         self.begin(&mut state);
         state
@@ -150,9 +157,15 @@ impl Product<'_> {
             // Another undo of the same step has given it up already.
             return self.due(state, undo, Verdict::Undone);
         };
-        let begun = match self.worlds.top(state.world) {
+        // What was interrupted was planned before that.
+        let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+            Stop::Interrupted(planned) if *of == number => Some(*planned),
+            _ => None,
+        });
+        let planned = planned.unwrap_or(state.world);
+        let begun = match self.worlds.top(planned) {
             Some(_) => place == 0,
-            None => self.comes(state, &requests).parts.iter().any(|part| part.place == place),
+            None => self.worlds.comes(planned, &requests).parts.iter().any(|part| part.place == place),
         };
         if begun {
             state.stopped.push((number, Stop::GivenUp(undo)));
@@ -184,8 +197,11 @@ impl Product<'_> {
         }
     }
 
-    /// Whatever can begin does.
+    /// Whatever can begin does; nothing while a safe configuration is being applied.
     pub(super) fn begin(&mut self, state: &mut State) {
+        if !state.safe.is_empty() {
+            return;
+        }
         while let Some(turn) = state.desk.turn(&self.worlds.claims) {
             let first = turn.batch.requests[0];
             if first.why != Why::Down {

@@ -123,6 +123,12 @@ impl Product<'_> {
         for undo in late {
             next = self.take_in(next, Batch::one(undo));
         }
+        // What is on its way comes now, or when more of this is over.
+        if let Some(batch) = next.flight.first()
+            && !self.stopped_by(&next, batch).is_empty()
+        {
+            self.tell(next.clone(), answers.clone(), failed, nexts);
+        }
         for batch in std::mem::take(&mut next.flight) {
             next = self.take_in(next, batch);
         }
@@ -177,6 +183,9 @@ impl Product<'_> {
         let mut broken = cancelled.clone();
         cancelled.push((part.place, Some(Verdict::Cancelled)));
         self.ended(state, number, &requests, cancelled, &part.before, Failed::Nothing, nexts);
+        // The last of it may have been done when that came.
+        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
+        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
             self.broke(state, number, &requests, broken, nexts);
@@ -203,7 +212,7 @@ impl Product<'_> {
         let undo = comes.parts.iter().any(|part| part.undo);
         let class = if undo { Failed::Undo } else { Failed::Nothing };
         let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
-        let world = self.worlds.stay(state.world, undone);
+        let world = self.worlds.stay(state.world, planned, undone);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
         if let Some(part) = comes.parts.first().filter(|_| comes.parts.iter().any(|part| part.failed.is_some())) {
             let broken = |(place, verdict): (usize, Option<Verdict>)| {
@@ -217,6 +226,7 @@ impl Product<'_> {
     pub(super) fn safe_ends(&mut self, state: &State, request: &Request, nexts: &mut Nexts) {
         let mut over = state.clone();
         over.safe.remove(0);
+        over.crowded &= !over.safe.is_empty();
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
@@ -243,7 +253,7 @@ impl Product<'_> {
         // What is under way may have made or changed what it finds, and goes on while it is applied.
         let claim = self.worlds.claims.of([request]);
         let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
-        if comes.may_fail || meets {
+        if comes.may_fail || meets || state.crowded {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));

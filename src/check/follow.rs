@@ -157,6 +157,14 @@ impl<'a> Follower<'a> {
         Ok(known)
     }
 
+    /// The states in which it may be, in words.
+    pub fn may(&mut self) -> String {
+        let may = self.may.clone();
+        let (rest, _) = self.silently();
+        self.may = may;
+        self.told(rest.iter())
+    }
+
     /// Whether more was on its way between coordinators than is followed.
     pub fn overflowed(&self) -> bool {
         self.product.overflow
@@ -242,8 +250,9 @@ impl<'a> Follower<'a> {
             let batch = |batch: &Batch| batch.requests.iter().map(|r| r.ask.to_string()).collect::<Vec<_>>();
             let flight: Vec<_> = state.flight.iter().map(batch).collect();
             let stopped = &state.stopped;
+            let under_way: Vec<_> = state.desk.under_way().iter().map(|turn| batch(&turn.batch)).collect();
             format!(
-                "- {:?} frames {:?} open {desk:?} due {} inbox {} flight {flight:?} stopped {} unconfirmed {} system {world}",
+                "- {:?} frames {:?} open {desk:?} of them under way {under_way:?} due {} inbox {} flight {flight:?} stopped {} unconfirmed {} system {world}",
                 self.leaves(state),
                 self.frames(state),
                 due.len(),

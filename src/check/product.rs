@@ -103,6 +103,7 @@ impl<'a> Product<'a> {
             desk: Desk::default(),
             stopped: SmallVec::new(),
             safe: SmallVec::new(),
+            crowded: false,
             due: SmallVec::new(),
             telling: SmallVec::new(),
             stayed: false,
@@ -134,20 +135,15 @@ impl<'a> Product<'a> {
     pub(super) fn goes_on(&mut self, state: &State) -> Nexts {
         let mut nexts = Nexts::default();
         if let Some(batch) = state.flight.first() {
-            // It comes once one of those that it would stop is over.
-            for number in self.stopped_by(state, batch) {
+            // It comes once one of those that it would stop is over; answers that were on their way come before.
+            let stopped = self.stopped_by(state, batch);
+            self.answers_come(state, &mut nexts);
+            for number in stopped {
                 self.ends(state, number, &mut nexts);
             }
             return nexts;
         }
-        if let Some((request, verdict)) = state.due.first().copied() {
-            let mut next = state.clone();
-            next.due.remove(0);
-            self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, &mut nexts);
-        }
-        if let Some(request) = state.safe.first().copied() {
-            self.safe_ends(state, &request, &mut nexts);
-        }
+        self.answers_come(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
         let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
@@ -165,6 +161,18 @@ impl<'a> Product<'a> {
             self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
         }
         nexts
+    }
+
+    /// Answers that come whatever else does: those on their way, and of safe configurations.
+    fn answers_come(&mut self, state: &State, nexts: &mut Nexts) {
+        if let Some((request, verdict)) = state.due.first().copied() {
+            let mut next = state.clone();
+            next.due.remove(0);
+            self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+        }
+        if let Some(request) = state.safe.first().copied() {
+            self.safe_ends(state, &request, nexts);
+        }
     }
 
     /// A coordinator hears an event.

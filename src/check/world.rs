@@ -302,18 +302,20 @@ impl<'a> Worlds<'a> {
         self.went(id, world, &pushed)
     }
 
-    /// The world in which these undos were taken back: frames that were to be undone with the states they belonged to stay
-    /// without these.
-    pub fn stay(&mut self, id: WorldId, undos: impl Iterator<Item = Request>) -> Went {
-        let Some(before) = self.get(id) else { return Went::to(id) };
-        let frames = before.stack.frames();
-        let of = |undo: &Request| {
+    /// The world in which these undos were taken back, planned in `planned`: frames that were to be undone with the states
+    /// they belonged to stay without these.
+    pub fn stay(&mut self, id: WorldId, planned: WorldId, undos: impl Iterator<Item = Request>) -> Went {
+        let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
+        let mut stay: SmallVec<[FrameId; 2]> = SmallVec::new();
+        for undo in undos.filter(|undo| undo.scope.is_some()) {
             let fits = |frame: &&Arc<Frame>| {
-                frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration) && frame.requester == undo.requester
+                let by = frame.requester == undo.requester;
+                by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
             };
-            frames.iter().rev().find(fits).map(|frame| frame.id)
-        };
-        let stay: SmallVec<[FrameId; 2]> = undos.filter(|undo| undo.scope.is_some()).filter_map(|undo| of(&undo)).collect();
+            // That which was the newest then: others may have come since, above it.
+            let count = planned.stack.frames().iter().filter(fits).count();
+            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
+        }
         if stay.is_empty() {
             return Went::to(id);
         }

@@ -293,6 +293,7 @@ impl Engine {
                 && *of == number
             {
                 group.takes -= usize::from(gone < group.takes);
+                group.told.retain(|told| told.place != gone);
                 group.places.iter_mut().filter(|place| **place > gone).for_each(|place| *place -= 1);
                 group.told.iter_mut().filter(|told| told.place > gone).for_each(|told| told.place -= 1);
             }

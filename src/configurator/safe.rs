@@ -8,7 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, Target, Verdict};
 use crate::stack::{Effort, Frame, effort};
-use crate::system::{System, step};
+use crate::system::{System, View as _, step};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
@@ -47,7 +47,10 @@ impl Engine {
         let frame = before.map_or(frame, |before| plan(&before).frame);
         let mut touched = Touched::default();
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
-            if let Target::Component(component) = entry.target {
+            // What is not there is left out, and does not keep what is taken back from bringing it back.
+            if let Target::Component(component) = entry.target
+                && self.world.system.component(component).is_some()
+            {
                 touched.add_state(component);
             }
         }

@@ -234,7 +234,7 @@ impl Transaction {
 
     /// The end of a part of which nothing is left.
     fn taken_back_whole(&self, at: usize) -> PartEnd {
-        match self.given_up == Some(at) && matches!(self.stopped_by, Some(Reason::GivenUp)) {
+        match self.given_up.contains(&at) && matches!(self.stopped_by, Some(Reason::GivenUp)) {
             true => PartEnd::Cancelled,
             false => PartEnd::Failed(self.reason()),
         }

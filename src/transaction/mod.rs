@@ -72,7 +72,8 @@ pub struct Transaction {
     touched: Touched,
     /// Why it ends early, if not because of a step.
     stopped_by: Option<Reason>,
-    given_up: Option<usize>,
+    /// Parts that are given up.
+    given_up: SmallVec<[usize; 1]>,
     asked_back: bool,
     interrupted: bool,
     held: bool,
@@ -107,7 +108,7 @@ impl Transaction {
             doubted: false,
             touched: Touched::default(),
             stopped_by: None,
-            given_up: None,
+            given_up: SmallVec::new(),
             asked_back: spec.asked_back,
             interrupted: false,
             held: false,
@@ -228,7 +229,7 @@ impl Transaction {
                 // Once it is on its way back, that goes on.
                 if self.phase == Phase::Forward {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
-                    self.given_up = Some(self.given_up.map_or(part, |other| other.min(part)));
+                    self.given_up.push(part);
                     self.asked_back = true;
                     self.cancel();
                 }
@@ -438,8 +439,8 @@ impl Transaction {
         if self.interrupted || self.taken_down {
             return 0;
         }
-        if let Some(part) = self.given_up {
-            return part;
+        if let Some(part) = self.given_up.iter().min() {
+            return *part;
         }
         let forward = self.forward.as_ref().expect("it was carried out");
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());

@@ -25,6 +25,8 @@ pub const CLASSES: [&str; 13] = [
 #[derive(Default)]
 pub struct Classes {
     pub met: [bool; CLASSES.len()],
+    /// Whether the states that it may be in are to be told after each answer.
+    pub tells: bool,
     /// The safe configurations.
     safe: Vec<String>,
     /// Requests raised in one step, by number: whether undo and push are among them.

@@ -19,6 +19,8 @@ pub enum Note {
     Answer { request: u64, by: String, answer: String },
     Requested { request: u64, by: String, ask: String },
     Moved(Vec<String>),
+    /// The configurator itself failed.
+    Failed(String),
 }
 
 /// How a case went wrong: what happened, what was expected, what is.
@@ -88,6 +90,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
                     Note::Requested { request: request.unwrap_or_default(), by: by.clone(), ask: ask.clone() }
                 }
                 Happening::State { active } => Note::Moved(active.clone()),
+                Happening::Forced { note } if note.contains("configurator itself") => Note::Failed(note.clone()),
                 _ => return,
             };
             notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
@@ -172,6 +175,9 @@ impl Case<'_> {
             self.log.push(format!("{} {note:?}", self.clock.now()));
         }
         for note in &notes {
+            if let Note::Failed(why) = note {
+                return Err(why.clone());
+            }
             if let Note::Answer { by, answer, .. } = note {
                 let by = match by.as_str() {
                     "operator" => Requester::Operator,
@@ -179,6 +185,9 @@ impl Case<'_> {
                 };
                 let seen = Seen::Answer { by, event: event(answer) };
                 self.follower.see(seen).map_err(|why| format!("the answer {answer}: {why}"))?;
+                if self.classes.tells {
+                    self.log.push(format!("after {answer}: {}", self.follower.may()));
+                }
             }
         }
         let shown = self.shown();

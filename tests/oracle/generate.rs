@@ -163,7 +163,7 @@ fn pieces(chance: &mut Chance, on: &str, changes: &mut Vec<String>, post: &mut V
 }
 
 /// The `at`-th configuration.
-fn configuration(chance: &mut Chance, at: usize, text: &mut String) -> Configuration {
+fn configuration(chance: &mut Chance, at: usize, confirms: bool, text: &mut String) -> Configuration {
     let id = ConfigId::new(&format!("c{at}")).expect("a plain name");
     let (mut changes, mut post): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut made = Configuration::new(id);
@@ -197,7 +197,7 @@ fn configuration(chance: &mut Chance, at: usize, text: &mut String) -> Configura
                 1 | 2 => OnFailure::Rollback,
                 _ => OnFailure::Unset,
             };
-            if made.on_failure != OnFailure::Hold && chance.percent(15) {
+            if confirms && made.on_failure != OnFailure::Hold && chance.percent(15) {
                 made.confirm = Some(Confirm {
                     event: event(*chance.of(&[CONFIRMS, "x0"])),
                     within: Duration::from_millis(1 + chance.below(6) as u64),
@@ -379,12 +379,15 @@ pub fn make(chance: &mut Chance) -> Made {
     let mut text = String::new();
     let several = chance.percent(40);
     let count = 4 + chance.below(3);
-    let configurations: Vec<Configuration> = (0..count).map(|at| configuration(chance, at, &mut text)).collect();
+    let stack = if chance.percent(50) { 2 + chance.below(3) } else { 16 };
+    // Left out: a frame that waits for its confirmation and is squashed meanwhile.
+    let confirms = stack == 16;
+    let configurations: Vec<Configuration> =
+        (0..count).map(|at| configuration(chance, at, confirms, &mut text)).collect();
     let mut coordinators = vec![coordinator(chance, "one", 0, count, several, &mut text)];
     if several {
         coordinators.push(coordinator(chance, "two", 1, count, several, &mut text));
     }
-    let stack = if chance.percent(50) { 2 + chance.below(3) } else { 16 };
     let _ = writeln!(text, "limits.stack {stack}");
     let deployment = Deployment {
         name: ident("oracle"),
