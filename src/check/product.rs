@@ -134,15 +134,7 @@ impl<'a> Product<'a> {
     /// What follows from a state without anything coming from outside.
     pub(super) fn goes_on(&mut self, state: &State) -> Nexts {
         let mut nexts = Nexts::default();
-        if let Some(batch) = state.flight.first() {
-            // It comes once one of those that it would stop is over; answers that were on their way come before.
-            let stopped = self.stopped_by(state, batch);
-            self.answers_come(state, &mut nexts);
-            for number in stopped {
-                self.ends(state, number, &mut nexts);
-            }
-            return nexts;
-        }
+        // A batch in flight comes when one of those that it would stop is over.
         self.answers_come(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());

@@ -30,6 +30,7 @@ use crate::time::Time;
 use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
