@@ -81,6 +81,26 @@ impl Product<'_> {
         stopped
     }
 
+    /// Whether `batch` would stop, overtake or cancel anything: then it makes a difference when it comes.
+    pub(super) fn meddles(&self, state: &State, batch: &Batch) -> bool {
+        let is_safe = |id: ConfigId| self.is_safe(id);
+        let arrival = state.desk.clone().arrive(batch.clone(), is_safe, &self.worlds.claims);
+        !arrival.told.is_empty() || !self.stopped_by(state, batch).is_empty()
+    }
+
+    /// What is in flight comes now, or later where that makes a difference.
+    pub(super) fn lands(&mut self, mut state: State) -> SmallVec<[State; 2]> {
+        let mut states = SmallVec::new();
+        if state.flight.first().is_some_and(|batch| self.meddles(&state, batch)) {
+            states.push(state.clone());
+        }
+        for batch in std::mem::take(&mut state.flight) {
+            state = self.take_in(state, batch);
+        }
+        states.push(state);
+        states
+    }
+
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
     pub(super) fn arrive(&mut self, mut state: State, batch: Batch) -> Vec<State> {
         if !state.flight.is_empty() {
@@ -89,7 +109,7 @@ impl Product<'_> {
         }
         let stops = self.stopped_by(&state, &batch);
         let mut states = Vec::with_capacity(1);
-        if self.races && !stops.is_empty() {
+        if self.races && self.meddles(&state, &batch) {
             states.push(State { flight: vec![batch.clone()], ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
             // Given up alone and once, it is answered the same way at whatever time.

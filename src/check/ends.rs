@@ -123,16 +123,9 @@ impl Product<'_> {
         for undo in late {
             next = self.take_in(next, Batch::one(undo));
         }
-        // What is on its way comes now, or when more of this is over.
-        if let Some(batch) = next.flight.first()
-            && !self.stopped_by(&next, batch).is_empty()
-        {
-            self.tell(next.clone(), answers.clone(), failed, nexts);
+        for next in self.lands(next) {
+            self.tell(next, answers.clone(), failed, nexts);
         }
-        for batch in std::mem::take(&mut next.flight) {
-            next = self.take_in(next, batch);
-        }
-        self.tell(next, answers, failed, nexts);
     }
 
     /// What a request that was carried out leaves to be waited for.
@@ -231,7 +224,7 @@ impl Product<'_> {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
                 next.world = self.worlds.answered(top, request, verdict);
-                self.tell(next, Answers::from_iter([(*request, verdict)]), Failed::Nothing, nexts);
+                self.safe_told(next, request, verdict, Failed::Nothing, nexts);
             }
             return;
         }
@@ -248,7 +241,7 @@ impl Product<'_> {
         let mut next = over.clone();
         self.go(&mut next, &comes.done);
         self.applied(&mut next, request, verdict, &comes.done);
-        self.tell(next, Answers::from_iter([(*request, verdict)]), class, nexts);
+        self.safe_told(next, request, verdict, class, nexts);
         nexts.all[from..].iter_mut().for_each(|next| next.deep = (comes.done.deep, comes.done.left));
         // What is under way may have made or changed what it finds, and goes on while it is applied.
         let claim = self.worlds.claims.of([request]);
@@ -258,7 +251,13 @@ impl Product<'_> {
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
             next.unconfirmed.clear();
-            self.tell(next, Answers::from_iter([(*request, Verdict::Broken)]), Failed::Broken, nexts);
+            self.safe_told(next, request, Verdict::Broken, Failed::Broken, nexts);
+        }
+    }
+
+    fn safe_told(&mut self, next: State, request: &Request, verdict: Verdict, failed: Failed, nexts: &mut Nexts) {
+        for next in self.lands(next) {
+            self.tell(next, Answers::from_iter([(*request, verdict)]), failed, nexts);
         }
     }
 }

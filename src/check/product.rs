@@ -160,7 +160,9 @@ impl<'a> Product<'a> {
         if let Some((request, verdict)) = state.due.first().copied() {
             let mut next = state.clone();
             next.due.remove(0);
-            self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+            for next in self.lands(next) {
+                self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+            }
         }
         if let Some(request) = state.safe.first().copied() {
             self.safe_ends(state, &request, nexts);

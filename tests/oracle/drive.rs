@@ -126,7 +126,9 @@ impl Case<'_> {
                 15 => self.raise(CONFIRMS)?,
                 16..=18 if self.names.len() == 1 || chance.percent(50) => {
                     let id = made.deployment.configurations[chance.below(made.deployment.configurations.len())].id;
+                    let kept = id.as_str() == "c3" && made.kept;
                     let ask = match chance.below(6) {
+                        _ if kept => continue,
                         0 => Ask::Undo,
                         1 | 2 => Ask::UndoOf(id),
                         _ => Ask::Apply(id),
@@ -136,6 +138,13 @@ impl Case<'_> {
                 _ => {}
             }
             self.rest(action)?;
+            if action == 0 {
+                // What is kept is there before anything else happens.
+                for _ in 0..24 {
+                    self.clock.sleep(Duration::from_millis(1));
+                    self.rest(0)?;
+                }
+            }
             for _ in 0..chance.of(&[0, 0, 1, 1, 2, 3, 8]).to_owned() {
                 self.clock.sleep(Duration::from_millis(1));
                 self.rest(action)?;

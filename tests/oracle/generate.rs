@@ -59,6 +59,8 @@ pub struct Made {
     pub deployment: Deployment,
     pub catalogue: Catalogue,
     pub text: String,
+    /// `c3` creates a component that is kept.
+    pub kept: bool,
 }
 
 fn ident(text: &str) -> Ident {
@@ -144,11 +146,12 @@ fn change(text: &str) -> Change {
 }
 
 /// What one configuration does to a component: changes and post-states.
-fn pieces(chance: &mut Chance, on: &str, changes: &mut Vec<String>, post: &mut Vec<String>) {
+fn pieces(chance: &mut Chance, on: &str, kept: bool, changes: &mut Vec<String>, post: &mut Vec<String>) {
     let other = *chance.of(&COMPONENTS);
     let state = *chance.of(&["stopped", "running"]);
     let number = 1 + chance.below(3);
     match chance.below(16) {
+        _ if on == "c" && kept && chance.percent(20) => changes.push("set c.k 5".to_owned()),
         0..=4 => changes.push(format!("set {on}.k {number}")),
         5 => changes.push(format!("set {on}.s {number}")),
         6 | 7 => post.push(format!("{on}:{state}")),
@@ -158,12 +161,13 @@ fn pieces(chance: &mut Chance, on: &str, changes: &mut Vec<String>, post: &mut V
         12 => changes.push(format!("connect {on}.y {other}.u")),
         13 => changes.push(format!("write {on}.u {number}")),
         14 => post.push(format!("_default:{state}")),
+        _ if on == "c" && kept => changes.push("call c.open".to_owned()),
         _ => changes.push(format!("destroy {on}")),
     }
 }
 
 /// The `at`-th configuration.
-fn configuration(chance: &mut Chance, at: usize, confirms: bool, text: &mut String) -> Configuration {
+fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, text: &mut String) -> Configuration {
     let id = ConfigId::new(&format!("c{at}")).expect("a plain name");
     let (mut changes, mut post): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut made = Configuration::new(id);
@@ -175,19 +179,26 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, text: &mut Stri
                 post.push(format!("{on}:{}", chance.of(&["stopped", "running"])));
             }
         }
-        2 => {
-            made.safe = chance.percent(60);
+        2 if kept => {
+            made.safe = true;
             match chance.below(3) {
-                0 => post.push(format!("{}:stopped", COMPONENTS[chance.below(2)])),
-                1 => changes.push(format!("set {}.k 0", COMPONENTS[chance.below(2)])),
-                _ => post.push("a:stopped b:stopped".to_owned()),
+                0 => post.push("c:stopped".to_owned()),
+                1 => changes.push("set c.k 0".to_owned()),
+                _ => {
+                    changes.push("set c.k 0".to_owned());
+                    post.push("c:stopped".to_owned());
+                }
             }
+        }
+        3 if kept => {
+            changes.push("create c".to_owned());
+            post.push(format!("c:{}", chance.of(&["stopped", "running"])));
         }
         _ => {
             let count = 1 + chance.below(2);
             for _ in 0..count {
                 let on = COMPONENTS[chance.below(5) % 3];
-                pieces(chance, on, &mut changes, &mut post);
+                pieces(chance, on, kept, &mut changes, &mut post);
             }
             if chance.percent(20) {
                 made.group = Some(ident("g"));
@@ -219,18 +230,28 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, text: &mut Stri
 }
 
 /// A name that a coordinator may raise.
-fn raised(chance: &mut Chance, configurations: usize, several: bool) -> String {
+fn raised(chance: &mut Chance, configurations: usize, several: bool, kept: bool) -> String {
     let id = match chance.below(10) {
         0..=2 => chance.below(2),
         3 => 2,
         _ => chance.below(configurations),
     };
     match chance.below(20) {
+        _ if kept && id == 3 => "c2".to_owned(),
+        17 if kept => "c2.undo".to_owned(),
         0..=11 => format!("c{id}"),
         12..=16 => format!("c{id}.undo"),
         17 => "undo".to_owned(),
         _ if several => chance.pick(&TOLD).to_owned(),
         _ => format!("c{id}"),
+    }
+}
+
+/// A configuration that a state brings with it.
+fn scoped(chance: &mut Chance, configurations: usize, kept: bool) -> String {
+    match chance.below(configurations) {
+        3 if kept => "c2".to_owned(),
+        id => format!("c{id}"),
     }
 }
 
@@ -242,7 +263,7 @@ fn answer(chance: &mut Chance, configurations: usize) -> String {
 
 /// A coordinator. What answers, its own end or the other coordinator lead to stands further on in the list of states: so it
 /// comes to rest, however fast the answers come.
-fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: usize, several: bool, text: &mut String) -> Coordinator {
+fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: usize, several: bool, kept: bool, text: &mut String) -> Coordinator {
     let count = 2 + chance.below(4);
     let mut root = State::new(ident("root"));
     let mut names: Vec<String> = vec!["idle".to_owned()];
@@ -256,24 +277,24 @@ fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: us
                 state.entry.push(raise(&format!("c{first}")));
             }
             for _ in 0..chance.below(3) {
-                state.entry.push(raise(&raised(chance, configurations, several)));
+                state.entry.push(raise(&raised(chance, configurations, several, kept)));
             }
             if chance.percent(35) {
-                let id = ConfigId::new(&format!("c{}", chance.below(configurations))).expect("a plain name");
+                let id = ConfigId::new(&scoped(chance, configurations, kept)).expect("a plain name");
                 state.config.push((id, Origin::NONE));
             }
             if chance.percent(15) {
-                state.exit.push(raise(&raised(chance, configurations, several)));
+                state.exit.push(raise(&raised(chance, configurations, several, kept)));
             }
             if chance.percent(20) {
                 for child in ["in0", "in1"] {
                     let mut inner = State::new(ident(child));
                     if chance.percent(60) {
-                        let id = ConfigId::new(&format!("c{}", chance.below(configurations))).expect("a plain name");
+                        let id = ConfigId::new(&scoped(chance, configurations, kept)).expect("a plain name");
                         inner.config.push((id, Origin::NONE));
                     }
                     if chance.percent(40) {
-                        inner.entry.push(raise(&raised(chance, configurations, several)));
+                        inner.entry.push(raise(&raised(chance, configurations, several, kept)));
                     }
                     state.children.push(Node::State(inner));
                 }
@@ -284,6 +305,11 @@ fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: us
         }
         root.children.push(Node::State(state));
     }
+    if kept {
+        let mut base = State::new(ident("base"));
+        base.entry.push(raise("c3"));
+        root.children.push(Node::State(base));
+    }
     root.transitions.push(Transition::new("initial", "idle", []));
     let mut add = |src: &str, tgt: &str, events: Vec<Trigger>, effect: Vec<String>| {
         let mut transition = Transition::new(src, tgt, events);
@@ -291,13 +317,25 @@ fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: us
         root.transitions.push(transition);
     };
     let started = format!("s{}", 1 + chance.below(2).min(count - 1));
-    add("idle", &started, vec![trigger("e_start")], vec![]);
+    match (kept, first) {
+        (false, _) => add("idle", &started, vec![trigger("e_start")], vec![]),
+        (true, 0) => {
+            add("idle", "base", vec![trigger("e_start")], vec![]);
+            add("base", &started, vec![trigger("e0")], vec![]);
+            add("base", "idle", vec![trigger("e_shutdown")], vec![]);
+        }
+        (true, _) => add("idle", &started, vec![trigger("e1")], vec![]),
+    }
     for (at, own) in names.iter().enumerate() {
+        // With a component that is kept, nothing else begins before that is there.
+        if kept && at == 0 {
+            continue;
+        }
         let after = &names[at + 1..];
         if at > 0 {
             let mut effect = Vec::new();
             for _ in 0..chance.below(3) {
-                effect.push(raised(chance, configurations, several));
+                effect.push(raised(chance, configurations, several, kept));
             }
             if chance.percent(70) {
                 effect.push(format!("c{first}.undo"));
@@ -307,7 +345,7 @@ fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: us
         for _ in 0..2 + chance.below(3) {
             let mut effect = Vec::new();
             if chance.percent(35) {
-                effect.push(raised(chance, configurations, several));
+                effect.push(raised(chance, configurations, several, kept));
             }
             let target = names[1 + chance.below(names.len() - 1)].clone();
             let by_itself = !after.is_empty() && !own.starts_with("done");
@@ -378,15 +416,18 @@ fn told(state: &State, depth: usize, text: &mut String) {
 pub fn make(chance: &mut Chance) -> Made {
     let mut text = String::new();
     let several = chance.percent(40);
-    let count = 4 + chance.below(3);
+    // A safe configuration is about a component of its own, which is created once, before anything else, and kept. Left out:
+    // it comes while what it is about is being created, destroyed or brought back.
+    let kept = chance.percent(50);
+    let count = if kept { 6 + chance.below(2) } else { 4 + chance.below(3) };
     let stack = if chance.percent(50) { 2 + chance.below(3) } else { 16 };
     // Left out: a frame that waits for its confirmation and is squashed meanwhile.
     let confirms = stack == 16;
     let configurations: Vec<Configuration> =
-        (0..count).map(|at| configuration(chance, at, confirms, &mut text)).collect();
-    let mut coordinators = vec![coordinator(chance, "one", 0, count, several, &mut text)];
+        (0..count).map(|at| configuration(chance, at, confirms, kept, &mut text)).collect();
+    let mut coordinators = vec![coordinator(chance, "one", 0, count, several, kept, &mut text)];
     if several {
-        coordinators.push(coordinator(chance, "two", 1, count, several, &mut text));
+        coordinators.push(coordinator(chance, "two", 1, count, several, kept, &mut text));
     }
     let _ = writeln!(text, "limits.stack {stack}");
     let deployment = Deployment {
@@ -410,5 +451,5 @@ pub fn make(chance: &mut Chance) -> Made {
         origin: Origin::NONE,
         key_origins: BTreeMap::new(),
     };
-    Made { deployment, catalogue: catalogue(), text }
+    Made { deployment, catalogue: catalogue(), text, kept }
 }
