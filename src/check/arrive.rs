@@ -119,9 +119,13 @@ impl Product<'_> {
                 stops.contains(&turn.number) && (turn.batch.requests.len() > 1 || twice)
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
-                let mut waits = state.clone();
-                stops.iter().rev().for_each(|number| waits.desk.put_back(*number));
-                states.push(self.take_in(waits, batch.clone()));
+                // Any of them, but no more than a few at once.
+                for some in 1..1u32 << stops.len().min(3) {
+                    let mut waits = state.clone();
+                    let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
+                    those.rev().for_each(|(_, number)| waits.desk.put_back(*number));
+                    states.push(self.take_in(waits, batch.clone()));
+                }
             }
         }
         states.insert(0, self.take_in(state, batch));
@@ -285,7 +289,8 @@ impl Product<'_> {
         self.begin(&mut state);
         // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
         state.telling.extend(answers.iter().copied());
-        let mut states = vec![state];
+        // What is in flight may come between what begins now and what is heard now.
+        let mut states = if state.flight.is_empty() { vec![state] } else { self.lands(state).into_vec() };
         for _ in 0..answers.len() {
             let mut heard = Vec::with_capacity(states.len());
             for mut state in states {

@@ -146,16 +146,23 @@ impl Product<'_> {
         }
         // In the order in which they came.
         let mut given_up: SmallVec<[usize; 1]> = SmallVec::new();
+        let mut late: SmallVec<[usize; 1]> = SmallVec::new();
         let mut interrupted = None;
         for (_, stop) in state.stopped.iter().filter(|(of, _)| *of == number) {
             match stop {
                 Stop::GivenUp(undo) if interrupted.is_none() => given_up.extend(given_up_of(undo, &requests)),
-                Stop::GivenUp(_) => {}
+                Stop::GivenUp(undo) => late.extend(given_up_of(undo, &requests)),
                 Stop::Interrupted(planned) => interrupted = Some(*planned),
             }
         }
         if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
-            return self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            if !late.is_empty() {
+                // What came at the same moment may have been told first.
+                given_up.append(&mut late);
+                self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            }
+            return;
         }
         if let Some(top) = self.worlds.top(state.world) {
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
