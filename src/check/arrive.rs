@@ -85,7 +85,12 @@ impl Product<'_> {
     pub(super) fn meddles(&self, state: &State, batch: &Batch) -> bool {
         let is_safe = |id: ConfigId| self.is_safe(id);
         let arrival = state.desk.clone().arrive(batch.clone(), is_safe, &self.worlds.claims);
-        !arrival.told.is_empty() || !self.stopped_by(state, batch).is_empty()
+        // Also what waits its turn behind others: by then these may be over.
+        let finds = |undo: &Request| {
+            let mut turns = state.desk.under_way().iter();
+            turns.any(|turn| given_up_of(undo, &turn.batch.requests).is_some())
+        };
+        !arrival.told.is_empty() || !self.stopped_by(state, batch).is_empty() || batch.requests.iter().any(finds)
     }
 
     /// What is in flight comes now, or later where that makes a difference.

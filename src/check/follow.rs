@@ -102,6 +102,7 @@ impl<'a> Follower<'a> {
     /// There is no such state: where it may have been, in words.
     pub fn see(&mut self, seen: Seen) -> Result<(), String> {
         let (rest, answering) = self.silently();
+        let answering_too = answering.clone();
         let mut next: FxHashSet<May> = FxHashSet::default();
         match seen {
             Seen::Answer { by, event } => {
@@ -132,7 +133,9 @@ impl<'a> Follower<'a> {
             }
         }
         if next.is_empty() {
-            return Err(format!("nothing of this leads there:\n{}", self.told(rest.iter())));
+            let told = self.told(rest.iter());
+            self.may = rest.into_iter().map(|state| May { state, owed: Answers::new() }).chain(answering_too).collect();
+            return Err(format!("nothing of this leads there:\n{told}"));
         }
         self.may = next.into_iter().collect();
         Ok(())
@@ -146,7 +149,9 @@ impl<'a> Follower<'a> {
         let (rest, _) = self.silently();
         let same: Vec<&State> = rest.iter().filter(|state| is_quiet(state) && self.fits(state, shown)).collect();
         let Some(first) = same.first() else {
-            return Err(format!("it is in none of these:\n{}", self.told(rest.iter().filter(|s| is_quiet(s)))));
+            let told = self.told(rest.iter().filter(|s| is_quiet(s)));
+            self.may = rest.into_iter().map(|state| May { state, owed: Answers::new() }).collect();
+            return Err(format!("it is in none of these:\n{told}"));
         };
         let known = Known {
             world: self.product.worlds.get(first.world).is_some(),
@@ -155,6 +160,11 @@ impl<'a> Follower<'a> {
         };
         self.may = same.into_iter().map(|state| May { state: state.clone(), owed: Answers::new() }).collect();
         Ok(known)
+    }
+
+    /// Whether something may have ended *broken*: what `check` knows of system and stack from then on is nothing.
+    pub fn is_lost(&self) -> bool {
+        self.may.iter().any(|may| self.product.worlds.get(may.state.world).is_none())
     }
 
     /// The states in which it may be, in words.

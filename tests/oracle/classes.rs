@@ -73,7 +73,7 @@ impl Classes {
             }
             self.close();
             match note {
-                Note::Answer { request, by, answer } => self.answered(*request, by, answer),
+                Note::Answer { request, by, answer, .. } => self.answered(*request, by, answer),
                 Note::Moved(active) if active.last().is_some_and(|leaf| leaf.contains("done")) => self.meets("e_done"),
                 _ => {}
             }

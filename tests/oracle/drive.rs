@@ -16,7 +16,7 @@ use std::time::Duration;
 /// What an observer of the session wrote down.
 #[derive(Debug, Clone)]
 pub enum Note {
-    Answer { request: u64, by: String, answer: String },
+    Answer { request: u64, by: String, answer: String, steps: String },
     Requested { request: u64, by: String, ask: String },
     Moved(Vec<String>),
     /// The configurator itself failed.
@@ -84,7 +84,8 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
         Arc::new(move |_, what| {
             let note = match what {
                 Happening::Answered(a) => {
-                    Note::Answer { request: a.request, by: a.by.clone(), answer: a.answer.clone() }
+                    let steps = serde_json::to_string(&a.steps).unwrap_or_default();
+                    Note::Answer { request: a.request, by: a.by.clone(), answer: a.answer.clone(), steps }
                 }
                 Happening::Requested { request, ask, by } => {
                     Note::Requested { request: request.unwrap_or_default(), by: by.clone(), ask: ask.clone() }
@@ -100,6 +101,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     let mut case = Case { session, clock: clock.clone(), follower, notes, log: vec![said], classes, names };
     let went = case.go(made, chance);
     let overflowed = case.follower.overflowed();
+    let lost = case.follower.is_lost();
     let log = std::mem::take(&mut case.log);
     drop(case);
     clock.shutdown();
@@ -107,6 +109,8 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     match went {
         _ if overflowed => Ok(false),
         Ok(()) => Ok(true),
+        // Left out: what follows on *broken*. `check` knows nothing of the world from then on.
+        Err(_) if lost => Ok(true),
         Err(why) => Err(Disagreement(format!("seed {seed}\n{}\n{}\n{why}", made.text, log.join("\n")))),
     }
 }
@@ -202,7 +206,7 @@ impl Case<'_> {
         let shown = self.shown();
         let known: Known = self.follower.rests(&shown).map_err(|why| format!("at rest as {shown:?}\n{why}"))?;
         self.classes.note(&notes, &shown, known);
-        Ok(())
+        if known.world { Ok(()) } else { Err("broken".to_owned()) }
     }
 
     fn shown(&self) -> Shown {
