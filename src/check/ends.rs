@@ -117,9 +117,10 @@ impl Product<'_> {
                 }
             }
         }
-        // What gives up a request that is taken up anew goes on doing so.
-        let goes_on = next.desk.under_way().iter().any(|turn| turn.number == number);
-        next.stopped.extend(given_up.into_iter().filter(|_| goes_on).map(|undo| (number, Stop::GivenUp(undo))));
+        // What was given up together with one before it is not taken up anew.
+        if next.desk.under_way().iter().any(|turn| turn.number == number) {
+            given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
+        }
         for undo in late {
             next = self.take_in(next, Batch::one(undo));
         }
@@ -133,7 +134,10 @@ impl Product<'_> {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
         state.lost.retain(|lost| *lost != id);
         let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
-        if let (true, Some((_, place))) = (waits, went.pushed.iter().find(|(of, _)| *of == id)) {
+        // One batch may push several of them.
+        let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
+        let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
+        if let (true, Some((_, place))) = (waits, pushed.next()) {
             state.unconfirmed.push(Unconfirmed { place: *place, request: Request { why: Why::Asked, ..*request } });
         }
     }
