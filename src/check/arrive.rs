@@ -287,8 +287,12 @@ impl Product<'_> {
         state.inbox.sort_by_key(|(to, _)| *to);
     }
 
-    /// Frames that waited for this event have been confirmed.
+    /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
+    /// its turn.
     pub(super) fn confirm(&self, state: &mut State, name: EventName) {
+        if !state.desk.is_empty() {
+            return;
+        }
         state.unconfirmed.retain(|waits| match waits.request.ask {
             Ask::Apply(id) => {
                 self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)

@@ -39,6 +39,9 @@ pub struct Product<'a> {
     pub others: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
+    /// What was given up was interrupted as well, while others of its batch were carried out with it: which of them stand
+    /// then is not followed exactly.
+    pub entangled: bool,
     /// Whether it is followed what comes where a batch under way may not have begun, or be over already, when it is stopped.
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
@@ -81,6 +84,7 @@ impl<'a> Product<'a> {
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
+            entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
             holds,

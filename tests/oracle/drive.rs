@@ -5,7 +5,7 @@ use crate::classes::Classes;
 use crate::generate::{CONFIRMS, Chance, EVENTS, Made, event};
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};
-use davit::platform::simulated::{Delays, Options, Simulated, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
 use davit::session::{Happening, Session, Setup};
 use davit::stack::Requester;
 use davit::statechart::{Chart, compile};
@@ -28,6 +28,7 @@ pub struct Disagreement(pub String);
 
 struct Case<'a> {
     session: Arc<Session>,
+    platform: Simulated,
     clock: Clock,
     follower: Follower<'a>,
     notes: Arc<Mutex<Vec<Note>>>,
@@ -35,6 +36,21 @@ struct Case<'a> {
     log: Vec<String>,
     classes: &'a mut Classes,
     names: Vec<String>,
+}
+
+/// What goes wrong. Left out: what leaves a component faulted or in quarantine, and a platform that lies, which `check` takes
+/// for what a monitor tells of or a loss.
+fn faults(chance: &mut Chance) -> Faults {
+    let mut rules = Vec::new();
+    if chance.percent(30) {
+        let often = [0.1, 0.3, 0.6][chance.below(3)];
+        rules.push(FaultRule::chance(often, Fault::Fail).times(1 + chance.below(4) as u32));
+    }
+    if chance.percent(10) {
+        let fault = if chance.percent(50) { Fault::LostRequest } else { Fault::LostAnswer };
+        rules.push(FaultRule::chance(0.2, fault).times(1 + chance.below(2) as u32));
+    }
+    Faults { seed: chance.below(1 << 30) as u64, ..Faults::new(rules) }
 }
 
 /// How long steps take.
@@ -98,7 +114,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
         })
     });
     let names = made.deployment.coordinators.iter().map(|c| c.name.to_string()).collect();
-    let mut case = Case { session, clock: clock.clone(), follower, notes, log: vec![said], classes, names };
+    let mut case = Case { session, platform, clock: clock.clone(), follower, notes, log: vec![said], classes, names };
     let went = case.go(made, chance);
     let overflowed = case.follower.overflowed();
     let lost = case.follower.is_lost();
@@ -143,10 +159,14 @@ impl Case<'_> {
             }
             self.rest(action)?;
             if action == 0 {
-                // What is kept is there before anything else happens.
+                // What is kept is there before anything else happens, or goes wrong.
                 for _ in 0..24 {
                     self.clock.sleep(Duration::from_millis(1));
                     self.rest(0)?;
+                }
+                // Left out: something goes wrong while a safe configuration stops it.
+                if !made.kept {
+                    self.platform.set_faults(faults(chance));
                 }
             }
             for _ in 0..chance.of(&[0, 0, 1, 1, 2, 3, 8]).to_owned() {

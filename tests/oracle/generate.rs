@@ -209,7 +209,7 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, tex
                 1 | 2 => OnFailure::Rollback,
                 _ => OnFailure::Unset,
             };
-            if confirms && made.on_failure != OnFailure::Hold && chance.percent(15) {
+            if confirms && made.on_failure != OnFailure::Hold && chance.percent(25) {
                 made.confirm = Some(Confirm {
                     event: event(*chance.of(&[CONFIRMS, "x0"])),
                     within: Duration::from_millis(1 + chance.below(6) as u64),
@@ -416,7 +416,7 @@ fn told(state: &State, depth: usize, text: &mut String) {
 /// The deployment of that chance.
 pub fn make(chance: &mut Chance) -> Made {
     let mut text = String::new();
-    let several = chance.percent(40);
+    let several = chance.percent(50);
     // A safe configuration is about a component of its own, which is created once, before anything else, and kept. Left out:
     // it comes while what it is about is being created, destroyed or brought back.
     let kept = chance.percent(50);
