@@ -137,15 +137,17 @@ impl Engine {
             edits.extend(done.map(|part| &planned.parts[part].edits));
         }
         let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
+        // What was decided of those behind one that failed took that for done: they are taken up anew.
+        let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
+        if let Some(part) = failed.filter(|part| !was_stopped(&parts[*part])) {
+            end = group.places[part] + 1;
+        }
         for (part, ended) in parts.into_iter().enumerate() {
             let place = group.places[part];
             let request = requests[place];
             let Some(planned) = planned else { break };
             match ended {
-                PartEnd::Anew => {
-                    end = place;
-                    break;
-                }
+                PartEnd::Anew => break,
                 PartEnd::Done => {
                     confirm.extend(pushed.next().flatten().map(|frame| (request, frame)));
                     answers.push((place, Some(request.ask.done()), None));
@@ -365,4 +367,14 @@ impl Engine {
         };
         self.world.stack.frames().iter().map(view).collect()
     }
+}
+
+/// Whether a part ended since everything was stopped.
+fn was_stopped(part: &PartEnd) -> bool {
+    let reason = match part {
+        PartEnd::Failed(reason) => reason,
+        PartEnd::Broken(broken) => &broken.residual.cause,
+        _ => return false,
+    };
+    matches!(reason, Reason::Interrupted(_) | Reason::TakenDown)
 }
