@@ -4,7 +4,7 @@ use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
 use super::world::{Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
-use crate::stack::{Batch, Request, Requester, Why, given_up_of};
+use crate::stack::{Request, Requester, Why, given_up_of};
 use smallvec::SmallVec;
 
 /// Requests of a batch that are answered: place and verdict; none: nobody is told.
@@ -121,8 +121,8 @@ impl Product<'_> {
         if next.desk.under_way().iter().any(|turn| turn.number == number) {
             given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
         }
-        for undo in late {
-            next = self.take_in(next, Batch::one(undo));
+        for undo in late.into_iter().rev() {
+            next.desk.comes_next(undo);
         }
         for next in self.lands(next) {
             self.tell(next, answers.clone(), failed, nexts);

@@ -312,7 +312,7 @@ impl Engine {
                 Some(Verdict::Ok) => {
                     self.forget(undo);
                     self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
-                    let _ = self.desk.arrive(Batch::one(undo), |_| false, &self.claims);
+                    self.desk.comes_next(undo);
                 }
                 Some(Verdict::Broken) => {
                     let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));

@@ -164,6 +164,11 @@ impl Desk {
         None
     }
 
+    /// An undo that came too late to give something up: it is the next to begin, before what came later, also of its own batch.
+    pub fn comes_next(&mut self, undo: Request) {
+        self.waiting.push_front(Batch::one(undo));
+    }
+
     /// A batch that could begin has not done so after all: it is the first that waits.
     pub fn put_back(&mut self, number: u32) {
         if let Some(at) = self.under_way.iter().position(|turn| turn.number == number) {

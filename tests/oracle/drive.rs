@@ -42,9 +42,9 @@ struct Case<'a> {
 /// for what a monitor tells of or a loss.
 fn faults(chance: &mut Chance) -> Faults {
     let mut rules = Vec::new();
-    if chance.percent(30) {
-        let often = [0.1, 0.3, 0.6][chance.below(3)];
-        rules.push(FaultRule::chance(often, Fault::Fail).times(1 + chance.below(4) as u32));
+    if chance.percent(50) {
+        let often = [0.1, 0.3, 0.8][chance.below(3)];
+        rules.push(FaultRule::chance(often, Fault::Fail).times(1 + chance.below(8) as u32));
     }
     if chance.percent(10) {
         let fault = if chance.percent(50) { Fault::LostRequest } else { Fault::LostAnswer };
