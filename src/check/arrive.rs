@@ -5,7 +5,7 @@ use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
-use crate::stack::{Arrival, Batch, Request, Why};
+use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -55,7 +55,7 @@ impl Product<'_> {
         state.desk.requests_mut().for_each(gone);
         state.safe.iter_mut().for_each(gone);
         state.due.iter_mut().for_each(|(request, _)| gone(request));
-        state.due.retain(|(request, _)| request.tag.0 != 0);
+        state.due.retain(|(request, _)| self.tells_all || request.tag.0 != 0);
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
@@ -81,6 +81,31 @@ impl Product<'_> {
         stopped
     }
 
+    /// Whether `batch` would stop, overtake or cancel anything: then it makes a difference when it comes.
+    pub(super) fn meddles(&self, state: &State, batch: &Batch) -> bool {
+        let is_safe = |id: ConfigId| self.is_safe(id);
+        let arrival = state.desk.clone().arrive(batch.clone(), is_safe, &self.worlds.claims);
+        // Also what waits its turn behind others: by then these may be over.
+        let finds = |undo: &Request| {
+            let mut turns = state.desk.under_way().iter();
+            turns.any(|turn| given_up_of(undo, &turn.batch.requests).is_some())
+        };
+        !arrival.told.is_empty() || !self.stopped_by(state, batch).is_empty() || batch.requests.iter().any(finds)
+    }
+
+    /// What is in flight comes now, or later where that makes a difference.
+    pub(super) fn lands(&mut self, mut state: State) -> SmallVec<[State; 2]> {
+        let mut states = SmallVec::new();
+        if state.flight.first().is_some_and(|batch| self.meddles(&state, batch)) {
+            states.push(state.clone());
+        }
+        for batch in std::mem::take(&mut state.flight) {
+            state = self.take_in(state, batch);
+        }
+        states.push(state);
+        states
+    }
+
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
     pub(super) fn arrive(&mut self, mut state: State, batch: Batch) -> Vec<State> {
         if !state.flight.is_empty() {
@@ -89,13 +114,23 @@ impl Product<'_> {
         }
         let stops = self.stopped_by(&state, &batch);
         let mut states = Vec::with_capacity(1);
-        if self.races && !stops.is_empty() {
+        if self.races && self.meddles(&state, &batch) {
             states.push(State { flight: vec![batch.clone()], ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
-            if batch.requests.iter().any(is_safe) {
-                let mut waits = state.clone();
-                stops.iter().rev().for_each(|number| waits.desk.put_back(*number));
-                states.push(self.take_in(waits, batch.clone()));
+            // Given up alone and once, it is answered the same way at whatever time.
+            let among = |turn: &Turn| {
+                let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
+                let twice = batch.requests.iter().filter(gives_up).count() > 1;
+                stops.contains(&turn.number) && (turn.batch.requests.len() > 1 || twice)
+            };
+            if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
+                // Any of them, but no more than a few at once.
+                for some in 1..1u32 << stops.len().min(3) {
+                    let mut waits = state.clone();
+                    let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
+                    those.rev().for_each(|(_, number)| waits.desk.put_back(*number));
+                    states.push(self.take_in(waits, batch.clone()));
+                }
             }
         }
         states.insert(0, self.take_in(state, batch));
@@ -122,21 +157,22 @@ impl Product<'_> {
             state.stayed |= *verdict == Verdict::UndoFailed;
             self.due(&mut state, *request, *verdict);
         }
+        for (number, undo) in arrival.given_up {
+            self.owed(&mut state, &undo);
+            self.give_up(&mut state, number, undo);
+        }
         if !arrival.safe.is_empty() {
             for turn in state.desk.under_way() {
-                let stopped = state.stopped.iter().any(|(of, stop)| *of == turn.number && *stop == Stop::Interrupted);
-                if !stopped {
-                    state.stopped.push((turn.number, Stop::Interrupted));
+                let interrupted = |(of, stop): &(u32, Stop)| *of == turn.number && matches!(stop, Stop::Interrupted(_));
+                if !state.stopped.iter().any(interrupted) {
+                    state.stopped.push((turn.number, Stop::Interrupted(state.world)));
                 }
             }
         }
         for request in arrival.safe {
             self.owed(&mut state, &request);
             state.safe.push(request);
-        }
-        for (number, undo) in arrival.given_up {
-            self.owed(&mut state, &undo);
-            self.give_up(&mut state, number, undo);
+            state.crowded = state.safe.len() > 1;
         }
         self.begin(&mut state);
         state
@@ -144,32 +180,47 @@ impl Product<'_> {
 
     /// What is under way is given up by its own undo.
     fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
-        let Some(turn) = state.desk.under_way().iter().find(|turn| turn.number == number) else { return };
-        let requests = turn.batch.requests.clone();
-        let Ask::UndoOf(id) = undo.ask else { return };
-        let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
-        let Some(place) = requests.iter().position(fits) else { return };
-        let begun = match self.worlds.top(state.world) {
+        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
+        let requests = turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default();
+        let Some(place) = given_up_of(&undo, &requests) else {
+            // Another undo of the same step has given it up already.
+            return self.due(state, undo, Verdict::Undone);
+        };
+        // What was interrupted was planned before that.
+        let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+            Stop::Interrupted(planned) if *of == number => Some(*planned),
+            _ => None,
+        });
+        let planned = planned.unwrap_or(state.world);
+        let begun = match self.worlds.top(planned) {
             Some(_) => place == 0,
-            None => self.comes(state, &requests).parts.iter().any(|part| part.place == place),
+            None => self.worlds.comes(planned, &requests).parts.iter().any(|part| part.place == place),
         };
         if begun {
             state.stopped.push((number, Stop::GivenUp(undo)));
             return;
         }
-        // It stands behind in its batch and has not begun.
-        state.desk.answered(number, place);
-        self.due(state, requests[place], Verdict::Cancelled);
+        self.give_up_behind(state, number, undo);
+    }
+
+    /// What stands behind in its batch and has not begun is given up.
+    pub(super) fn give_up_behind(&self, state: &mut State, number: u32, undo: Request) {
+        let requests = state.desk.under_way().iter().find(|turn| turn.number == number).map(|turn| &turn.batch.requests);
+        let request = requests.and_then(|requests| Some((given_up_of(&undo, requests)?, requests)));
+        if let Some((place, request)) = request.map(|(place, requests)| (place, requests[place])) {
+            state.desk.answered(number, place);
+            self.due(state, request, Verdict::Cancelled);
+        }
         self.due(state, undo, Verdict::Undone);
     }
 
-    /// An answer is on its way, if anybody waits for it.
+    /// An answer is on its way, if anybody waits for it (or all are to be given).
     fn due(&self, state: &mut State, request: Request, verdict: Verdict) {
         let listens = |number: usize| {
             let event = self.members[number].chart.event(verdict.event(request.ask));
             request.tag.0 != 0 && event != EventId::OTHER
         };
-        if self.member(request.requester).is_some_and(listens) {
+        if self.tells_all || self.member(request.requester).is_some_and(listens) {
             state.due.push((request, verdict));
         }
     }
@@ -183,8 +234,11 @@ impl Product<'_> {
         }
     }
 
-    /// Whatever can begin does.
+    /// Whatever can begin does; nothing while a safe configuration is being applied.
     pub(super) fn begin(&mut self, state: &mut State) {
+        if !state.safe.is_empty() {
+            return;
+        }
         while let Some(turn) = state.desk.turn(&self.worlds.claims) {
             let first = turn.batch.requests[0];
             if first.why != Why::Down {
@@ -233,8 +287,12 @@ impl Product<'_> {
         state.inbox.sort_by_key(|(to, _)| *to);
     }
 
-    /// Frames that waited for this event have been confirmed.
+    /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
+    /// its turn.
     pub(super) fn confirm(&self, state: &mut State, name: EventName) {
+        if !state.desk.is_empty() {
+            return;
+        }
         state.unconfirmed.retain(|waits| match waits.request.ask {
             Ask::Apply(id) => {
                 self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)
@@ -248,7 +306,8 @@ impl Product<'_> {
         self.begin(&mut state);
         // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
         state.telling.extend(answers.iter().copied());
-        let mut states = vec![state];
+        // What is in flight may come between what begins now and what is heard now.
+        let mut states = if state.flight.is_empty() { vec![state] } else { self.lands(state).into_vec() };
         for _ in 0..answers.len() {
             let mut heard = Vec::with_capacity(states.len());
             for mut state in states {

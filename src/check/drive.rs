@@ -104,7 +104,8 @@ impl Product<'_> {
             }
         }
         if let Some(request) = state.safe.first().copied()
-            && let Err(reasons) = &self.worlds.safe(state.world, &request).done
+            && let reasons = self.worlds.safe(state.world, &request).troubles.clone()
+            && !reasons.is_empty()
         {
             return Err((request, reasons.to_vec()));
         }

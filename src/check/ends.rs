@@ -2,9 +2,9 @@
 
 use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
-use super::world::{Comes, Top, Went};
-use crate::model::{Ask, ConfigId, Verdict};
-use crate::stack::{Batch, Request, Requester, Why};
+use super::world::{Comes, Top, Went, WorldId};
+use crate::model::{Ask, Verdict};
+use crate::stack::{Request, Requester, Why, given_up_of};
 use smallvec::SmallVec;
 
 /// Requests of a batch that are answered: place and verdict; none: nobody is told.
@@ -105,7 +105,7 @@ impl Product<'_> {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
             answers.push((request, verdict));
-            let fits = |undo: &Request| matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b);
+            let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
                 let undo = given_up.remove(at);
@@ -117,16 +117,16 @@ impl Product<'_> {
                 }
             }
         }
-        // What gives up a request that is taken up anew goes on doing so.
-        let goes_on = next.desk.under_way().iter().any(|turn| turn.number == number);
-        next.stopped.extend(given_up.into_iter().filter(|_| goes_on).map(|undo| (number, Stop::GivenUp(undo))));
-        for undo in late {
-            next = self.take_in(next, Batch::one(undo));
+        // What was given up together with one before it is not taken up anew.
+        if next.desk.under_way().iter().any(|turn| turn.number == number) {
+            given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
         }
-        for batch in std::mem::take(&mut next.flight) {
-            next = self.take_in(next, batch);
+        for undo in late.into_iter().rev() {
+            next.desk.comes_next(undo);
         }
-        self.tell(next, answers, failed, nexts);
+        for next in self.lands(next) {
+            self.tell(next, answers.clone(), failed, nexts);
+        }
     }
 
     /// What a request that was carried out leaves to be waited for.
@@ -134,7 +134,10 @@ impl Product<'_> {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
         state.lost.retain(|lost| *lost != id);
         let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
-        if let (true, Some((_, place))) = (waits, went.pushed.iter().find(|(of, _)| *of == id)) {
+        // One batch may push several of them.
+        let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
+        let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
+        if let (true, Some((_, place))) = (waits, pushed.next()) {
             state.unconfirmed.push(Unconfirmed { place: *place, request: Request { why: Why::Asked, ..*request } });
         }
     }
@@ -145,55 +148,37 @@ impl Product<'_> {
         if requests.is_empty() {
             return;
         }
+        // In the order in which they came.
+        let mut given_up: SmallVec<[usize; 1]> = SmallVec::new();
+        let mut late: SmallVec<[usize; 1]> = SmallVec::new();
+        let mut interrupted = None;
+        for (_, stop) in state.stopped.iter().filter(|(of, _)| *of == number) {
+            match stop {
+                Stop::GivenUp(undo) if interrupted.is_none() => given_up.extend(given_up_of(undo, &requests)),
+                Stop::GivenUp(undo) => late.extend(given_up_of(undo, &requests)),
+                Stop::Interrupted(planned) => interrupted = Some(*planned),
+            }
+        }
+        if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
+            self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            if !late.is_empty() {
+                // What came at the same moment may have been told first.
+                given_up.append(&mut late);
+                self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            }
+            return;
+        }
         if let Some(top) = self.worlds.top(state.world) {
-            let given_up = state.stopped.iter().find_map(|(of, stop)| match stop {
-                Stop::GivenUp(undo) if *of == number => Some(*undo),
-                _ => None,
-            });
-            let verdict = if given_up.is_some() { Verdict::Cancelled } else { requests[0].ask.failed() };
-            for verdict in [verdict, requests[0].ask.broken()] {
+            let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
+            for verdict in [ask.done(), ask.failed(), ask.broken()].into_iter().chain(cancelled) {
                 let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
-                self.ended(
-                    state,
-                    number,
-                    &requests,
-                    Given::from_iter([(0, Some(verdict))]),
-                    &went,
-                    Failed::Nothing,
-                    nexts,
-                );
+                let given = Given::from_iter([(0, Some(verdict))]);
+                self.ended(state, number, &requests, given, &went, Failed::Nothing, nexts);
             }
             return;
         }
         let comes = self.comes(state, &requests);
-        let interrupted = state.stopped.iter().any(|(of, stop)| *of == number && *stop == Stop::Interrupted);
-        if interrupted {
-            let mut given: Given = comes.told.clone();
-            given.extend(comes.parts.iter().map(|part| (part.place, Some(requests[part.place].ask.failed()))));
-            given.sort_by_key(|(place, _)| *place);
-            let went = comes.parts.first().map_or(&comes.done, |part| part.failed.as_ref().unwrap_or(&part.before));
-            // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
-            let undo = comes.parts.iter().any(|part| part.undo);
-            let class = if undo { Failed::Undo } else { Failed::Nothing };
-            self.ended(state, number, &requests, given.clone(), went, class, nexts);
-            if let Some(part) = comes.parts.iter().find(|part| part.failed.is_some()) {
-                let broken = |(place, verdict): (usize, Option<Verdict>)| {
-                    (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
-                };
-                self.broke(state, number, &requests, given.into_iter().map(broken).collect(), nexts);
-            }
-            return;
-        }
-        let given_up: SmallVec<[ConfigId; 1]> = state
-            .stopped
-            .iter()
-            .filter_map(|(of, stop)| match stop {
-                Stop::GivenUp(Request { ask: Ask::UndoOf(id), .. }) if *of == number => Some(*id),
-                _ => None,
-            })
-            .collect();
-        let is_given_up = |place: usize| matches!(requests[place].ask, Ask::Apply(id) if given_up.contains(&id));
-        let Some(k) = comes.parts.iter().position(|part| is_given_up(part.place)) else {
+        let Some(k) = comes.parts.iter().position(|part| given_up.contains(&part.place)) else {
             // It is refused by now, or was.
             return self.ends(state, number, nexts);
         };
@@ -202,9 +187,43 @@ impl Product<'_> {
         let mut broken = cancelled.clone();
         cancelled.push((part.place, Some(Verdict::Cancelled)));
         self.ended(state, number, &requests, cancelled, &part.before, Failed::Nothing, nexts);
+        // The last of it may have been done when that came.
+        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
+        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
             self.broke(state, number, &requests, broken, nexts);
+        }
+    }
+
+    /// How a batch may end that a safe configuration has interrupted: it is taken back, as far as it was planned in the world
+    /// from before.
+    fn interrupted_ends(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        planned: WorldId,
+        given_up: &[usize],
+        nexts: &mut Nexts,
+    ) {
+        let comes = self.worlds.comes(planned, requests);
+        self.entangled |= !given_up.is_empty() && comes.parts.len() > 1;
+        let end = |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
+        let mut given: Given = comes.told.clone();
+        given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
+        given.sort_by_key(|(place, _)| *place);
+        // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
+        let undo = comes.parts.iter().any(|part| part.undo);
+        let class = if undo { Failed::Undo } else { Failed::Nothing };
+        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
+        let world = self.worlds.stay(state.world, planned, undone);
+        self.ended(state, number, requests, given.clone(), &world, class, nexts);
+        if let Some(part) = comes.parts.first().filter(|_| comes.parts.iter().any(|part| part.failed.is_some())) {
+            let broken = |(place, verdict): (usize, Option<Verdict>)| {
+                (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
+            };
+            self.broke(state, number, requests, given.into_iter().map(broken).collect(), nexts);
         }
     }
 
@@ -212,35 +231,45 @@ impl Product<'_> {
     pub(super) fn safe_ends(&mut self, state: &State, request: &Request, nexts: &mut Nexts) {
         let mut over = state.clone();
         over.safe.remove(0);
+        over.crowded &= !over.safe.is_empty();
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
                 next.world = self.worlds.answered(top, request, verdict);
-                self.tell(next, Answers::from_iter([(*request, verdict)]), Failed::Nothing, nexts);
+                self.safe_told(next, request, verdict, Failed::Nothing, nexts);
             }
             return;
         }
         let comes = self.worlds.safe(state.world, request);
         let from = nexts.all.len();
-        match &comes.done {
-            Ok(went) => {
-                let mut next = over.clone();
-                self.go(&mut next, went);
-                self.applied(&mut next, request, Verdict::Ok, went);
-                self.tell(next, Answers::from_iter([(*request, Verdict::Ok)]), Failed::Nothing, nexts);
-                nexts.all[from..].iter_mut().for_each(|next| next.deep = (went.deep, went.left));
-            }
-            Err(reasons) if request.requester != Requester::Operator => {
-                nexts.troubles.push(Trouble::Refused(*request, reasons.clone()));
-            }
-            Err(_) => {}
+        if !comes.troubles.is_empty() && request.requester != Requester::Operator {
+            nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
         }
-        if comes.may_fail {
+        // Where a piece of it cannot be planned, it is done as far as it goes, and all is known of that.
+        let (verdict, class) = match comes.troubles.is_empty() {
+            true => (Verdict::Ok, Failed::Nothing),
+            false => (Verdict::Broken, Failed::Broken),
+        };
+        let mut next = over.clone();
+        self.go(&mut next, &comes.done);
+        self.applied(&mut next, request, verdict, &comes.done);
+        self.safe_told(next, request, verdict, class, nexts);
+        nexts.all[from..].iter_mut().for_each(|next| next.deep = (comes.done.deep, comes.done.left));
+        // What is under way may have made or changed what it finds, and goes on while it is applied.
+        let claim = self.worlds.claims.of([request]);
+        let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
+        if comes.may_fail || meets || state.crowded {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
             next.unconfirmed.clear();
-            self.tell(next, Answers::from_iter([(*request, Verdict::Broken)]), Failed::Broken, nexts);
+            self.safe_told(next, request, Verdict::Broken, Failed::Broken, nexts);
+        }
+    }
+
+    fn safe_told(&mut self, next: State, request: &Request, verdict: Verdict, failed: Failed, nexts: &mut Nexts) {
+        for next in self.lands(next) {
+            self.tell(next, Answers::from_iter([(*request, verdict)]), failed, nexts);
         }
     }
 }

@@ -81,7 +81,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
         OperatorMay::Apply(id) => Some(*id),
         OperatorMay::Set(_) => None,
     }));
-    let mut undone = Undone { ids: None, bare: FxHashSet::default() };
+    let mut undone = Undone { bare: FxHashSet::default(), ..Undone::default() };
     let mut members = Vec::new();
     for number in numbers {
         let (coordinator, chart) = (&deployment.coordinators[*number], charts[*number]);

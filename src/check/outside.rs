@@ -3,7 +3,7 @@
 use super::members::Member;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
-use crate::model::{Ask, ConfigId, RequestId, Verdict};
+use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, Request, Requester, Why};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
@@ -32,18 +32,7 @@ impl Product<'_> {
                 nexts.cut = true;
                 continue;
             }
-            let mut next = state.clone();
-            next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping();
-            self.confirm(&mut next, name);
-            self.spread(&mut next, name, None);
-            let by = Move::Event(u16::try_from(at).unwrap_or(u16::MAX));
-            // If one alone hears it, there is nothing to wait for.
-            if let [(only, event)] = next.inbox[..] {
-                next.inbox.clear();
-                self.hear(next, usize::from(only), event, by, nexts);
-            } else {
-                nexts.all.push(Next::plain(by, next, Failed::Nothing));
-            }
+            self.raised(state, name, Move::Event(u16::try_from(at).unwrap_or(u16::MAX)), nexts);
         }
         self.notices(state, nexts);
         self.operators(state, nexts);
@@ -58,8 +47,23 @@ impl Product<'_> {
         }
     }
 
+    /// An event comes to all that wait for it.
+    pub(super) fn raised(&mut self, state: &State, name: EventName, by: Move, nexts: &mut Nexts) {
+        let mut next = state.clone();
+        next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping();
+        self.confirm(&mut next, name);
+        self.spread(&mut next, name, None);
+        // If one alone hears it, there is nothing to wait for.
+        if let [(only, event)] = next.inbox[..] {
+            next.inbox.clear();
+            self.hear(next, usize::from(only), event, by, nexts);
+        } else {
+            nexts.all.push(Next::plain(by, next, Failed::Nothing));
+        }
+    }
+
     /// Confirmations that come or do not, and what is lost.
-    fn notices(&mut self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn notices(&mut self, state: &State, nexts: &mut Nexts) {
         for (at, waits) in state.unconfirmed.iter().enumerate() {
             let Ask::Apply(id) = waits.request.ask else { continue };
             let mut next = state.clone();

@@ -39,12 +39,17 @@ pub struct Product<'a> {
     pub others: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
+    /// What was given up was interrupted as well, while others of its batch were carried out with it: which of them stand
+    /// then is not followed exactly.
+    pub entangled: bool,
     /// Whether it is followed what comes where a batch under way may not have begun, or be over already, when it is stopped.
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
     /// Configurations that stand for something.
     pub holds: Vec<ConfigId>,
+    /// Answers that nobody hears are given as well.
+    pub tells_all: bool,
 }
 
 impl<'a> Product<'a> {
@@ -79,9 +84,11 @@ impl<'a> Product<'a> {
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
+            entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
             holds,
+            tells_all: false,
         };
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(&views[*number], charts, *number);
@@ -100,6 +107,7 @@ impl<'a> Product<'a> {
             desk: Desk::default(),
             stopped: SmallVec::new(),
             safe: SmallVec::new(),
+            crowded: false,
             due: SmallVec::new(),
             telling: SmallVec::new(),
             stayed: false,
@@ -120,22 +128,18 @@ impl<'a> Product<'a> {
 
     /// All that follows from a state.
     pub fn nexts(&mut self, state: &State) -> Nexts {
+        let mut nexts = self.goes_on(state);
+        if state.flight.is_empty() && state.inbox.is_empty() {
+            self.comes_from_outside(state, &mut nexts);
+        }
+        nexts
+    }
+
+    /// What follows from a state without anything coming from outside.
+    pub(super) fn goes_on(&mut self, state: &State) -> Nexts {
         let mut nexts = Nexts::default();
-        if let Some(batch) = state.flight.first() {
-            // It comes once one of those that it would stop is over.
-            for number in self.stopped_by(state, batch) {
-                self.ends(state, number, &mut nexts);
-            }
-            return nexts;
-        }
-        if let Some((request, verdict)) = state.due.first().copied() {
-            let mut next = state.clone();
-            next.due.remove(0);
-            self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, &mut nexts);
-        }
-        if let Some(request) = state.safe.first().copied() {
-            self.safe_ends(state, &request, &mut nexts);
-        }
+        // A batch in flight comes when one of those that it would stop is over.
+        self.answers_come(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
         let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
@@ -152,10 +156,21 @@ impl<'a> Product<'a> {
             let (_, event) = next.inbox.remove(at);
             self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
         }
-        if state.inbox.is_empty() {
-            self.comes_from_outside(state, &mut nexts);
-        }
         nexts
+    }
+
+    /// Answers that come whatever else does: those on their way, and of safe configurations.
+    fn answers_come(&mut self, state: &State, nexts: &mut Nexts) {
+        if let Some((request, verdict)) = state.due.first().copied() {
+            let mut next = state.clone();
+            next.due.remove(0);
+            for next in self.lands(next) {
+                self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+            }
+        }
+        if let Some(request) = state.safe.first().copied() {
+            self.safe_ends(state, &request, nexts);
+        }
     }
 
     /// A coordinator hears an event.

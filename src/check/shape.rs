@@ -18,6 +18,8 @@ pub struct Undone {
     pub ids: Option<FxHashSet<ConfigId>>,
     /// Those who undo whatever is their newest.
     pub bare: FxHashSet<Requester>,
+    /// Whether the order of frames counts also where nothing can tell it.
+    pub in_order: bool,
 }
 
 impl Undone {
@@ -82,6 +84,9 @@ impl Shapes {
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
     /// one name.
     fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
+        if self.undone.in_order {
+            return false;
+        }
         let one_name = a.requester == b.requester
             && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
         !one_name && !self.frames.share(a, b)

@@ -26,8 +26,8 @@ pub enum Failed {
 pub enum Stop {
     /// This undo of one of its requests.
     GivenUp(Request),
-    /// A safe configuration.
-    Interrupted,
+    /// A safe configuration; it was planned in this world.
+    Interrupted(WorldId),
 }
 
 /// A frame that waits for its confirmation.
@@ -52,6 +52,8 @@ pub struct State {
     pub stopped: SmallVec<[(u32, Stop); 1]>,
     /// Safe configurations that are being applied, in their order.
     pub safe: SmallVec<[Request; 1]>,
+    /// Several of them are, or were just now: one may meet with steps of another.
+    pub crowded: bool,
     /// Answers on their way.
     pub due: SmallVec<[(Request, Verdict); 1]>,
     /// Answers that are being given; none in a state between moves.
@@ -89,7 +91,7 @@ impl State {
     fn undos(&self) -> impl Iterator<Item = &Request> {
         self.stopped.iter().filter_map(|(_, stop)| match stop {
             Stop::GivenUp(undo) => Some(undo),
-            Stop::Interrupted => None,
+            Stop::Interrupted(_) => None,
         })
     }
 

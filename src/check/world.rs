@@ -14,7 +14,7 @@ use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Fi
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
-    FrameId, Group, Op, Planned, Reason, Request, Requester, Rules, Stack, World, take_up, transaction,
+    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, take_up,
 };
 use crate::system::{System, View, step};
 use crate::time::Time;
@@ -98,8 +98,10 @@ pub struct Comes {
 /// What a safe configuration comes to.
 #[derive(Debug, Clone)]
 pub struct SafeComes {
-    /// The world with it; none: it is refused.
-    pub done: Result<Went, Rc<Findings>>,
+    /// When all of it is done that can be.
+    pub done: Went,
+    /// What of it cannot be done there: then it ends *broken*.
+    pub troubles: Rc<Findings>,
     /// Whether a step of it can fail.
     pub may_fail: bool,
 }
@@ -255,7 +257,7 @@ impl<'a> Worlds<'a> {
             told: group.told.iter().map(|told| (told.place, told.verdict)).collect(),
             refused: refused.collect(),
             parts: Vec::new(),
-            done: Went { world: id, places: None, pushed: SmallVec::new(), deep: None, left: None },
+            done: Went::to(id),
             takes: group.takes.max(1),
         };
         let Some(planned) = group.planned else { return comes };
@@ -271,23 +273,21 @@ impl<'a> Worlds<'a> {
         for (k, part) in planned.parts.iter().enumerate() {
             let place = group.places[k];
             let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
-            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, None) };
-            let failed = (may_fail[k] || holds).then(|| {
-                let request = &requests[place];
-                let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
-                match stays {
-                    Some(frame) => self.after(id, &planned, k, Some(frame.id)),
-                    None => before.clone(),
-                }
+            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, &[]) };
+            let request = &requests[place];
+            let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
+            let failed = (may_fail[k] || holds).then(|| match stays {
+                Some(frame) => self.after(id, &planned, k, &[frame.id]),
+                None => before.clone(),
             });
             comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
         }
-        comes.done = self.after(id, &planned, planned.parts.len(), None);
+        comes.done = self.after(id, &planned, planned.parts.len(), &[]);
         comes
     }
 
-    /// The world after the first `parts` of a plan. `stays`: a frame that was to be undone with the state it belonged to.
-    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stays: Option<FrameId>) -> Went {
+    /// The world after the first `parts` of a plan. `stay`: frames that were to be undone with the state they belonged to.
+    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stay: &[FrameId]) -> Went {
         let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
         let mut world = before.clone();
         if parts == planned.parts.len() {
@@ -298,10 +298,30 @@ impl<'a> Worlds<'a> {
         }
         let edits = planned.parts[..parts].iter().map(|part| &part.edits);
         let pushed = world.stack.apply(edits, &[]);
-        if let Some(frame) = stays {
-            world.stack.unscope(frame);
-        }
+        stay.iter().for_each(|frame| world.stack.unscope(*frame));
         self.went(id, world, &pushed)
+    }
+
+    /// The world in which these undos were taken back, planned in `planned`: frames that were to be undone with the states
+    /// they belonged to stay without these.
+    pub fn stay(&mut self, id: WorldId, planned: WorldId, undos: impl Iterator<Item = Request>) -> Went {
+        let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
+        let mut stay: SmallVec<[FrameId; 2]> = SmallVec::new();
+        for undo in undos.filter(|undo| undo.scope.is_some()) {
+            let fits = |frame: &&Arc<Frame>| {
+                let by = frame.requester == undo.requester;
+                by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
+            };
+            // That which was the newest then: others may have come since, above it.
+            let count = planned.stack.frames().iter().filter(fits).count();
+            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
+        }
+        if stay.is_empty() {
+            return Went::to(id);
+        }
+        let mut world = before.clone();
+        stay.iter().for_each(|frame| world.stack.unscope(*frame));
+        self.went(id, world, &[])
     }
 
     /// What a safe configuration comes to in a world that is known.
@@ -312,20 +332,17 @@ impl<'a> Worlds<'a> {
         }
         let Ask::Apply(configuration) = request.ask else { unreachable!("safe configurations are applied") };
         self.asked.insert(configuration);
-        let planned = self.get(id).map(|world| {
-            let configuration = &self.configurations[&configuration];
-            let op =
-                Op::Push { configuration, requester: request.requester, at: Time::default(), scope: request.scope };
-            transaction(&world.system, &world.stack, &[op], &self.context)
-        });
-        let comes = match planned {
-            Some(Ok(planned)) => {
-                let may_fail = !planned.steps.is_empty();
-                SafeComes { done: Ok(self.after(id, &planned, planned.parts.len(), None)), may_fail }
-            }
-            Some(Err(refusal)) => SafeComes { done: Err(Rc::new(refusal.findings)), may_fail: true },
-            None => unreachable!("planned in a world that is known"),
-        };
+        let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
+        let configuration = &self.configurations[&configuration];
+        let Effort { planned, frame, troubles } =
+            effort(&before.system, &before.stack, configuration, request, Time::default(), &self.context);
+        let mut world = before.clone();
+        planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+        let pops = planned.parts[0].edits.pops.clone();
+        let pushed = world.stack.push_safe(pops, Frame { partial: !troubles.is_empty(), ..frame });
+        let may_fail = !planned.steps.is_empty();
+        let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
+        let comes = SafeComes { done: self.went(id, world, &[pushed]), troubles, may_fail };
         let comes = Rc::new(comes);
         self.safes.insert(key, comes.clone());
         comes

@@ -215,9 +215,11 @@ impl Engine {
                 did |= self.advance(at);
             }
         }
-        while let Some(at) =
-            self.running.iter().position(|running| running.over && !matches!(running.purpose, Purpose::Own))
-        {
+        // Answers of one moment: of safe configurations first, then in the order in which they began.
+        let over = |running: &&Running| running.over && !matches!(running.purpose, Purpose::Own);
+        let order = |running: &&Running| (!running.is_safe(), running.number);
+        while let Some(number) = self.running.iter().filter(over).min_by_key(order).map(|running| running.number) {
+            let Some(at) = self.running.iter().position(|running| running.number == number) else { break };
             let running = self.running.remove(at);
             self.ended(running);
             did = true;

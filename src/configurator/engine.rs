@@ -83,8 +83,8 @@ pub(super) struct Engine {
     /// What safe configurations under way could not plan, and what those that have ended touched.
     pub troubles: Vec<(RequestId, Vec<Reason>)>,
     pub touched: crate::transaction::Touched,
-    /// Undos that give up what is under way, answered with it.
-    pub giving_up: Vec<(u32, Request)>,
+    /// Undos that give up what is under way, with the number of that request; answered with it.
+    pub giving_up: Vec<(RequestId, Request)>,
     /// Commands that wait.
     pub commands: VecDeque<Command>,
     replies: Vec<(Ticket, Reply)>,

@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
-use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, take_up};
+use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, given_up_of, take_up};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
@@ -37,6 +37,12 @@ impl Engine {
         loop {
             let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
             let requests = turn.batch.requests.clone();
+            // Given up together with one before it, of which it was to be taken up anew.
+            let given_up = |request: &Request| self.giving_up.iter().any(|(of, _)| *of == request.id);
+            if let Some(place) = requests.iter().position(|request| !request.ask.is_undo() && given_up(request)) {
+                self.cancel_behind(number, place, requests[place]);
+                continue;
+            }
             let configurations = self.configurations.clone();
             let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
             let rules = Rules { configurations: &configurations, context: &self.context, at: self.clock.now(), busy };
@@ -124,18 +130,26 @@ impl Engine {
         let mut answers: Vec<(usize, Option<Verdict>, Option<Reason>)> = Vec::new();
         let mut confirm: Vec<(Request, FrameId)> = Vec::new();
         let mut end = group.takes;
+        // All at once: one may pop what another one of them pushes.
+        let done = (0..parts.len()).filter(|part| matches!(parts[*part], PartEnd::Done));
+        let mut edits = SmallVec::<[_; 2]>::new();
+        if let Some(planned) = planned {
+            edits.extend(done.map(|part| &planned.parts[part].edits));
+        }
+        let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
+        // What was decided of those behind one that failed took that for done: they are taken up anew.
+        let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
+        if let Some(part) = failed.filter(|part| !was_stopped(&parts[*part])) {
+            end = group.places[part] + 1;
+        }
         for (part, ended) in parts.into_iter().enumerate() {
             let place = group.places[part];
             let request = requests[place];
             let Some(planned) = planned else { break };
             match ended {
-                PartEnd::Anew => {
-                    end = place;
-                    break;
-                }
+                PartEnd::Anew => break,
                 PartEnd::Done => {
-                    let pushed = self.world.stack.apply([&planned.parts[part].edits], &busy);
-                    confirm.extend(pushed.first().map(|frame| (request, *frame)));
+                    confirm.extend(pushed.next().flatten().map(|frame| (request, frame)));
                     answers.push((place, Some(request.ask.done()), None));
                 }
                 PartEnd::Failed(reason) => {
@@ -172,7 +186,7 @@ impl Engine {
         for (place, verdict, reason) in answers {
             let request = requests[place];
             self.finish(request, verdict, reason);
-            self.answer_giving_up(number, &request, verdict);
+            self.answer_giving_up(&request, verdict);
         }
     }
 
@@ -244,35 +258,34 @@ impl Engine {
 
     /// What is under way is given up by its own undo.
     pub(super) fn give_up_request(&mut self, number: u32, undo: Request) {
-        let Ask::UndoOf(id) = undo.ask else { return };
-        self.giving_up.push((number, undo));
         let of_batch = |running: &&mut Running| matches!(&running.purpose, Purpose::Requests(of, _) if *of == number);
         let requests = match self.desk.under_way().iter().find(|turn| turn.number == number) {
             Some(turn) => turn.batch.requests.clone(),
-            None => return,
+            None => SmallVec::new(),
         };
-        let fits = |request: &Request| request.ask == Ask::Apply(id) && request.requester == undo.requester;
-        let place = requests.iter().position(fits);
+        let Some(place) = given_up_of(&undo, &requests) else {
+            // Another undo of the same step has given it up already.
+            return self.answer(undo, Verdict::Undone, None);
+        };
+        self.giving_up.push((requests[place].id, undo));
         let running = self.running.iter_mut().find(of_batch);
-        let part = match (&running, place) {
-            (Some(running), Some(place)) => match &running.purpose {
-                Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
-                _ => None,
-            },
+        let part = running.as_ref().and_then(|running| match &running.purpose {
+            Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
             _ => None,
-        };
-        match (running, part, place) {
-            (Some(running), Some(part), _) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
+        });
+        match (running, part) {
+            (Some(running), Some(part)) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
             // It stands behind in its batch and has not begun.
-            (_, None, Some(place)) => {
-                let request = requests[place];
-                self.desk.answered(number, place);
-                self.shift_places(number, place);
-                self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
-                self.answer_giving_up(number, &request, Some(Verdict::Cancelled));
-            }
-            _ => {}
+            _ => self.cancel_behind(number, place, requests[place]),
         }
+    }
+
+    /// A request of a batch under way is given up before it began.
+    fn cancel_behind(&mut self, number: u32, place: usize, request: Request) {
+        self.desk.answered(number, place);
+        self.shift_places(number, place);
+        self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
+        self.answer_giving_up(&request, Some(Verdict::Cancelled));
     }
 
     /// A request was taken out of a batch under way: those behind it have moved up.
@@ -282,31 +295,31 @@ impl Engine {
                 && *of == number
             {
                 group.takes -= usize::from(gone < group.takes);
+                group.told.retain(|told| told.place != gone);
                 group.places.iter_mut().filter(|place| **place > gone).for_each(|place| *place -= 1);
                 group.told.iter_mut().filter(|told| told.place > gone).for_each(|told| told.place -= 1);
             }
         }
     }
 
-    /// Answers the undo that gave `request` up.
-    fn answer_giving_up(&mut self, number: u32, request: &Request, verdict: Option<Verdict>) {
-        let fits = |(of, undo): &(u32, Request)| {
-            *of == number && matches!((undo.ask, request.ask), (Ask::UndoOf(a), Ask::Apply(b)) if a == b)
-        };
-        let Some(at) = self.giving_up.iter().position(fits) else { return };
-        let (_, undo) = self.giving_up.remove(at);
-        match verdict {
-            // It was through before it could be given up: the undo is a request like others.
-            Some(Verdict::Ok) => {
-                self.forget(undo);
-                self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
-                let _ = self.desk.arrive(Batch::one(undo), |_| false, &self.claims);
+    /// Answers the undos that gave `request` up.
+    fn answer_giving_up(&mut self, request: &Request, verdict: Option<Verdict>) {
+        let fits = |(of, _): &(RequestId, Request)| *of == request.id && !request.ask.is_undo();
+        while let Some(at) = self.giving_up.iter().position(fits) {
+            let (_, undo) = self.giving_up.remove(at);
+            match verdict {
+                // It was through before it could be given up: the undo is a request like others.
+                Some(Verdict::Ok) => {
+                    self.forget(undo);
+                    self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
+                    self.desk.comes_next(undo);
+                }
+                Some(Verdict::Broken) => {
+                    let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
+                    self.answer(undo, Verdict::UndoBroken, reason);
+                }
+                _ => self.answer(undo, Verdict::Undone, None),
             }
-            Some(Verdict::Broken) => {
-                let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
-                self.answer(undo, Verdict::UndoBroken, reason);
-            }
-            _ => self.answer(undo, Verdict::Undone, None),
         }
     }
 
@@ -354,4 +367,14 @@ impl Engine {
         };
         self.world.stack.frames().iter().map(view).collect()
     }
+}
+
+/// Whether a part ended since everything was stopped.
+fn was_stopped(part: &PartEnd) -> bool {
+    let reason = match part {
+        PartEnd::Failed(reason) => reason,
+        PartEnd::Broken(broken) => &broken.residual.cause,
+        _ => return false,
+    };
+    matches!(reason, Reason::Interrupted(_) | Reason::TakenDown)
 }

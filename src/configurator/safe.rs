@@ -7,8 +7,8 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, Target, Verdict};
-use crate::stack::{Edits, Effort, Frame, effort};
-use crate::system::{System, step};
+use crate::stack::{Effort, Frame, effort};
+use crate::system::{System, View as _, step};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
@@ -47,7 +47,10 @@ impl Engine {
         let frame = before.map_or(frame, |before| plan(&before).frame);
         let mut touched = Touched::default();
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
-            if let Target::Component(component) = entry.target {
+            // What is not there is left out, and does not keep what is taken back from bringing it back.
+            if let Target::Component(component) = entry.target
+                && self.world.system.component(component).is_some()
+            {
                 touched.add_state(component);
             }
         }
@@ -108,13 +111,12 @@ impl Engine {
         if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
             broken = Some(part);
         }
-        self.world.stack.apply([&Edits { pops: edits, push: None }], &[]);
         let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
         let frame = match (&broken, interrupted) {
             (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
             _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
         };
-        let pushed = self.world.stack.push(Frame { safe: true, ..frame });
+        let pushed = self.world.stack.push_safe(edits, frame);
         let (verdict, reason) = match broken {
             None if troubles.is_empty() => (Verdict::Ok, None),
             None => {

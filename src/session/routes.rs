@@ -64,6 +64,10 @@ impl Listener for ToConfigurator {
                 }
                 Meaning::Emitted(event) => {
                     self.hub.note(Happening::Emitted { event: event.to_string() });
+                    // It may be what confirms a configuration.
+                    if let Some(configurator) = self.configurator() {
+                        configurator.event(event);
+                    }
                     self.tell_others(event);
                 }
                 Meaning::UnknownUndo(name) => {
@@ -77,8 +81,7 @@ impl Listener for ToConfigurator {
                 }),
             }
         }
-        let configurator = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone());
-        if let Some(configurator) = configurator {
+        if let Some(configurator) = self.configurator() {
             // A full queue answers every request itself.
             let _ = configurator.submit(requests);
         }
@@ -122,10 +125,14 @@ impl Listener for ToConfigurator {
 }
 
 impl ToConfigurator {
+    fn configurator(&self) -> Option<ConfiguratorHandle> {
+        self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
+    }
+
     /// Has it stand in the queue that the *down* state was entered, if it was.
     fn tell_down(&mut self) {
         if std::mem::take(&mut self.untold)
-            && let Some(configurator) = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
+            && let Some(configurator) = self.configurator()
         {
             configurator.down(self.name);
         }

@@ -80,7 +80,9 @@ impl Desk {
         }
         for safe in &arrival.safe {
             let Ask::Apply(id) = safe.ask else { continue };
-            kept.requests.iter_mut().for_each(|request| request.still = true);
+            // What is behind in a batch under way was asked for before as well.
+            let behind = self.under_way.iter_mut().flat_map(|turn| &mut turn.batch.requests);
+            kept.requests.iter_mut().chain(behind.filter(|r| concerns(id, r))).for_each(|request| request.still = true);
             for request in self.cancel_waiting(|request| concerns(id, request)) {
                 let verdict = if request.ask.is_undo() { Verdict::UndoFailed } else { Verdict::Cancelled };
                 arrival.told.push((request, verdict, Reason::SafeCame(id)));
@@ -162,6 +164,11 @@ impl Desk {
         None
     }
 
+    /// An undo that came too late to give something up: it is the next to begin, before what came later, also of its own batch.
+    pub fn comes_next(&mut self, undo: Request) {
+        self.waiting.push_front(Batch::one(undo));
+    }
+
     /// A batch that could begin has not done so after all: it is the first that waits.
     pub fn put_back(&mut self, number: u32) {
         if let Some(at) = self.under_way.iter().position(|turn| turn.number == number) {
@@ -193,6 +200,12 @@ impl Desk {
     pub fn over(&mut self, number: u32) {
         self.under_way.retain(|turn| turn.number != number);
     }
+}
+
+/// The request of a batch under way that `undo` gives up: the newest that it may take back.
+pub fn given_up_of(undo: &Request, requests: &[Request]) -> Option<usize> {
+    let Ask::UndoOf(id) = undo.ask else { return None };
+    requests.iter().rposition(|request| takes_back(undo, request, id))
 }
 
 /// Whether `undo` (of `id`) takes back what `request` asks.

@@ -27,7 +27,7 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
-pub use desk::{Arrival, Desk, Turn};
+pub use desk::{Arrival, Desk, Turn, given_up_of};
 pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
@@ -221,7 +221,16 @@ impl Stack {
     /// Takes over what the parts of a transaction do to the stack, in their order, now that their steps are done. Answers
     /// the numbers of the frames pushed. `busy` are frames that others under way pop or hand over to.
     pub fn apply<'e>(&mut self, edits: impl IntoIterator<Item = &'e Edits>, busy: &[FrameId]) -> Vec<FrameId> {
-        let mut pushed: Vec<FrameId> = Vec::new();
+        self.apply_each(edits, busy).into_iter().flatten().collect()
+    }
+
+    /// The same; answers of each of them the frame that it pushed, unless a later one popped that again.
+    pub fn apply_each<'e>(
+        &mut self,
+        edits: impl IntoIterator<Item = &'e Edits>,
+        busy: &[FrameId],
+    ) -> Vec<Option<FrameId>> {
+        let mut pushed: Vec<Option<FrameId>> = Vec::new();
         let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
         for Edits { pops, push } in edits {
             for (id, hand) in pops {
@@ -229,13 +238,16 @@ impl Stack {
                 let popped = real(*id);
                 share::hand_over(&mut self.frames, hand, &real);
                 self.frames.retain(|frame| frame.id != popped);
-                pushed.retain(|id| *id != popped);
+                pushed.iter_mut().filter(|id| **id == Some(popped)).for_each(|id| *id = None);
+            }
+            if push.is_none() {
+                pushed.push(None);
             }
             if let Some(frame) = push {
                 let id = FrameId(self.next);
                 self.next += 1;
                 numbers.push((frame.id, id));
-                pushed.push(id);
+                pushed.push(Some(id));
                 let mut frame = frame.clone();
                 Arc::make_mut(&mut frame).id = id;
                 let requester = frame.requester;
@@ -268,6 +280,13 @@ impl Stack {
             at -= 1;
         }
         id
+    }
+
+    /// Pushes the frame of a safe configuration that has been applied as far as it goes; `pops` go with it.
+    pub fn push_safe(&mut self, pops: Vec<(FrameId, HandOver)>, frame: Frame) -> FrameId {
+        let push = Some(Arc::new(Frame { safe: true, ..frame }));
+        let pushed = self.apply([&Edits { pops, push }], &[]);
+        pushed.first().copied().unwrap_or(FrameId(0))
     }
 
     /// Pushes a frame as it is, but for its number.

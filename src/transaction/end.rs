@@ -219,18 +219,25 @@ impl Transaction {
                     PartEnd::Done
                 }
             } else if at == part {
-                match (clean, self.given_up) {
-                    (true, Some(_)) if matches!(self.stopped_by, Some(Reason::GivenUp)) => PartEnd::Cancelled,
-                    (true, _) => PartEnd::Failed(self.reason()),
-                    (false, _) => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
+                match clean {
+                    true => self.taken_back_whole(at),
+                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
                 }
             } else if self.interrupted || self.taken_down {
-                PartEnd::Failed(self.reason())
+                self.taken_back_whole(at)
             } else {
                 PartEnd::Anew
             });
         }
         self.over(parts);
+    }
+
+    /// The end of a part of which nothing is left.
+    fn taken_back_whole(&self, at: usize) -> PartEnd {
+        match self.given_up.contains(&at) && matches!(self.stopped_by, Some(Reason::GivenUp)) {
+            true => PartEnd::Cancelled,
+            false => PartEnd::Failed(self.reason()),
+        }
     }
 
     /// Parts before `part` that do not stand: a call of theirs was neither done nor finished, or what they lead to is not

@@ -30,6 +30,7 @@ use crate::time::Time;
 use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -72,7 +73,8 @@ pub struct Transaction {
     touched: Touched,
     /// Why it ends early, if not because of a step.
     stopped_by: Option<Reason>,
-    given_up: Option<usize>,
+    /// Parts that are given up.
+    given_up: SmallVec<[usize; 1]>,
     asked_back: bool,
     interrupted: bool,
     held: bool,
@@ -107,7 +109,7 @@ impl Transaction {
             doubted: false,
             touched: Touched::default(),
             stopped_by: None,
-            given_up: None,
+            given_up: SmallVec::new(),
             asked_back: spec.asked_back,
             interrupted: false,
             held: false,
@@ -228,7 +230,7 @@ impl Transaction {
                 // Once it is on its way back, that goes on.
                 if self.phase == Phase::Forward {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
-                    self.given_up = Some(part);
+                    self.given_up.push(part);
                     self.asked_back = true;
                     self.cancel();
                 }
@@ -389,7 +391,7 @@ impl Transaction {
             failed = self.took_back(&run, &way);
         }
         let part = self.failed_part();
-        if self.between.is_none() && part > 0 && !self.planned.whole.is_empty() {
+        if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
         }
         let way = self.way_back(part, live);
@@ -438,8 +440,8 @@ impl Transaction {
         if self.interrupted || self.taken_down {
             return 0;
         }
-        if let Some(part) = self.given_up {
-            return part;
+        if let Some(part) = self.given_up.iter().min() {
+            return *part;
         }
         let forward = self.forward.as_ref().expect("it was carried out");
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());

@@ -1,6 +1,7 @@
 //! The configurator against design §6, on the simulated platform and in simulated time.
 
 mod atomicity;
+mod batches;
 mod brief;
 mod prepared;
 mod rig;
