@@ -1,6 +1,7 @@
 //! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; and it survives
 //! itself.
 
+use super::conditions::{Conditions, Standings};
 use super::control::{Busy, Command, View};
 use super::inbox::{Counts, Mail, Reply, Ticket};
 use super::pool::Pool;
@@ -55,6 +56,7 @@ pub(super) struct Parts {
     pub counts: Arc<Counts>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
+    pub conditions: Option<Arc<dyn Conditions>>,
 }
 
 pub(super) struct Engine {
@@ -69,6 +71,9 @@ pub(super) struct Engine {
     pub counts: Arc<Counts>,
     answers: AnswerSink,
     pub progress: Option<ProgressSink>,
+    /// Who evaluates conditions, and the configurations that stand for something.
+    pub conditions: Option<Arc<dyn Conditions>>,
+    pub standings: Standings,
     /// System, stack and what is broken.
     pub world: World,
     /// Who waits for whom.
@@ -127,6 +132,8 @@ impl Engine {
             counts: parts.counts,
             answers: parts.answers,
             progress: parts.progress,
+            conditions: parts.conditions,
+            standings: Standings::default(),
             world,
             desk: Desk::default(),
             running: Vec::new(),
@@ -187,6 +194,8 @@ impl Engine {
                 }
             }
             did |= self.advance_all();
+            self.review_standings();
+            self.tell_fallen();
             self.look_at_suspects();
             if did {
                 self.glance();
@@ -201,7 +210,7 @@ impl Engine {
             }
             let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
             let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
-            self.pump(confirm.min(looks).min(self.running_until()));
+            self.pump(confirm.min(looks).min(self.running_until()).min(self.standing_until()));
         }
     }
 
@@ -245,6 +254,8 @@ impl Engine {
                 self.counts.report_taken();
                 self.reported(event);
             }
+            // Whoever waits for it looks.
+            Mail::Truths => self.counts.truths.store(false, Ordering::Release),
             Mail::Event(event) => {
                 self.counts.report_taken();
                 self.confirming.retain(|waiting| waiting.event != event);
@@ -290,6 +301,9 @@ impl Engine {
     }
 
     fn reported(&mut self, event: PlatformEvent) {
+        if let Some(conditions) = &self.conditions {
+            conditions.nudge();
+        }
         match event {
             PlatformEvent::Faulted { component, .. } => self.suspects.push(component),
             PlatformEvent::Returned { component, .. } => {

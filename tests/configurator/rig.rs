@@ -205,6 +205,7 @@ impl Rig {
             workers: 4,
             answers: Arc::new(move |answer| sink.lock().unwrap().push(answer)),
             progress: Some(Arc::new(move |progress| told.lock().unwrap().push(progress.clone()))),
+            conditions: None,
         });
         let told = handle.clone();
         platform.subscribe(Arc::new(move |event| told.platform_event(&event)));

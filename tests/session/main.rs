@@ -6,3 +6,4 @@ mod flood;
 mod hangs;
 mod life;
 mod socket;
+mod stands;
