@@ -141,6 +141,14 @@ pub const SAFE_QUEUE: usize = 64;
 /// one moment is seen together, and components that write without pause cost at most ten thousand looks a second.
 pub const HOLDS_LOOK: Duration = Duration::from_micros(100);
 
+/// How often the configurator looks whether components that nothing is under way with are as its steps have left them: a
+/// residual that nobody reported is found within some seconds, at a cost that nobody notices.
+pub const OBSERVE_EVERY: Duration = Duration::from_secs(5);
+
+/// Components looked at in one call then; a larger system is looked at in several, so that no step waits for long while a
+/// platform reads.
+pub const OBSERVED_AT_ONCE: usize = 256;
+
 /// How often conditions on counters of activities are looked at: nobody tells when a counter goes on.
 pub const HOLDS_COUNTERS: Duration = Duration::from_millis(100);
 

@@ -4,6 +4,7 @@
 use super::conditions::{Conditions, Standings};
 use super::control::{Busy, Command, View};
 use super::inbox::{Counts, Mail, Reply, Ticket};
+use super::looks::Observing;
 use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
@@ -74,6 +75,8 @@ pub(super) struct Engine {
     /// Who evaluates conditions, and the configurations that stand for something.
     pub conditions: Option<Arc<dyn Conditions>>,
     pub standings: Standings,
+    /// The slow look at what nothing is under way with.
+    pub observing: Observing,
     /// System, stack and what is broken.
     pub world: World,
     /// Who waits for whom.
@@ -134,6 +137,7 @@ impl Engine {
             progress: parts.progress,
             conditions: parts.conditions,
             standings: Standings::default(),
+            observing: Observing::default(),
             world,
             desk: Desk::default(),
             running: Vec::new(),
@@ -208,15 +212,25 @@ impl Engine {
                 self.mend();
                 continue;
             }
+            if self.observe_slowly() {
+                continue;
+            }
             let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
             let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
-            self.pump(confirm.min(looks).min(self.running_until()).min(self.standing_until()));
+            let (observed, idle) = self.observing.until();
+            let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
+            self.pump_or_idle(until, idle);
         }
     }
 
     /// Takes in what has come, waiting for something until `until`.
     pub fn pump(&mut self, until: Time) {
-        match self.inbox.recv_deadline(until) {
+        self.pump_or_idle(until, Time::NEVER);
+    }
+
+    /// The same, and no longer than until `idle`, for which simulated time does not move on by itself.
+    fn pump_or_idle(&mut self, until: Time, idle: Time) {
+        match self.inbox.recv_or_idle(until, idle) {
             Ok(mail) => self.take_in(mail),
             Err(RecvError::Timeout) => return,
             Err(RecvError::Closed) => {
@@ -449,7 +463,7 @@ impl Engine {
         self.suspects = later;
     }
 
-    fn generation(&self, component: ComponentName) -> Option<u64> {
+    pub fn generation(&self, component: ComponentName) -> Option<u64> {
         use crate::system::View as _;
         self.world.system.component(component).map(|node| node.generation)
     }

@@ -11,6 +11,7 @@
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//!   `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
 mod carry;
@@ -19,6 +20,8 @@ pub mod control;
 mod engine;
 mod fast;
 mod inbox;
+mod looks;
+mod observing;
 mod pool;
 pub mod progress;
 mod recovery;

@@ -1,6 +1,6 @@
 //! What is told while requests are carried out: each step with how it ended and how long it took.
 
-use super::request::{Answer, Reason, Request};
+use super::request::{Answer, Reason, Request, Residual};
 use crate::model::{ComponentName, ConfigId, Ident, MemberRef, Outcome, RequestId, Step};
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
@@ -108,6 +108,8 @@ pub enum Progress {
         /// Why.
         reason: Arc<Reason>,
     },
+    /// A later look at the platform shows otherwise what nothing was under way with.
+    Differs(Arc<Residual>),
     /// A broken system is whole again.
     Recovered,
     /// The configurator itself failed, and goes on.

@@ -177,6 +177,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
                 hub.taken(coordinator.deliver(Incoming::control(event)));
             }
         }
+        Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
         Progress::Recovered => hub.note(Happening::Recovered),
         Progress::Started(_) | Progress::Answered(_) => {}
     }

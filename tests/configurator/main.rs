@@ -2,6 +2,7 @@
 
 mod atomicity;
 mod brief;
+mod observing;
 mod prepared;
 mod rig;
 mod safe;

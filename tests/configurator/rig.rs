@@ -221,6 +221,15 @@ impl Rig {
         }
     }
 
+    /// Nobody hears what the platform reports meanwhile.
+    pub fn platform_deaf(&self, what: impl FnOnce(&Simulated)) {
+        use davit::platform::Platform as _;
+        self.platform.subscribe(Arc::new(|_| {}));
+        what(&self.platform);
+        let told = self.handle.clone();
+        self.platform.subscribe(Arc::new(move |event| told.platform_event(&event)));
+    }
+
     fn request(&self, word: &str, requester: Requester) -> Request {
         let ask = match word {
             "undo" => Ask::Undo,

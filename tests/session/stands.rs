@@ -3,11 +3,12 @@
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{Ask, ComponentName, ConfigId, RequestId};
+use davit::configurator::Recovery;
+use davit::model::{Ask, ComponentName, ConfigId, RequestId, Step, Value};
 use davit::platform::Platform as _;
 use davit::platform::simulated::{Options, Simulated};
-use davit::runtime::{Builder, Component, Context, Kind, Libraries, Library, Out, Prop};
-use davit::session::{Happening, Session};
+use davit::runtime::{Answer, Builder, Component, Context, Kind, Libraries, Library, Out, Prop};
+use davit::session::{Happening, Phase, Session};
 use davit::time::{Clock, Time};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -40,13 +41,15 @@ impl Component for Drive {
     }
 }
 
-fn kind(limit: &Arc<AtomicI64>) -> Kind {
-    let limit = limit.clone();
-    Kind::made_by("Drive", move |b: &mut Builder<Drive>| Drive {
-        limit: limit.clone(),
-        wanted: b.property("wanted", 0.0),
-        mode: b.output("mode"),
-        now: 0.0,
+fn kind(limit: &Arc<AtomicI64>, clock: &Clock) -> Kind {
+    let (limit, clock) = (limit.clone(), clock.clone());
+    Kind::made_by("Drive", move |b: &mut Builder<Drive>| {
+        let clock = clock.clone();
+        b.caller_operation("settle", move |(): ()| {
+            clock.sleep(100 * MS);
+            Answer::Done(())
+        });
+        Drive { limit: limit.clone(), wanted: b.property("wanted", 0.0), mode: b.output("mode"), now: 0.0 }
     })
 }
 
@@ -83,6 +86,8 @@ ConfiguratorConf {
   make   = Configuration { create("drive", "Drive", { activity = "control" }), post_conf_state = { "drive:running" } },
   engage = Configuration { holds = at_least("drive.mode", 6), property_set("drive.wanted", 8) },
   hasty  = Configuration { holds = at_least("drive.mode", 6), timeout = 0.03, property_set("drive.wanted", 8) },
+  slowly = Configuration { holds = at_least("drive.mode", 6), property_set("drive.wanted", 8),
+    operation_call("drive.settle"):undo("drive.settle") },
   weaken = Configuration { property_set("drive.wanted", 3) },
   halt   = Configuration { pre_conf_state = { "drive:stopped" } },
 }
@@ -110,7 +115,7 @@ impl Run {
         let clock = Clock::simulated();
         let _me = clock.enter();
         let limit = Arc::new(AtomicI64::new(100));
-        let libraries = Libraries::new().with(Library::new("drives").with_kind(kind(&limit)));
+        let libraries = Libraries::new().with(Library::new("drives").with_kind(kind(&limit, &clock)));
         let folder = folder("platform: embedded\nlibraries: [drives]\n", CONFIGURATIONS);
         let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries)
             .and_then(app::check)
@@ -260,6 +265,10 @@ fn a_later_configuration_can_make_it_false_its_own_undo_cannot() {
         assert_eq!(run.answer(Ask::UndoOf(id("engage"))), "engage.undone");
         run.clock.sleep(100 * MS);
         assert_eq!(run.heard("engage.lost"), 0, "that was its undo");
+        // Also while that is under way for longer than the drive needs to fall.
+        assert_eq!(run.answer(apply("slowly")), "slowly.ok");
+        assert_eq!(run.answer(Ask::UndoOf(id("slowly"))), "slowly.undone");
+        assert_eq!(run.heard("slowly.lost"), 0);
         assert_eq!(run.answer(apply("engage")), "engage.ok");
         assert_eq!(run.answer(apply("weaken")), "weaken.ok");
         run.clock.sleep(100 * MS);
@@ -273,10 +282,10 @@ fn who_stops_what_it_looks_at_ends_it_silently_a_fault_does_not() {
     Run::with(|run| {
         assert_eq!(run.answer(apply("engage")), "engage.ok");
         assert_eq!(run.answer(apply("halt")), "halt.ok");
-        run.clock.sleep(100 * MS);
+        run.clock.sleep(700 * MS);
         run.limit.store(2, Ordering::SeqCst);
         assert_eq!(run.answer(Ask::UndoOf(id("halt"))), "halt.undone");
-        run.clock.sleep(100 * MS);
+        run.clock.sleep(700 * MS);
         assert_eq!(run.heard("engage.lost"), 0);
         assert!(!run.is_lost("engage"));
         run.limit.store(100, Ordering::SeqCst);
@@ -295,6 +304,7 @@ types:
   Drive:
     ports: { mode: { direction: out, type: float } }
     properties: { wanted: { type: float, default: 0.0 } }
+    operations: { settle: {} }
 ";
 
 #[test]
@@ -320,5 +330,42 @@ fn where_no_values_can_be_seen_only_a_fault_speaks_against_it() {
     assert!(run.session.in_state("noticed"));
     run.session.take_down(false);
     assert!(platform.observe(clock.now() + MS).unwrap().is_empty());
+    clock.shutdown();
+}
+
+#[test]
+fn what_a_later_look_finds_different_is_lost_too_and_looking_keeps_no_clock_going() {
+    let clock = Clock::simulated();
+    let me = clock.enter();
+    let folder = folder(DECLARED, CONFIGURATIONS);
+    let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin())
+        .and_then(app::check)
+        .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+    let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default());
+    let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
+    let run = Run { heard: record(&session), clock: clock.clone(), session, limit: Arc::default() };
+    run.session.bring_up().unwrap();
+    assert_eq!(run.answer(apply("weaken")), "weaken.ok");
+    // At rest: with nobody left who waits for a time, time stands still.
+    let now = clock.now();
+    drop(me);
+    assert_eq!(clock.now(), now, "looking now and then does not move time on");
+    let _me = clock.enter();
+    let property = davit::model::MemberRef::new("drive.wanted").unwrap();
+    assert!(platform.tamper(&Step::PropertySet { property, value: Value::Float(99.0) }));
+    run.clock.sleep(6000 * MS);
+    assert_eq!(run.heard("weaken.lost"), 1);
+    assert!(run.is_lost("weaken") && !run.is_lost("make"));
+    let status = run.session.status();
+    assert_eq!(status.phase, Phase::Broken);
+    assert_eq!(status.residual.len(), 1);
+    let shown = serde_json::to_value(&status).unwrap();
+    assert_eq!(shown["stack"][1]["lost"], true, "{shown}");
+    let recovered = run.session.recover(Recovery::Back, "test", 5000 * MS).unwrap();
+    assert!(recovered.recovered);
+    let drive = ComponentName::new("drive").unwrap();
+    let seen = platform.observe(clock.now() + MS).unwrap();
+    assert!(format!("{:?}", seen.components[&drive].properties).contains("3.0"));
+    assert!(run.session.take_down(false).is_clean());
     clock.shutdown();
 }
