@@ -45,8 +45,10 @@ impl Engine {
         }
         match self.observing.next {
             None => self.observing.later(now),
-            Some(next) if now >= next && self.pool.has_room_beside(1) => self.look_on(),
-            Some(_) => {}
+            Some(next) if now < next => {}
+            Some(_) if self.pool.has_room_beside(1) => self.look_on(),
+            // Another time: whoever is busy is not to wait for this.
+            Some(_) => self.observing.next = Some(now + limits::OBSERVE_EVERY),
         }
         false
     }
@@ -80,7 +82,11 @@ impl Engine {
     fn not_to_be_judged(&self) -> FxHashSet<ComponentName> {
         let running = self.running.iter().flat_map(|running| running.machine.components());
         let broken = self.world.broken.iter().flat_map(|broken| broken.components.iter().copied());
-        running.chain(broken).chain(self.world.quarantined.iter().copied()).chain(self.suspects.iter().copied()).collect()
+        running
+            .chain(broken)
+            .chain(self.world.quarantined.iter().copied())
+            .chain(self.suspects.iter().copied())
+            .collect()
     }
 
     /// Compares what was seen with the model. True: it differs.
@@ -112,7 +118,8 @@ impl Engine {
         }
         // Connections to what is not judged stay as the model has them.
         let model = self.world.system.snapshot_some(&names).connections;
-        seen.connections.extend(model.into_iter().filter(|((from, to), _)| !still(&from.component) || !still(&to.component)));
+        seen.connections
+            .extend(model.into_iter().filter(|((from, to), _)| !still(&from.component) || !still(&to.component)));
         self.differs(&names, &seen)
     }
 
@@ -168,7 +175,9 @@ impl Engine {
         let slots = touches(step, None, &self.world.system);
         let writes = |footprint: &Footprint| {
             let mut own = footprint.touches.iter().filter(|touch| touch.access != Access::Need);
-            own.any(|own| slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| same(own.slot, touch.slot)))
+            own.any(|own| {
+                slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| same(own.slot, touch.slot))
+            })
         };
         self.world.stack.frames().iter().rev().find(|frame| writes(&frame.footprint)).cloned()
     }

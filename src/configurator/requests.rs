@@ -121,13 +121,7 @@ impl Engine {
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(
-        &mut self,
-        number: u32,
-        group: Group,
-        parts: Vec<PartEnd>,
-        planned: Option<(&Planned, &[(usize, u64)])>,
-    ) {
+    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<(&Planned, &[(usize, u64)])>) {
         let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();

@@ -56,7 +56,17 @@ pub(super) struct Running {
 
 impl Running {
     pub fn new(number: u64, machine: Transaction, purpose: Purpose, serves: SmallVec<[RequestId; 2]>) -> Self {
-        Self { number, machine, purpose, serves, flights: Vec::new(), read: None, asked: Vec::new(), stood: Vec::new(), over: false }
+        Self {
+            number,
+            machine,
+            purpose,
+            serves,
+            flights: Vec::new(),
+            read: None,
+            asked: Vec::new(),
+            stood: Vec::new(),
+            over: false,
+        }
     }
 
     pub fn is_safe(&self) -> bool {

@@ -180,7 +180,8 @@ impl Engine {
                 _ => continue,
             };
             let standing = self.standings.of.get_mut(&id).expect("looked at just now");
-            if let (Watch::On(number, _), Some(conditions)) = (std::mem::replace(&mut standing.watch, next), &self.conditions)
+            if let (Watch::On(number, _), Some(conditions)) =
+                (std::mem::replace(&mut standing.watch, next), &self.conditions)
             {
                 conditions.end(number);
             }
@@ -230,7 +231,10 @@ impl Engine {
     fn works_on(&self, running: &Running, id: ConfigId) -> bool {
         let planned = running.machine.planned();
         planned.parts.iter().any(|part| part.pushes == Some(id))
-            || planned.popped.iter().any(|frame| frame.configuration == id || frame.parts.iter().any(|p| p.configuration == id))
+            || planned
+                .popped
+                .iter()
+                .any(|frame| frame.configuration == id || frame.parts.iter().any(|p| p.configuration == id))
             || self.standings.of.get(&id).is_some_and(|standing| running.machine.stops_any(&standing.runs))
     }
 }

@@ -156,9 +156,7 @@ impl Evaluator {
                 }
                 changed
             };
-            if changed
-                && let Some(configurator) = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
-            {
+            if changed && let Some(configurator) = self.junction.upgrade().and_then(|j| lock(&j.configurator).clone()) {
                 configurator.truths_changed();
             }
         }

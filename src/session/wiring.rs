@@ -9,7 +9,8 @@ use super::recovery::Difference;
 use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use crate::configurator::{
-    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
+    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown,
+    View,
 };
 use crate::coordinator::{Dropped, Incoming};
 use crate::functions::Opener;
@@ -63,8 +64,8 @@ impl Session {
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
         let steps = Arc::new(Mutex::new(rustc_hash::FxHashMap::default()));
-        let evaluator = super::stands::needed(&deployment, &catalogue)
-            .then(|| Evaluator::start(&clock, &platform, &junction));
+        let evaluator =
+            super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
             catalogue,

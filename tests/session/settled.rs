@@ -3,9 +3,7 @@
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::model::monitor::{Condition, ConditionKind};
-use davit::model::{
-    Ask, Catalogue, ComponentName, ComponentSnapshot, ConfigId, Execution, Outcome, Snapshot, Step,
-};
+use davit::model::{Ask, Catalogue, ComponentName, ComponentSnapshot, ConfigId, Execution, Outcome, Snapshot, Step};
 use davit::monitor::Input;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Cause, EventSink, ObserveError, Platform, Watch};

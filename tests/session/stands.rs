@@ -1,9 +1,9 @@
 //! What configurations stand for (`holds`): true before they count as applied, watched while they are in force.
 
 use davit::app;
+use davit::configurator::Recovery;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::configurator::Recovery;
 use davit::model::{Ask, ComponentName, ConfigId, RequestId, Step, Value};
 use davit::platform::Platform as _;
 use davit::platform::simulated::{Options, Simulated};
@@ -103,7 +103,8 @@ pub struct Run {
 fn folder(head: &str, configurations: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let deployment = format!("davit: 1\nname: drives\n{head}{DEPLOYMENT}");
-    for (name, text) in [("d.yaml", deployment.as_str()), ("conf.lua", configurations), ("coordinator.lua", COORDINATOR)]
+    for (name, text) in
+        [("d.yaml", deployment.as_str()), ("conf.lua", configurations), ("coordinator.lua", COORDINATOR)]
     {
         std::fs::write(folder.path().join(name), text).unwrap();
     }
