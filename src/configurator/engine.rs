@@ -4,14 +4,14 @@
 use super::conditions::{Conditions, Standings};
 use super::control::{Busy, Command, View};
 use super::inbox::{Counts, Mail, Reply, Ticket};
-use super::looks::Observing;
+use super::looks::{Observing, SuspectLook};
 use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::Running;
 use super::switches::Fast;
 use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, RunState, Snapshot, Verdict,
+    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, Snapshot, Verdict,
 };
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
@@ -33,15 +33,6 @@ pub(super) struct Confirming {
     pub event: EventName,
     pub within: Duration,
     pub until: Time,
-}
-
-/// A look at a component that was reported faulted.
-struct Look {
-    ticket: Ticket,
-    component: ComponentName,
-    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
-    generation: Option<u64>,
-    until: Time,
 }
 
 /// What a configurator is made of.
@@ -99,7 +90,7 @@ pub(super) struct Engine {
     given_up: FxHashSet<Ticket>,
     /// Components that were reported faulted and not looked at since, and looks that are under way.
     pub suspects: Vec<ComponentName>,
-    looks: Vec<Look>,
+    pub looks: Vec<SuspectLook>,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
     /// What partial frames are left of.
@@ -413,71 +404,6 @@ impl Engine {
             progress(&Progress::Answered(answer.clone()));
         }
         (self.answers)(answer);
-    }
-
-    /// Looks at components that were reported faulted (the report may be older than what was done since).
-    fn look_at_suspects(&mut self) {
-        let mut at = 0;
-        while at < self.looks.len() {
-            let Look { ticket, component, generation, until } = self.looks[at];
-            let seen = match self.take_reply(ticket) {
-                Some(Reply::ObservedComponent(Ok(seen))) => seen,
-                Some(_) => None,
-                None if self.clock.now() >= until => {
-                    self.give_up(ticket);
-                    None
-                }
-                None => {
-                    at += 1;
-                    continue;
-                }
-            };
-            self.looks.remove(at);
-            let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
-            let stale = self.generation(component) != generation;
-            if faulted && stale {
-                self.suspects.push(component);
-            } else if faulted && self.world.system.set_state(component, RunState::Faulted) {
-                self.changed();
-            }
-        }
-        if self.suspects.is_empty() {
-            return;
-        }
-        // What is being worked on is looked at by whoever works on it, or afterwards.
-        let busy: FxHashSet<ComponentName> = self.running.iter().flat_map(|r| r.machine.components()).collect();
-        let mut later = Vec::new();
-        while let Some(component) = self.suspects.pop() {
-            if self.looks.iter().any(|look| look.component == component) {
-                continue;
-            }
-            if busy.contains(&component) || !self.pool.has_room_beside(1) {
-                later.push(component);
-                continue;
-            }
-            let deadline = self.clock.now() + self.limits.step_timeout;
-            let ticket = self.pool.start(super::pool::Call::ObserveComponent(component), deadline);
-            let until = deadline + crate::limits::PLATFORM_GRACE;
-            self.looks.push(Look { ticket, component, generation: self.generation(component), until });
-        }
-        self.suspects = later;
-    }
-
-    pub fn generation(&self, component: ComponentName) -> Option<u64> {
-        use crate::system::View as _;
-        self.world.system.component(component).map(|node| node.generation)
-    }
-
-    /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
-    pub fn settle_suspects(&mut self) {
-        loop {
-            self.look_at_suspects();
-            let Some(until) = self.looks.iter().map(|look| look.until).min() else { return };
-            self.pump(until);
-            if self.stopping {
-                return;
-            }
-        }
     }
 
     pub fn view(&mut self, system: bool) -> Arc<View> {

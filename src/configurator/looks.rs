@@ -1,11 +1,20 @@
-//! Where the slow look at components stands (`observing`).
+//! Looks at components that are under way, and where the slow one stands (`suspects`, `observing`).
 
 use super::inbox::Ticket;
 use crate::limits;
 use crate::model::ComponentName;
 use crate::time::Time;
 
-/// A look at some components that is under way.
+/// A look at a component that was reported faulted.
+pub(super) struct SuspectLook {
+    pub ticket: Ticket,
+    pub component: ComponentName,
+    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
+    pub generation: Option<u64>,
+    pub until: Time,
+}
+
+/// A look at some components, as the slow one takes it.
 pub(super) struct Look {
     pub ticket: Ticket,
     /// Each with when the model had touched it last: what is done to it meanwhile makes the look stale.

@@ -11,7 +11,7 @@
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
-//!   `observing`, `looks`: the slow look at what nothing is under way with.
+//!   `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
 mod carry;
@@ -30,6 +30,7 @@ mod requests;
 mod running;
 mod safe;
 mod stands;
+mod suspects;
 mod switches;
 mod teardown;
 

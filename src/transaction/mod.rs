@@ -23,7 +23,7 @@ pub use back::Touched;
 pub use end::{BrokenPart, End, PartEnd};
 pub use messages::{Can, Input, Poll, Question, Spec};
 
-use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step, Transition};
+use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
@@ -224,18 +224,6 @@ impl Transaction {
     /// The components that it is about.
     pub fn components(&self) -> Vec<ComponentName> {
         self.own()
-    }
-
-    /// Whether it stops or destroys one of these components, as it was planned.
-    pub fn stops_any(&self, components: &[ComponentName]) -> bool {
-        let stops = |step: &Step| match step {
-            Step::State { transition, .. } => matches!(transition, Transition::Stop | Transition::Cleanup),
-            Step::Destroy { .. } => true,
-            _ => false,
-        };
-        let forward = self.forward.as_ref().map_or(&[][..], |run| &run.list);
-        !components.is_empty()
-            && forward.iter().any(|planned| stops(&planned.step) && components.contains(&planned.step.component()))
     }
 
     /// What came of it, once it is over.

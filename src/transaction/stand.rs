@@ -2,9 +2,22 @@
 
 use super::messages::{Can, Poll, Question};
 use super::{Asked, Phase, Transaction};
+use crate::model::{ComponentName, Step, Transition};
 use crate::system::System;
 
 impl Transaction {
+    /// Whether it stops or destroys one of these components, as it was planned.
+    pub fn stops_any(&self, components: &[ComponentName]) -> bool {
+        let stops = |step: &Step| match step {
+            Step::State { transition, .. } => matches!(transition, Transition::Stop | Transition::Cleanup),
+            Step::Destroy { .. } => true,
+            _ => false,
+        };
+        let forward = self.forward.as_ref().map_or(&[][..], |run| &run.list);
+        !components.is_empty()
+            && forward.iter().any(|planned| stops(&planned.step) && components.contains(&planned.step.component()))
+    }
+
     /// Goes on where all was done. None: nothing is to be waited for.
     pub(super) fn stand(&mut self, live: &mut System, can: &Can<'_>) -> Option<Poll> {
         if self.stopped_by.is_some() {
