@@ -233,6 +233,11 @@ codes! {
     CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
         "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
          them, and the requests for it.";
+    CONF_HOLDS_UNSEEN = "conf::holds_unseen", "the platform does not show what a configuration stands for",
+        "The components of the simulated platform have no code: their run states can be seen, values at their ports cannot. So \
+         what the configuration stands for counts as true there while none of the components that it looks at is faulted, and \
+         `davit status` shows the frame as not observed. On a platform whose components run it is evaluated; until then \
+         nobody has seen that it ever becomes true.";
     CONF_CONFIRM_CONTRADICTED = "conf::confirm_contradicted", "`confirm` stands beside `safe` or `on_failure = \"hold\"`",
         "`confirm` says that the configuration is undone when an event does not come in time. A safe configuration stays in \
          force until somebody undoes it, and `on_failure = \"hold\"` says that nothing is undone unasked: both at once \

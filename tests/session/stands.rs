@@ -4,7 +4,7 @@ use davit::app;
 use davit::configurator::Recovery;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{Ask, ComponentName, ConfigId, RequestId, Step, Value};
+use davit::model::{Ask, ComponentName, ConfigId, RequestId, Step, Value, codes};
 use davit::platform::Platform as _;
 use davit::platform::simulated::{Options, Simulated};
 use davit::runtime::{Answer, Builder, Component, Context, Kind, Libraries, Library, Out, Prop};
@@ -316,6 +316,8 @@ fn where_no_values_can_be_seen_only_a_fault_speaks_against_it() {
     let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+    let warned = checked.findings.iter().filter(|finding| finding.code == codes::CONF_HOLDS_UNSEEN).count();
+    assert_eq!(warned, 3, "`check` says so of each: {:?}", checked.findings);
     let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default());
     let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
     let run = Run { heard: record(&session), clock: clock.clone(), session, limit: Arc::default() };
