@@ -3,7 +3,10 @@
 use super::rig::*;
 use davit::configurator::{Progress, Recovery};
 use davit::model::*;
-use davit::platform::simulated::Fault;
+use davit::platform::simulated::{Fault, Options, Simulated};
+use davit::platform::{EventSink, ObserveError, Platform};
+use davit::time::Time;
+use std::sync::Arc;
 use std::time::Duration;
 
 fn set(property: &str, value: f64) -> Step {
@@ -104,10 +107,75 @@ fn what_is_under_way_is_left_alone_and_nothing_is_delayed() {
         rig.submit("eight.undo");
         rig.wait(0.95);
     }
-    assert!(lost(&rig).is_empty() && rig.view().broken.is_none());
+    // Steps that have happened and of which nobody has heard yet.
+    rig.platform.set_delays(Default::default());
+    for _ in 0..12 {
+        rig.inject("property_set B.k", Fault::LostAnswer);
+        rig.submit("eight");
+        rig.wait(1.3);
+        assert_eq!(rig.events().last().unwrap(), "eight.ok");
+        rig.submit("eight.undo");
+        rig.wait(0.4);
+    }
+    assert!(lost(&rig).is_empty() && rig.view().broken.is_none(), "{:?}", lost(&rig));
     let answers = rig.answers.lock().unwrap();
-    let late: Vec<_> = answers.iter().filter(|a| a.at > asked && a.took > Duration::from_millis(901)).collect();
+    // A lost answer is waited for.
+    let late = answers.iter().filter(|a| a.at > asked && a.took > Duration::from_millis(1001));
+    let late: Vec<_> = late.collect();
     assert!(late.is_empty(), "{late:?}");
+}
+
+/// A platform that takes its time to look, and tells what was there when it began.
+struct SlowEyes {
+    inner: Simulated,
+}
+
+impl Platform for SlowEyes {
+    fn catalogue(&self) -> &Catalogue {
+        self.inner.catalogue()
+    }
+    fn execution(&self, step: &Step) -> Execution {
+        self.inner.execution(step)
+    }
+    fn execute(&self, step: &Step, deadline: Time) -> Outcome {
+        self.inner.execute(step, deadline)
+    }
+    fn cancel(&self, step: &Step) {
+        self.inner.cancel(step);
+    }
+    fn observe(&self, deadline: Time) -> Result<Snapshot, ObserveError> {
+        self.inner.observe(deadline)
+    }
+    fn observe_component(&self, name: ComponentName, until: Time) -> Result<Option<ComponentSnapshot>, ObserveError> {
+        self.inner.observe_component(name, until)
+    }
+    fn observe_some(&self, components: &[ComponentName], deadline: Time) -> Result<Snapshot, ObserveError> {
+        let seen = self.inner.observe_some(components, deadline);
+        self.inner.clock().sleep(Duration::from_millis(500));
+        seen
+    }
+    fn subscribe(&self, sink: EventSink) {
+        self.inner.subscribe(sink);
+    }
+    fn quarantined(&self) -> Vec<ComponentName> {
+        self.inner.quarantined()
+    }
+}
+
+#[test]
+fn what_was_done_while_the_platform_looked_is_no_difference() {
+    let rig = Rig::with(scenario(), Options::default(), |inner| Arc::new(SlowEyes { inner }));
+    for word in ["make", "wire", "run"] {
+        assert_eq!(rig.ask(word), [format!("{word}.ok")]);
+    }
+    for _ in 0..40 {
+        rig.submit("rewire eight");
+        rig.wait(0.35);
+        rig.submit("eight.undo rewire.undo");
+        rig.wait(0.35);
+    }
+    assert!(rig.answers.lock().unwrap().iter().all(|answer| answer.verdict.is_success()));
+    assert!(lost(&rig).is_empty() && rig.view().broken.is_none(), "{:?}", lost(&rig));
 }
 
 #[test]
