@@ -134,6 +134,7 @@ impl Switched {
             answers: Arc::new(move |answer| drop(sink.try_send(answer))),
             // As a session has it: every step is told.
             progress: Some(Arc::new(|progress| _ = std::hint::black_box(progress))),
+            conditions: None,
         });
         let mut switched = Self { handle, answers, asked: 0 };
         switched.ask(clock, Ask::Apply(ConfigId::new("make").expect("a name")));

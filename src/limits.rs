@@ -137,6 +137,21 @@ pub const REQUEST_QUEUE: usize = 256;
 /// Requests for safe configurations that may wait beside them: these get in when the queue is full.
 pub const SAFE_QUEUE: usize = 64;
 
+/// How long whoever evaluates what configurations stand for waits after something came before it looks: what is written at
+/// one moment is seen together, and components that write without pause cost at most ten thousand looks a second.
+pub const HOLDS_LOOK: Duration = Duration::from_micros(100);
+
+/// How often the configurator looks whether components that nothing is under way with are as its steps have left them: a
+/// residual that nobody reported is found within some seconds, at a cost that nobody notices.
+pub const OBSERVE_EVERY: Duration = Duration::from_secs(5);
+
+/// Components looked at in one call then; a larger system is looked at in several, so that no step waits for long while a
+/// platform reads.
+pub const OBSERVED_AT_ONCE: usize = 256;
+
+/// How often conditions on counters of activities are looked at: nobody tells when a counter goes on.
+pub const HOLDS_COUNTERS: Duration = Duration::from_millis(100);
+
 /// Reports of the platform (faults, late returns, confirmations) that may wait for the configurator. When more come at
 /// once, it looks at the whole platform instead.
 pub const PLATFORM_REPORTS: usize = 1024;

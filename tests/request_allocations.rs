@@ -90,6 +90,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         workers: 2,
         answers: Arc::new(move |answer| drop(sink.try_send(answer))),
         progress: Some(Arc::new(move |_| _ = told.fetch_add(1, Ordering::Relaxed))),
+        conditions: None,
     });
     let mut next = 0;
     let mut ask = |ask: Ask| {

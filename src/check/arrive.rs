@@ -205,7 +205,8 @@ impl Product<'_> {
 
     /// What stands behind in its batch and has not begun is given up.
     pub(super) fn give_up_behind(&self, state: &mut State, number: u32, undo: Request) {
-        let requests = state.desk.under_way().iter().find(|turn| turn.number == number).map(|turn| &turn.batch.requests);
+        let requests =
+            state.desk.under_way().iter().find(|turn| turn.number == number).map(|turn| &turn.batch.requests);
         let request = requests.and_then(|requests| Some((given_up_of(&undo, requests)?, requests)));
         if let Some((place, request)) = request.map(|(place, requests)| (place, requests[place])) {
             state.desk.answered(number, place);

@@ -3,9 +3,11 @@
 
 use super::monitors;
 use super::universe::Universe;
-use crate::model::codes::{DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY};
+use crate::model::codes::{
+    CONF_HOLDS_UNSEEN, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
+};
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{Condition, SELF, SignalKind};
+use crate::model::monitor::{Condition, ConditionKind, SELF, SignalKind};
 use crate::model::{
     ComponentType, ConfigId, Deployment, Direction, Finding, Findings, Ident, MemberRef, OperatorMay, Origin,
 };
@@ -34,7 +36,30 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
 pub fn holds(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> Findings {
     let asked = deployment.configurations.iter().filter(|c| ids.contains(&c.id));
     let conditions = asked.filter_map(|c| Some((c.holds.as_ref()?, format!("configurations.{}", c.id))));
-    conditions.flat_map(|(holds, path)| monitors::condition(deployment, universe, holds, path)).collect()
+    let of = |(holds, path): (&Condition, String)| {
+        let mut findings = monitors::condition(deployment, universe, holds, path.clone());
+        findings.extend(unseen(deployment, holds).map(|finding| finding.path(path)));
+        findings
+    };
+    conditions.flat_map(of).collect()
+}
+
+/// That the platform does not show what a configuration stands for: the simulated one shows run states only.
+fn unseen(deployment: &Deployment, holds: &Condition) -> Option<Finding> {
+    if deployment.platform.as_str() != "simulated" {
+        return None;
+    }
+    let mut values = false;
+    holds.for_each(&mut |condition| {
+        use ConditionKind as K;
+        values |= matches!(condition.kind, K::IsTrue(_) | K::Silent { .. } | K::Compare { .. });
+    });
+    values.then(|| {
+        let message = "the simulated platform does not show values: what this stands for counts as true there";
+        Finding::warning(CONF_HOLDS_UNSEEN, message).at(holds.origin).labelled("cannot be seen there").help(
+            "check it on the platform whose components run; a fault of a component that it looks at is a loss here too",
+        )
+    })
 }
 
 fn configuration(deployment: &Deployment, id: ConfigId, at: Origin) -> Option<Finding> {

@@ -209,7 +209,8 @@ impl Product<'_> {
     ) {
         let comes = self.worlds.comes(planned, requests);
         self.entangled |= !given_up.is_empty() && comes.parts.len() > 1;
-        let end = |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
+        let end =
+            |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
         let mut given: Given = comes.told.clone();
         given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
         given.sort_by_key(|(place, _)| *place);

@@ -12,9 +12,7 @@ use super::product::Product;
 use super::shape::Undone;
 use super::state::{Answers, Move, Nexts, State};
 use super::world::Worlds;
-use crate::model::{
-    Ask, Catalogue, ComponentName, Deployment, EventName, MemberRef, RequestId, Snapshot, Target,
-};
+use crate::model::{Ask, Catalogue, ComponentName, Deployment, EventName, MemberRef, RequestId, Snapshot, Target};
 use crate::stack::{Batch, Request, Requester, Why, claims};
 use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
@@ -224,7 +222,9 @@ impl<'a> Follower<'a> {
     }
 
     fn leaves(&self, state: &State) -> Vec<String> {
-        let leaf = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| member.chart.fqn(*leaf).to_string();
+        let leaf = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| {
+            member.chart.fqn(*leaf).to_string()
+        };
         self.product.members.iter().zip(&state.leaves).map(leaf).collect()
     }
 

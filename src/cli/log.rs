@@ -71,6 +71,13 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             }
             line
         }
+        "lost" => {
+            let mut line = format!("lost       {}", out.paint(Style::Bad, text(&entry["event"])));
+            for reason in entry["reasons"].as_array().into_iter().flatten() {
+                line.push_str(&format!("\n{:>12}           {}", "", text(reason)));
+            }
+            line
+        }
         "stale" => format!("stale      {}", text(&entry["event"])),
         "fault" => {
             format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))

@@ -98,6 +98,10 @@ impl Progress {
                 self.line(format!("{time}  {}  {component}: {reason}", out.paint(Style::Bad, "fault")));
             }
             Happening::Returned { component } => self.line(format!("{time}  {component} returned and was cleaned up")),
+            Happening::Lost { event, reasons } => {
+                self.line(format!("{time}  {}  {event}", out.paint(Style::Bad, "lost")));
+                reasons.iter().for_each(|reason| self.line(format!("                 {reason}")));
+            }
             Happening::Recovered => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {

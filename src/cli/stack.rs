@@ -29,6 +29,7 @@ impl Run for Args {
         if frames.is_empty() {
             out.line("the stack is empty");
         }
+        let mark = |is: bool, style, words: &str| if is { out.paint(style, words) } else { String::new() };
         let mut table = Table::new(0);
         for (i, frame) in frames.iter().enumerate().rev() {
             let parts = frame["parts"].as_u64().unwrap_or(1);
@@ -38,7 +39,10 @@ impl Run for Args {
                 format!("by {}", text(&frame["by"])),
                 format!("at {:.3} s", frame["at"].as_f64().unwrap_or_default()),
                 if parts > 1 { format!("{parts} squashed into one") } else { String::new() },
-                if frame["floor"] == true { out.paint(Style::Care, "floor: undo stops here") } else { String::new() },
+                mark(frame["floor"] == true, Style::Care, "floor: undo stops here"),
+                mark(frame["partial"] == true, Style::Bad, "partial"),
+                mark(frame["lost"] == true, Style::Bad, "lost"),
+                mark(frame["unseen"] == true, Style::Dim, "not observed"),
             ]);
         }
         out.text(table.to_string());

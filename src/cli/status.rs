@@ -95,6 +95,13 @@ fn print(out: &Output, status: &Json) {
             None => String::new(),
         }
     ));
+    for (key, style, words) in
+        [("lost", Style::Bad, "what it did or stands for is no longer so"), ("unseen", Style::Dim, "not observed here")]
+    {
+        for frame in stack.iter().filter(|frame| frame[key] == true) {
+            out.line(format!("             {} {}", text(&frame["configuration"]), out.paint(style, words)));
+        }
+    }
     let mut table = Table::new(2);
     if let Some(components) = status["system"]["components"].as_object() {
         for (name, component) in components {

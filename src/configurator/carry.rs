@@ -61,6 +61,10 @@ impl Engine {
                     let ticket = self.pool.start(Call::ObserveSome(components), deadline);
                     running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
                 }
+                Poll::Ask(question) => {
+                    did = true;
+                    self.ask_condition(running, question);
+                }
                 Poll::Begin(steps) => {
                     did = true;
                     let first = &running.machine.step(steps[0]).step;
@@ -132,7 +136,7 @@ impl Engine {
 
     /// Takes in the calls that are back, and those given up. True: there were some.
     fn land(&mut self, running: &mut Running) -> bool {
-        let mut did = false;
+        let mut did = self.land_truths(running);
         let now = self.clock.now();
         if let Some((ticket, until)) = running.read {
             let seen: Option<Option<Snapshot>> = match self.take_reply(ticket) {
@@ -206,6 +210,7 @@ impl Engine {
     /// Everything that is under way goes on, safe configurations first. True: something happened.
     pub(super) fn advance_all(&mut self) -> bool {
         let mut did = false;
+        self.review_standings();
         let mut order: BTreeMap<(bool, u64), ()> = BTreeMap::new();
         for running in self.running.iter().filter(|running| !running.over) {
             order.insert((!running.is_safe(), running.number), ());

@@ -22,6 +22,10 @@ pub struct FrameView {
     pub parts: usize,
     /// It is what was done and not taken back of something that ended *broken*.
     pub partial: bool,
+    /// What its configuration stands for is no longer so, since it was applied last.
+    pub lost: bool,
+    /// The platform does not show what its configuration stands for.
+    pub unseen: bool,
 }
 
 /// What is under way.

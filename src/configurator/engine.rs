@@ -1,15 +1,17 @@
 //! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; and it survives
 //! itself.
 
+use super::conditions::{Conditions, Standings};
 use super::control::{Busy, Command, View};
 use super::inbox::{Counts, Mail, Reply, Ticket};
+use super::looks::{Observing, SuspectLook};
 use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::Running;
 use super::switches::Fast;
 use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, RunState, Snapshot, Verdict,
+    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, Snapshot, Verdict,
 };
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
@@ -33,15 +35,6 @@ pub(super) struct Confirming {
     pub until: Time,
 }
 
-/// A look at a component that was reported faulted.
-struct Look {
-    ticket: Ticket,
-    component: ComponentName,
-    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
-    generation: Option<u64>,
-    until: Time,
-}
-
 /// What a configurator is made of.
 pub(super) struct Parts {
     pub clock: Clock,
@@ -55,6 +48,7 @@ pub(super) struct Parts {
     pub counts: Arc<Counts>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
+    pub conditions: Option<Arc<dyn Conditions>>,
 }
 
 pub(super) struct Engine {
@@ -69,6 +63,11 @@ pub(super) struct Engine {
     pub counts: Arc<Counts>,
     answers: AnswerSink,
     pub progress: Option<ProgressSink>,
+    /// Who evaluates conditions, and the configurations that stand for something.
+    pub conditions: Option<Arc<dyn Conditions>>,
+    pub standings: Standings,
+    /// The slow look at what nothing is under way with.
+    pub observing: Observing,
     /// System, stack and what is broken.
     pub world: World,
     /// Who waits for whom.
@@ -91,7 +90,7 @@ pub(super) struct Engine {
     given_up: FxHashSet<Ticket>,
     /// Components that were reported faulted and not looked at since, and looks that are under way.
     pub suspects: Vec<ComponentName>,
-    looks: Vec<Look>,
+    pub looks: Vec<SuspectLook>,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
     /// What partial frames are left of.
@@ -127,6 +126,9 @@ impl Engine {
             counts: parts.counts,
             answers: parts.answers,
             progress: parts.progress,
+            conditions: parts.conditions,
+            standings: Standings::default(),
+            observing: Observing::default(),
             world,
             desk: Desk::default(),
             running: Vec::new(),
@@ -187,6 +189,8 @@ impl Engine {
                 }
             }
             did |= self.advance_all();
+            self.review_standings();
+            self.tell_fallen();
             self.look_at_suspects();
             if did {
                 self.glance();
@@ -199,15 +203,25 @@ impl Engine {
                 self.mend();
                 continue;
             }
+            if self.observe_slowly() {
+                continue;
+            }
             let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
             let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
-            self.pump(confirm.min(looks).min(self.running_until()));
+            let (observed, idle) = self.observing.until();
+            let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
+            self.pump_or_idle(until, idle);
         }
     }
 
     /// Takes in what has come, waiting for something until `until`.
     pub fn pump(&mut self, until: Time) {
-        match self.inbox.recv_deadline(until) {
+        self.pump_or_idle(until, Time::NEVER);
+    }
+
+    /// The same, and no longer than until `idle`, for which simulated time does not move on by itself.
+    fn pump_or_idle(&mut self, until: Time, idle: Time) {
+        match self.inbox.recv_or_idle(until, idle) {
             Ok(mail) => self.take_in(mail),
             Err(RecvError::Timeout) => return,
             Err(RecvError::Closed) => {
@@ -245,6 +259,8 @@ impl Engine {
                 self.counts.report_taken();
                 self.reported(event);
             }
+            // Whoever waits for it looks.
+            Mail::Truths => self.counts.truths.store(false, Ordering::Release),
             Mail::Event(event) => {
                 self.counts.report_taken();
                 self.confirming.retain(|waiting| waiting.event != event);
@@ -290,6 +306,9 @@ impl Engine {
     }
 
     fn reported(&mut self, event: PlatformEvent) {
+        if let Some(conditions) = &self.conditions {
+            conditions.nudge();
+        }
         match event {
             PlatformEvent::Faulted { component, .. } => self.suspects.push(component),
             PlatformEvent::Returned { component, .. } => {
@@ -385,71 +404,6 @@ impl Engine {
             progress(&Progress::Answered(answer.clone()));
         }
         (self.answers)(answer);
-    }
-
-    /// Looks at components that were reported faulted (the report may be older than what was done since).
-    fn look_at_suspects(&mut self) {
-        let mut at = 0;
-        while at < self.looks.len() {
-            let Look { ticket, component, generation, until } = self.looks[at];
-            let seen = match self.take_reply(ticket) {
-                Some(Reply::ObservedComponent(Ok(seen))) => seen,
-                Some(_) => None,
-                None if self.clock.now() >= until => {
-                    self.give_up(ticket);
-                    None
-                }
-                None => {
-                    at += 1;
-                    continue;
-                }
-            };
-            self.looks.remove(at);
-            let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
-            let stale = self.generation(component) != generation;
-            if faulted && stale {
-                self.suspects.push(component);
-            } else if faulted && self.world.system.set_state(component, RunState::Faulted) {
-                self.changed();
-            }
-        }
-        if self.suspects.is_empty() {
-            return;
-        }
-        // What is being worked on is looked at by whoever works on it, or afterwards.
-        let busy: FxHashSet<ComponentName> = self.running.iter().flat_map(|r| r.machine.components()).collect();
-        let mut later = Vec::new();
-        while let Some(component) = self.suspects.pop() {
-            if self.looks.iter().any(|look| look.component == component) {
-                continue;
-            }
-            if busy.contains(&component) || !self.pool.has_room_beside(1) {
-                later.push(component);
-                continue;
-            }
-            let deadline = self.clock.now() + self.limits.step_timeout;
-            let ticket = self.pool.start(super::pool::Call::ObserveComponent(component), deadline);
-            let until = deadline + crate::limits::PLATFORM_GRACE;
-            self.looks.push(Look { ticket, component, generation: self.generation(component), until });
-        }
-        self.suspects = later;
-    }
-
-    fn generation(&self, component: ComponentName) -> Option<u64> {
-        use crate::system::View as _;
-        self.world.system.component(component).map(|node| node.generation)
-    }
-
-    /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
-    pub fn settle_suspects(&mut self) {
-        loop {
-            self.look_at_suspects();
-            let Some(until) = self.looks.iter().map(|look| look.until).min() else { return };
-            self.pump(until);
-            if self.stopping {
-                return;
-            }
-        }
     }
 
     pub fn view(&mut self, system: bool) -> Arc<View> {

@@ -26,6 +26,8 @@ impl Engine {
         }
         let configurations = self.configurations.clone();
         if let Some(configuration) = configurations.get(&id)
+            // What it stands for is to be waited for.
+            && configuration.holds.is_none()
             && let Some(switch) = Switch::new(&mut self.world.system, configuration)
             && let Some(platform) = self.platform.prepare(switch.universe())
         {
@@ -83,6 +85,12 @@ impl Engine {
         } else {
             let frame = self.world.stack.push_switch(&fast.switch, request.requester, at, request.scope);
             self.await_confirmation(request, frame);
+            self.applied(id, None);
+        }
+        if self.watches_any()
+            && let Some(conditions) = &self.conditions
+        {
+            conditions.nudge();
         }
         self.switches.insert(id, fast);
         self.desk.over(number);

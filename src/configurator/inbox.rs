@@ -31,6 +31,8 @@ pub(super) enum Mail {
     Platform(PlatformEvent),
     /// An event that some configuration waits for as its confirmation.
     Event(EventName),
+    /// Conditions that are evaluated for the configurator are so, or are so no more.
+    Truths,
     /// To be done between requests, in the configurator's own thread.
     Command(super::control::Command),
 }
@@ -41,6 +43,8 @@ pub(super) struct Counts {
     pub requests: AtomicUsize,
     /// Safe requests that have not begun.
     pub safe: AtomicUsize,
+    /// A [`Mail::Truths`] is on its way.
+    pub truths: AtomicBool,
     reports: AtomicUsize,
     commands: AtomicUsize,
     /// Reports did not fit: the platform must be looked at as a whole.
@@ -60,7 +64,8 @@ pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
         + limits::PLATFORM_REPORTS
         + limits::WORKERS_MOST
         + limits::WORKERS_GIVEN_UP
-        + limits::CONFIGURATOR_COMMANDS;
+        + limits::CONFIGURATOR_COMMANDS
+        + 1;
     let (sender, receiver) = clock.channel(room);
     (Post { sender, counts: Arc::default() }, receiver)
 }
@@ -109,6 +114,13 @@ impl Post {
         if !reserve(&self.counts.reports, 1, limits::PLATFORM_REPORTS) || self.sender.try_send(mail).is_err() {
             // There is much to read: whoever reads it looks at everything then.
             self.counts.reports_lost.store(true, Ordering::Release);
+        }
+    }
+
+    /// Says that truths have changed, once until that is taken in.
+    pub fn truths(&self) {
+        if !self.counts.truths.swap(true, Ordering::AcqRel) && self.sender.try_send(Mail::Truths).is_err() {
+            self.counts.truths.store(false, Ordering::Release);
         }
     }
 

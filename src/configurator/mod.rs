@@ -10,14 +10,18 @@
 //!
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
-//!   platform. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//!   `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
 mod carry;
+pub mod conditions;
 pub mod control;
 mod engine;
 mod fast;
 mod inbox;
+mod looks;
+mod observing;
 mod pool;
 pub mod progress;
 mod recovery;
@@ -25,11 +29,14 @@ pub mod request;
 mod requests;
 mod running;
 mod safe;
+mod stands;
+mod suspects;
 mod switches;
 mod teardown;
 
 pub use crate::stack::answer::WAY_OUT;
 pub use crate::stack::{Requester, Scope, Why};
+pub use conditions::{Conditions, Truth};
 pub use control::{Busy, Drift, FrameView, Recovery, TakenDown, View};
 pub use progress::{AnswerSink, Progress, ProgressSink, StepEnd, StepName};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};
@@ -72,6 +79,9 @@ pub struct Setup {
     pub answers: AnswerSink,
     /// Hears what is under way.
     pub progress: Option<ProgressSink>,
+    /// Who evaluates what configurations stand for, and what settles calls; none: the former counts as true, the latter is
+    /// not known.
+    pub conditions: Option<Arc<dyn Conditions>>,
 }
 
 /// Starts configurators.
@@ -97,6 +107,7 @@ impl Configurator {
             counts: post.counts.clone(),
             answers: setup.answers.clone(),
             progress: setup.progress,
+            conditions: setup.conditions,
         };
         let stack = crate::stack::Stack::new(setup.limits.stack);
         let engine = Engine::new(parts, World::new(System::new(Arc::new(setup.catalogue)), stack));
@@ -165,6 +176,11 @@ impl ConfiguratorHandle {
         if self.inner.awaited.contains(&event) {
             self.inner.post.report(Mail::Event(event));
         }
+    }
+
+    /// Tells that truths of conditions have changed; never blocks.
+    pub fn truths_changed(&self) {
+        self.inner.post.truths();
     }
 
     /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.

@@ -1,7 +1,7 @@
 //! What is told while requests are carried out: each step with how it ended and how long it took.
 
-use super::request::{Answer, Request};
-use crate::model::{ComponentName, Ident, MemberRef, Outcome, RequestId, Step};
+use super::request::{Answer, Reason, Request, Residual};
+use crate::model::{ComponentName, ConfigId, Ident, MemberRef, Outcome, RequestId, Step};
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
 use std::time::Duration;
@@ -101,6 +101,15 @@ pub enum Progress {
     },
     /// A request was answered.
     Answered(Answer),
+    /// What a configuration in force did or stands for is no longer so: told once until it is applied anew.
+    Lost {
+        /// Which.
+        configuration: ConfigId,
+        /// Why.
+        reason: Arc<Reason>,
+    },
+    /// A later look at the platform shows otherwise what nothing was under way with.
+    Differs(Arc<Residual>),
     /// A broken system is whole again.
     Recovered,
     /// The configurator itself failed, and goes on.

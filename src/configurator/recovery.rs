@@ -254,7 +254,10 @@ impl Engine {
         }
         let reason = Reason::Panic(text.to_owned());
         let mut expected = self.world.system.clone();
-        for running in self.running.drain(..) {
+        let running: Vec<_> = self.running.drain(..).collect();
+        for running in running {
+            let asked = running.asked.iter().map(|asked| asked.number);
+            self.forget_conditions(asked.chain(running.stood.iter().map(|(_, number)| *number)));
             let done: Vec<_> = running.machine.done_so_far().map(|(_, undo)| undo.clone()).collect();
             for back in done.iter().rev().flat_map(|undo| undo.steps()) {
                 let _ = step::apply(back, &mut expected);

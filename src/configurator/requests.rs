@@ -109,21 +109,25 @@ impl Engine {
 
     /// A transaction is over.
     pub(super) fn ended(&mut self, running: Running) {
-        let Running { machine, purpose, .. } = running;
+        let Running { machine, purpose, asked, stood, .. } = running;
+        self.forget_conditions(asked.iter().map(|asked| asked.number));
+        if let Some(conditions) = &self.conditions {
+            conditions.nudge();
+        }
         match purpose {
             Purpose::Requests(number, group) => {
                 let planned = machine.planned().clone();
                 let end = machine.end();
-                self.book(number, group, end.parts, Some(&planned));
+                self.book(number, group, end.parts, Some((&planned, &stood)));
                 self.take_up(number);
             }
-            Purpose::Safe(safe) => self.safe_ended(*safe, machine),
+            Purpose::Safe(safe) => self.safe_ended(*safe, machine, stood.first().map(|(_, number)| *number)),
             Purpose::Own => {}
         }
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<&Planned>) {
+    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<(&Planned, &[(usize, u64)])>) {
         let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
@@ -133,7 +137,7 @@ impl Engine {
         // All at once: one may pop what another one of them pushes.
         let done = (0..parts.len()).filter(|part| matches!(parts[*part], PartEnd::Done));
         let mut edits = SmallVec::<[_; 2]>::new();
-        if let Some(planned) = planned {
+        if let Some((planned, _)) = planned {
             edits.extend(done.map(|part| &planned.parts[part].edits));
         }
         let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
@@ -145,10 +149,17 @@ impl Engine {
         for (part, ended) in parts.into_iter().enumerate() {
             let place = group.places[part];
             let request = requests[place];
-            let Some(planned) = planned else { break };
+            let Some((planned, stood)) = planned else { break };
+            let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
+            if !matches!(ended, PartEnd::Done) {
+                self.forget_conditions(stood);
+            }
             match ended {
                 PartEnd::Anew => break,
                 PartEnd::Done => {
+                    if let Some(id) = planned.parts[part].pushes {
+                        self.applied(id, stood);
+                    }
                     confirm.extend(pushed.next().flatten().map(|frame| (request, frame)));
                     answers.push((place, Some(request.ask.done()), None));
                 }
@@ -364,6 +375,8 @@ impl Engine {
             floor: frame.floor.is_some(),
             parts: frame.parts.len().max(1),
             partial: frame.partial,
+            lost: self.is_lost(frame.configuration),
+            unseen: self.is_unseen(frame.configuration),
         };
         self.world.stack.frames().iter().map(view).collect()
     }

@@ -5,7 +5,7 @@ use crate::limits;
 use crate::model::RequestId;
 use crate::stack::{Frame, Group, Request};
 use crate::time::Time;
-use crate::transaction::{Touched, Transaction};
+use crate::transaction::{Question, Touched, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +18,13 @@ pub(super) struct Flight {
     pub deadline: Time,
     /// Set: no further one of several is to be begun.
     pub stop: Arc<AtomicBool>,
+}
+
+/// A condition that is being evaluated for a transaction, and until when it is waited for.
+pub(super) struct Asked {
+    pub question: Question,
+    pub number: u64,
+    pub until: Time,
 }
 
 /// What a transaction is for.
@@ -41,12 +48,25 @@ pub(super) struct Running {
     pub serves: SmallVec<[RequestId; 2]>,
     pub flights: Vec<Flight>,
     pub read: Option<(Ticket, Time)>,
+    pub asked: Vec<Asked>,
+    /// Parts that stand for what they should, with the numbers of their conditions.
+    pub stood: Vec<(usize, u64)>,
     pub over: bool,
 }
 
 impl Running {
     pub fn new(number: u64, machine: Transaction, purpose: Purpose, serves: SmallVec<[RequestId; 2]>) -> Self {
-        Self { number, machine, purpose, serves, flights: Vec::new(), read: None, over: false }
+        Self {
+            number,
+            machine,
+            purpose,
+            serves,
+            flights: Vec::new(),
+            read: None,
+            asked: Vec::new(),
+            stood: Vec::new(),
+            over: false,
+        }
     }
 
     pub fn is_safe(&self) -> bool {
@@ -56,7 +76,8 @@ impl Running {
     /// When something must be looked at again, if nothing comes.
     pub fn until(&self) -> Time {
         let flights = self.flights.iter().map(|flight| flight.deadline + limits::PLATFORM_GRACE);
-        flights.chain(self.read.map(|(_, until)| until)).min().unwrap_or(Time::NEVER)
+        let asked = self.asked.iter().map(|asked| asked.until);
+        flights.chain(self.read.map(|(_, until)| until)).chain(asked).min().unwrap_or(Time::NEVER)
     }
 
     /// No further one of the brief steps that are out is to be begun.

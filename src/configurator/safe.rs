@@ -70,6 +70,7 @@ impl Engine {
         let machine = Transaction::new(planned, spec);
         let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
         self.running.insert(0, running);
+        self.review_standings();
         // Now, not after what else waits to go on.
         self.advance(0);
     }
@@ -101,7 +102,7 @@ impl Engine {
 
     /// A safe configuration has been applied as far as it goes: its frame is pushed, it is answered, and what it interrupted
     /// goes back.
-    pub(super) fn safe_ended(&mut self, safe: (Request, Frame, Touched), machine: Transaction) {
+    pub(super) fn safe_ended(&mut self, safe: (Request, Frame, Touched), machine: Transaction, stood: Option<u64>) {
         let (request, frame, touched) = safe;
         let edits = machine.planned().parts[0].edits.pops.clone();
         let end = machine.end();
@@ -135,8 +136,12 @@ impl Engine {
         };
         self.forget_confirmations();
         self.changed();
-        if verdict == Verdict::Ok {
-            self.await_confirmation(request, pushed);
+        match (verdict, request.ask) {
+            (Verdict::Ok, Ask::Apply(id)) => {
+                self.await_confirmation(request, pushed);
+                self.applied(id, stood);
+            }
+            _ => self.forget_conditions(stood),
         }
         self.answer(request, verdict, reason);
         self.release(touched);

@@ -47,6 +47,7 @@ impl Engine {
         let mut down = TakenDown::default();
         self.glance();
         self.confirming.clear();
+        self.forget_standings();
         if forced {
             // Not after what is out has come in: now.
             self.break_off();
@@ -261,6 +262,7 @@ pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
         range: 0..steps.len() as u32,
         edits: crate::stack::Edits::default(),
         pushes: None,
+        holds: false,
         on_failure: crate::model::OnFailure::Unset,
         frame: None,
     };

@@ -4,10 +4,10 @@
 //! configuration enables one by setting it, and its undo restores what was. What a monitor looks at need not exist, nor
 //! be connected: the component has probes of it.
 
-use crate::model::monitor::{Counter, MONITORS_TYPE, Part};
-use crate::model::{Monitor, RunState};
-use crate::monitor::{Bank, Input, Sample, Troubles, state_value};
-use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Observed, Out, Probes, Prop};
+use crate::model::Monitor;
+use crate::model::monitor::MONITORS_TYPE;
+use crate::monitor::{Bank, Sample, Troubles};
+use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Sight};
 use std::sync::Arc;
 
 /// The library with the component type that evaluates `monitors`.
@@ -26,40 +26,14 @@ pub fn added_to(libraries: Libraries, monitors: &[Monitor]) -> Libraries {
 struct Plan {
     monitors: Vec<Monitor>,
     bank: Bank,
-    wanted: Arc<[Observed]>,
-    /// The inputs of the bank that each probe serves.
-    served: Vec<Vec<(usize, What)>>,
-}
-
-/// What an input takes from its probe.
-#[derive(Clone)]
-enum What {
-    Number(Vec<Part>),
-    State,
-    Faulted,
-    Counter(Counter),
+    sight: Sight,
 }
 
 impl Plan {
     fn new(monitors: &[Monitor]) -> Self {
         let bank = Bank::new(monitors);
-        let mut wanted: Vec<Observed> = Vec::new();
-        let mut served: Vec<Vec<(usize, What)>> = Vec::new();
-        for (i, input) in bank.inputs().iter().enumerate() {
-            let (of, what) = match input {
-                Input::Port(signal) => (Observed::Port(signal.member), What::Number(signal.path.clone())),
-                Input::State(component) => (Observed::Component(*component), What::State),
-                Input::Faulted(component) => (Observed::Component(*component), What::Faulted),
-                Input::Activity { activity, counter } => (Observed::Activity(*activity), What::Counter(*counter)),
-            };
-            let place = wanted.iter().position(|w| *w == of).unwrap_or_else(|| {
-                wanted.push(of);
-                served.push(Vec::new());
-                wanted.len() - 1
-            });
-            served[place].push((i, what));
-        }
-        Self { monitors: monitors.to_vec(), bank, wanted: wanted.into(), served }
+        let sight = Sight::of(bank.inputs());
+        Self { monitors: monitors.to_vec(), bank, sight }
     }
 }
 
@@ -99,28 +73,7 @@ impl Component for Monitors {
             }
         }
         self.fresh = false;
-        for sample in &mut self.samples {
-            sample.present = false;
-        }
-        let (samples, served) = (&mut self.samples, &self.plan.served);
-        for (place, mut seen) in self.probes.each() {
-            let written = seen.written();
-            for (input, what) in &served[place] {
-                let sample = match what {
-                    What::Number(path) => {
-                        written.map(|(at, writes)| (seen.number(path).unwrap_or(f64::NAN), at, writes))
-                    }
-                    What::State => seen.state().map(|state| (state_value(state), now, 0)),
-                    What::Faulted => {
-                        seen.state().map(|state| (f64::from(u8::from(state == RunState::Faulted)), now, 0))
-                    }
-                    What::Counter(counter) => seen.counter(*counter).map(|value| (value, now, 0)),
-                };
-                if let Some((value, at, writes)) = sample {
-                    samples[*input] = Sample { value, at, writes, present: true };
-                }
-            }
-        }
+        self.plan.sight.look(&mut self.probes, now, &mut self.samples);
         let (samples, events) = (&self.samples, &mut self.events);
         self.bank.step(now, &mut |input| samples[input], &mut |_, event| events.raise(event));
         for (i, (verdict, robustness)) in self.verdicts.iter_mut().zip(&mut self.robustness).enumerate() {
@@ -173,7 +126,7 @@ impl Monitors {
                 "Changes so far that were told apart no more, because the memory of a condition over time was used up.",
             )
             .output("merged");
-        let probes = b.probes(plan.wanted.clone());
+        let probes = b.probes(plan.sight.wanted().clone());
         Self {
             plan: plan.clone(),
             bank: plan.bank.clone(),

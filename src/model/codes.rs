@@ -233,6 +233,11 @@ codes! {
     CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
         "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
          them, and the requests for it.";
+    CONF_HOLDS_UNSEEN = "conf::holds_unseen", "the platform does not show what a configuration stands for",
+        "The components of the simulated platform have no code: their run states can be seen, values at their ports cannot. So \
+         what the configuration stands for counts as true there while none of the components that it looks at is faulted, and \
+         `davit status` shows the frame as not observed. On a platform whose components run it is evaluated; until then \
+         nobody has seen that it ever becomes true.";
     CONF_CONFIRM_CONTRADICTED = "conf::confirm_contradicted", "`confirm` stands beside `safe` or `on_failure = \"hold\"`",
         "`confirm` says that the configuration is undone when an event does not come in time. A safe configuration stays in \
          force until somebody undoes it, and `on_failure = \"hold\"` says that nothing is undone unasked: both at once \
@@ -544,6 +549,20 @@ codes! {
         "An earlier request left components of which not all is known, or that are not as the model has them. Plans are made from \
          what is known, so a request that names one of them is refused; everything else goes on. `ID.undo` of the configuration \
          that broke repairs them, and so do `davit recover --back`, `davit recover --accept` and a shutdown.";
+    DOES_NOT_STAND = "run::does_not_stand", "what a configuration stands for did not become true",
+        "A configuration says with `holds` what it stands for. All its steps were done, and within its `timeout` (else within \
+         `limits.step_timeout_s`) the condition did not become true on what was written after the last of them. So it failed, \
+         and was taken back like after a failed step. A port that is written only when its value changes may have nothing to \
+         show then: let it be written periodically, or look at something else.";
+    STANDS_NO_MORE = "run::stands_no_more", "what a configuration stands for is no longer so",
+        "The condition under `holds` was true when the configuration was applied, and became false while it is in force, by \
+         itself, by a fault or by a later configuration. Nothing is undone; the coordinator hears `ID.lost`, once until the \
+         configuration is applied anew, and `davit status` marks it.";
+    SEEN_OTHERWISE = "run::seen_otherwise", "the platform is not as the model has it",
+        "Now and then the configurator looks whether components are as its steps have left them. These are not: a step was \
+         reported done and was not, or somebody else changed them. They are broken: a request that names one of them is \
+         refused, and the coordinator hears `ID.lost` of the newest configuration that wrote what differs. `davit drift` shows \
+         the difference, `davit recover --back` mends it, `davit recover --accept` takes the system as it is.";
     INTERRUPTED = "run::interrupted", "a safe configuration went first",
         "A configuration marked `safe` was requested while this request was being carried out. No further step of it was issued, \
          the safe configuration was applied, and what it did not touch was rolled back. Ask again when it is safe to.";

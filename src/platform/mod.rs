@@ -8,7 +8,8 @@ pub mod simulated;
 
 pub use crate::model::outcome::{Cause, Execution, Outcome};
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
-use crate::time::Time;
+use crate::monitor::{Input, Sample};
+use crate::time::{Signal, Time};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -156,6 +157,14 @@ pub trait Platform: Send + Sync {
     /// From now on events go to `sink` (one sink; the last one set).
     fn subscribe(&self, sink: EventSink);
 
+    /// Looks at what conditions are about, beside all connections; of ports, at what is written from now on and at nothing
+    /// before. Whenever something is written there, `wake` is notified; whoever looks also does so after each step, and
+    /// when a component was reported. Never waits. None: this platform shows no values at all.
+    fn watch(&self, inputs: &[Input], wake: &Signal) -> Option<Box<dyn Watch>> {
+        let _ = (inputs, wake);
+        None
+    }
+
     /// Components whose call never returned, or did not come to rest when it was given up.
     fn quarantined(&self) -> Vec<ComponentName>;
 
@@ -177,4 +186,13 @@ pub trait Prepared: Send {
     fn waited(&self) -> bool {
         true
     }
+}
+
+/// A look at the inputs of conditions; it ends when it is dropped.
+pub trait Watch: Send {
+    /// Whether the platform can show this input, of those it was asked for, at all.
+    fn shows(&self, input: usize) -> bool;
+
+    /// The newest samples, in the order of the inputs. What is not there is absent.
+    fn look(&mut self, now: Time, samples: &mut [Sample]);
 }

@@ -21,6 +21,7 @@ pub mod port;
 pub mod probe;
 pub mod property;
 mod realtime;
+pub mod sight;
 pub mod value;
 mod words;
 
@@ -32,4 +33,5 @@ pub use library::{Kind, Libraries, Library};
 pub use port::{EventIn, EventOut, In, Out, Sample};
 pub use probe::{Observed, Probes, Seen};
 pub use property::Prop;
+pub use sight::Sight;
 pub use value::{PortValue, record};

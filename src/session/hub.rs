@@ -167,9 +167,10 @@ impl Hub {
         let observers = {
             let mut state = self.lock();
             let heard = match &what {
-                Happening::Event { event, .. } | Happening::Emitted { event } | Happening::Stale { event } => {
-                    Some(event.clone())
-                }
+                Happening::Event { event, .. }
+                | Happening::Emitted { event }
+                | Happening::Lost { event, .. }
+                | Happening::Stale { event } => Some(event.clone()),
                 Happening::Answered(answered) => Some(answered.answer.clone()),
                 Happening::State { active } => {
                     let of = active.first().and_then(|root| root.split_once(':')).map_or("", |(name, _)| name);

@@ -77,6 +77,13 @@ pub enum Happening {
         /// Which.
         component: String,
     },
+    /// What a configuration in force did or stands for is no longer so; the coordinators hear `ID.lost`.
+    Lost {
+        /// `ID.lost`.
+        event: String,
+        /// Why, one line each.
+        reasons: Vec<String>,
+    },
     /// A broken system is whole again.
     Recovered,
     /// Something had to be forced, or was left over.
@@ -240,6 +247,12 @@ pub struct FrameView {
     pub parts: usize,
     /// Whether undo stops here.
     pub floor: bool,
+    /// Whether it is what was done and not taken back of something that ended *broken*.
+    pub partial: bool,
+    /// Whether what its configuration did or stands for is no longer so, since it was applied last.
+    pub lost: bool,
+    /// Whether the platform does not show what its configuration stands for: it counts as true while nothing is faulted.
+    pub unseen: bool,
 }
 
 /// A deployment at one moment: what `status --json` prints.

@@ -16,6 +16,7 @@ mod routes;
 pub mod rpc;
 pub mod service;
 pub mod socket;
+mod stands;
 mod wiring;
 
 pub use hub::{Hub, Observer};

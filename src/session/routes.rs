@@ -6,7 +6,7 @@ use super::log::{Answered, Happening, StepTime};
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, Scope};
 use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
 use crate::limits;
-use crate::model::{EventName, RequestId, Verdict};
+use crate::model::{Ask, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use rustc_hash::FxHashMap;
@@ -162,7 +162,7 @@ impl ToConfigurator {
 /// Steps carried out for requests that are not answered yet.
 pub(super) type Steps = Mutex<FxHashMap<RequestId, Vec<StepTime>>>;
 
-pub(super) fn on_progress(hub: &Hub, steps: &Steps, progress: &Progress) {
+pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progress: &Progress) {
     match progress {
         Progress::Begun { .. } => {}
         Progress::Ended { request, step, end, took, undoing } => {
@@ -175,6 +175,16 @@ pub(super) fn on_progress(hub: &Hub, steps: &Steps, progress: &Progress) {
         Progress::Survived(text) => {
             hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
         }
+        Progress::Lost { configuration, reason } => {
+            let event = Verdict::Lost.event(Ask::Apply(*configuration));
+            let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
+            hub.note(Happening::Lost { event: event.to_string(), reasons });
+            // In whatever state they are: it answers nothing that was asked there.
+            for coordinator in junction.all() {
+                hub.taken(coordinator.deliver(Incoming::control(event)));
+            }
+        }
+        Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
         Progress::Recovered => hub.note(Happening::Recovered),
         Progress::Started(_) | Progress::Answered(_) => {}
     }

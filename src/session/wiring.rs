@@ -7,8 +7,10 @@ use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
 use super::recovery::Difference;
 use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
+use super::stands::Evaluator;
 use crate::configurator::{
-    Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown, View,
+    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown,
+    View,
 };
 use crate::coordinator::{Dropped, Incoming};
 use crate::functions::Opener;
@@ -49,6 +51,7 @@ pub struct Session {
     parts: Vec<Part>,
     configurator: ConfiguratorHandle,
     junction: Arc<Junction>,
+    evaluator: Option<Arc<Evaluator>>,
     commands: Mutex<Vec<Command>>,
     ended: Mutex<Option<Ended>>,
 }
@@ -61,6 +64,8 @@ impl Session {
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
         let steps = Arc::new(Mutex::new(rustc_hash::FxHashMap::default()));
+        let evaluator =
+            super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
             catalogue,
@@ -75,9 +80,10 @@ impl Session {
                 Arc::new(move |answer| on_answer(&hub, &junction, &steps, &answer))
             },
             progress: {
-                let hub = hub.clone();
-                Some(Arc::new(move |progress| on_progress(&hub, &steps, progress)))
+                let (hub, junction) = (hub.clone(), junction.clone());
+                Some(Arc::new(move |progress| on_progress(&hub, &junction, &steps, progress)))
             },
+            conditions: evaluator.as_ref().map(|evaluator| evaluator.clone() as Arc<dyn Conditions>),
         });
         *lock(&junction.configurator) = Some(configurator.clone());
         let parts = Part::start_all(&deployment, charts.into_iter().zip(functions), &clock, &hub, &junction);
@@ -93,6 +99,7 @@ impl Session {
             parts,
             configurator,
             junction,
+            evaluator,
             commands: Mutex::new(Vec::new()),
             ended: Mutex::new(None),
         })
@@ -365,6 +372,9 @@ impl Session {
 
     /// The threads' handles hold each other through the junction; without it they end.
     fn part(&self) {
+        if let Some(evaluator) = &self.evaluator {
+            evaluator.close();
+        }
         lock(&self.junction.coordinators).clear();
         lock(&self.junction.configurator).take();
     }
@@ -386,6 +396,9 @@ impl FrameView {
             at: frame.at.as_secs_f64(),
             parts: frame.parts,
             floor: frame.floor,
+            partial: frame.partial,
+            lost: frame.lost,
+            unseen: frame.unseen,
         }
     }
 }

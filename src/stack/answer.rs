@@ -60,6 +60,12 @@ pub enum Reason {
     },
     /// The configuration's own time was over before it was applied.
     Timeout(Duration),
+    /// It was applied, and what it stands for did not become true in time.
+    DoesNotStand(ConfigId),
+    /// What it stands for was true and is no longer so.
+    StandsNoMore(ConfigId),
+    /// A later look at the platform shows it otherwise.
+    SeenOtherwise(Vec<Step>),
     /// Stopped for a `safe` configuration.
     Interrupted(ConfigId),
     /// Overtaken by its own undo while it was queued.
@@ -187,6 +193,12 @@ impl Reason {
                 .help("the component's own message says why; mend that and ask again"),
             Self::Timeout(_) => Finding::error(codes::CONFIGURATION_TIMEOUT, self.to_string())
                 .help("raise the configuration's `timeout`, or find the step that takes so long with `davit log`"),
+            Self::DoesNotStand(_) => Finding::error(codes::DOES_NOT_STAND, self.to_string())
+                .help("see what its `holds` looks at, or give it more time with `timeout`"),
+            Self::StandsNoMore(_) => Finding::error(codes::STANDS_NO_MORE, self.to_string())
+                .help("see what its `holds` looks at; it is in force still, and watched again once it is applied anew"),
+            Self::SeenOtherwise(_) => Finding::error(codes::SEEN_OTHERWISE, self.to_string())
+                .help("`davit drift` shows what differs, `davit recover --back` mends it, `--accept` takes it as it is"),
             Self::Interrupted(_) => Finding::error(codes::INTERRUPTED, self.to_string())
                 .help("ask again when the safe configuration is no longer needed"),
             Self::Overtaken => Finding::info(codes::OVERTAKEN, self.to_string()),
@@ -232,6 +244,9 @@ impl fmt::Display for Reason {
             }
             Self::Step { step, cause } => write!(f, "`{step}`: {cause}"),
             Self::Timeout(limit) => write!(f, "not applied within {} s", limit.as_secs_f64()),
+            Self::DoesNotStand(id) => write!(f, "applied, but what `{id}` stands for did not become true in time"),
+            Self::StandsNoMore(id) => write!(f, "what `{id}` stands for is no longer so"),
+            Self::SeenOtherwise(steps) => write!(f, "the platform shows otherwise: {}", list(steps)),
             Self::Interrupted(by) => write!(f, "interrupted by the safe configuration `{by}`"),
             Self::Overtaken => f.write_str("overtaken by its own undo before it began"),
             Self::GivenUp => f.write_str("given up: its undo was asked for"),

@@ -90,6 +90,7 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
         range: 0..u32::try_from(steps.len()).expect("fewer steps than that"),
         edits: Edits { pops: Vec::new(), push: Some(Arc::new(frame.clone())) },
         pushes: Some(configuration.id),
+        holds: configuration.holds.is_some(),
         on_failure: configuration.on_failure,
         frame: Some(Arc::new(frame.clone())),
     };

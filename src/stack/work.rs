@@ -43,6 +43,8 @@ pub struct Part {
     pub edits: Edits,
     /// The configuration that is pushed; none: something is undone.
     pub pushes: Option<ConfigId>,
+    /// What the configuration stands for is to be true before it counts as applied.
+    pub holds: bool,
     /// What a failure of it leads to.
     pub on_failure: OnFailure,
     /// Its frame as it will be, without a number: what is pushed, or what is being popped.
@@ -148,11 +150,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     pub(super) fn add(&mut self, op: &Op<'_>, context: &Context) -> Result<(), Refusal> {
         let from = self.place();
         let mut edits = Edits::default();
-        let (mut pushes, mut on_failure, mut frame) = (None, OnFailure::default(), None);
+        let (mut pushes, mut holds, mut on_failure, mut frame) = (None, false, OnFailure::default(), None);
         match op {
             Op::Push { configuration, requester, at, scope } => {
                 pushes = Some(configuration.id);
                 on_failure = configuration.on_failure;
+                holds = configuration.holds.is_some();
                 self.push(configuration, *requester, *at, *scope, context, &mut edits)?;
                 frame.clone_from(&edits.push);
             }
@@ -185,7 +188,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                 }
             }
         }
-        self.parts.push(Part { range: from..self.place(), edits, pushes, on_failure, frame });
+        self.parts.push(Part { range: from..self.place(), edits, pushes, holds, on_failure, frame });
         Ok(())
     }
 

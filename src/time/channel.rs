@@ -211,8 +211,17 @@ impl<T> Receiver<T> {
     /// # Errors
     /// [`RecvError`]: nothing came, or nothing will come.
     pub fn recv_deadline(&self, deadline: Time) -> Result<T, RecvError> {
+        self.recv_or_idle(deadline, Time::NEVER)
+    }
+
+    /// The same, but it also waits no longer than until `idle`: a time that simulated time does not move on for by itself, so
+    /// that who looks at something now and then keeps no clock going at which nothing else happens.
+    ///
+    /// # Errors
+    /// [`RecvError`]: nothing came, or nothing will come.
+    pub fn recv_or_idle(&self, deadline: Time, idle: Time) -> Result<T, RecvError> {
         match &self.0 {
-            End::Real(clock, receiver) => match real_instant(clock, deadline) {
+            End::Real(clock, receiver) => match real_instant(clock, deadline.min(idle)) {
                 Some(instant) => receiver.recv_deadline(instant).map_err(|error| match error {
                     real::RecvTimeoutError::Timeout => RecvError::Timeout,
                     real::RecvTimeoutError::Disconnected => RecvError::Closed,
@@ -231,10 +240,11 @@ impl<T> Receiver<T> {
                     if !locked.values.is_empty() || locked.senders == 0 {
                         continue;
                     }
-                    if clock.now() >= deadline {
+                    if clock.now() >= deadline.min(idle) {
                         return Err(RecvError::Timeout);
                     }
-                    scheduler(clock).wait(me, deadline, move |wait| locked.want_value.push_back(wait));
+                    let register = move |wait| locked.want_value.push_back(wait);
+                    scheduler(clock).wait_or_idle(me, deadline, idle, register);
                 }
             }),
         }

@@ -52,6 +52,8 @@ struct State {
     ready: VecDeque<Id>,
     /// Moments waited for; entries of waits that have ended otherwise stay until they come up.
     timers: BinaryHeap<Reverse<(Time, Id, u64)>>,
+    /// Those of them for which alone time does not move on.
+    idle: Vec<(Time, Id, u64)>,
     hung: Vec<Wait>,
     shut: bool,
     /// Who watches real time, when paced.
@@ -218,8 +220,18 @@ impl Scheduler {
     /// Waits until woken or until `deadline`. `register` gets the wait before the token is given away (and before any
     /// other lock that the caller holds is released), so that no wake-up is lost.
     pub(super) fn wait(&self, me: Id, deadline: Time, register: impl FnOnce(Wait)) {
+        self.wait_or_idle(me, deadline, Time::NEVER, register);
+    }
+
+    /// [`Self::wait`], which also ends at `idle`, when time comes that far because of what others wait for.
+    pub(super) fn wait_or_idle(&self, me: Id, deadline: Time, idle: Time, register: impl FnOnce(Wait)) {
         let mut state = lock(&self.state);
         let wait = self.begin_wait(&mut state, me, deadline);
+        if idle < deadline {
+            let timer = (idle, me, wait.number);
+            state.timers.push(Reverse(timer));
+            state.idle.push(timer);
+        }
         register(wait);
         self.block(state, me);
     }
@@ -270,6 +282,10 @@ impl Scheduler {
                 continue;
             }
             let Some((at, _)) = state.next_timer() else { return };
+            // A clock that follows real time goes on anyway.
+            if self.pace.is_none() && state.is_idle() {
+                return;
+            }
             if let Some(pace) = &self.pace
                 && !pace.until(at).is_zero()
             {
@@ -348,5 +364,18 @@ impl State {
             self.timers.pop();
         }
         None
+    }
+
+    /// Whether nobody waits for a moment for which time moves on. There is a moment that somebody waits for.
+    fn is_idle(&mut self) -> bool {
+        if self.idle.is_empty() {
+            return false;
+        }
+        let Self { participants, idle, timers, .. } = self;
+        let waits = |(_, id, number): &(Time, Id, u64)| participants.get(id).is_some_and(|p| p.wait == Some(*number));
+        idle.retain(waits);
+        // What comes next decides nearly always.
+        timers.peek().is_some_and(|Reverse(next)| idle.contains(next))
+            && timers.iter().all(|Reverse(timer)| !waits(timer) || idle.contains(timer))
     }
 }

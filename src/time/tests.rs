@@ -264,3 +264,27 @@ proptest! {
         prop_assert_eq!(sum.load(Ordering::SeqCst), total);
     }
 }
+
+#[test]
+fn idle_waits_do_not_move_time_on_and_end_when_it_goes_on() {
+    let clock = Clock::simulated();
+    let guard = clock.enter();
+    let (_tx, rx) = clock.channel::<()>(1);
+    let woken = Arc::new(Mutex::new(Vec::new()));
+    let (own, list) = (clock.clone(), woken.clone());
+    clock.spawn("idle", move || {
+        for _ in 0..3 {
+            assert_eq!(rx.recv_or_idle(Time::NEVER, own.now() + MS * 10), Err(RecvError::Timeout));
+            lock(&list).push(own.now());
+        }
+    });
+    clock.sleep(MS);
+    // Nobody else waits for a time.
+    drop(guard);
+    assert_eq!((clock.now(), lock(&woken).len()), (at(1), 0));
+    let _guard = clock.enter();
+    clock.sleep(MS * 24);
+    assert_eq!(*lock(&woken), [at(10), at(20)]);
+    clock.sleep(MS * 24);
+    assert_eq!(*lock(&woken), [at(10), at(20), at(30)]);
+}

@@ -48,7 +48,7 @@ impl Transaction {
     /// Everything was tried: it is done, or, best effort, what could not be done is named.
     pub(super) fn end_forward(&mut self, live: &System, can: &Can<'_>) {
         let forward = self.forward.as_ref().expect("it was carried out");
-        if forward.failures.is_empty() && forward.unsettled.is_empty() {
+        if forward.failures.is_empty() && forward.unsettled.is_empty() && self.fallen.is_none() {
             let parts = self.planned.parts.iter().map(|_| PartEnd::Done).collect();
             return self.over(parts);
         }
@@ -81,7 +81,10 @@ impl Transaction {
             (Some((_, reason)), ..) => reason.clone(),
             (None, Some(i), _) => Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout },
             (None, None, Some(reason)) => reason.clone(),
-            (None, None, None) => Reason::Ended,
+            (None, None, None) => {
+                let pushes = self.fallen.and_then(|part| self.planned.parts[part].pushes);
+                pushes.map_or(Reason::Ended, Reason::DoesNotStand)
+            }
         }
     }
 

@@ -31,6 +31,21 @@ pub struct Can<'a> {
     pub quarantined: &'a [ComponentName],
 }
 
+/// What only the values that components show can tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Question {
+    /// Whether what the configuration of a part stands for becomes true, within its time.
+    Stands {
+        /// The part.
+        part: usize,
+    },
+    /// Whether a call of unknown outcome was done, by the condition that its operation names.
+    WasDone {
+        /// The number of the step in the list in hand.
+        step: u32,
+    },
+}
+
 /// What is to be done next.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Poll {
@@ -40,6 +55,8 @@ pub enum Poll {
     Cancel(u32),
     /// These components are read back.
     Read(Vec<ComponentName>),
+    /// This is found out, on what is seen from now on: [`Input::Told`].
+    Ask(Question),
     /// Nothing, until something comes.
     Wait,
     /// It is over: [`Transaction::end`].
@@ -60,6 +77,13 @@ pub enum Input {
     NotBegun(u32),
     /// What was read; none: nobody answered.
     Seen(Option<Snapshot>),
+    /// What was asked; none: it cannot be seen.
+    Told {
+        /// What was asked.
+        question: Question,
+        /// Whether it is so.
+        is: Option<bool>,
+    },
     /// A part of it is given up, by who asked for it: what was done is taken back, also what moves.
     GiveUp {
         /// The part.

@@ -5,8 +5,8 @@
 //! whoever drives the machine and changes only here, with each step that was done. The configurator carries messages
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
-//! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `back`: the way back.
-//! `end`: what comes of each part. `messages`: what goes in and out.
+//! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
+//! was applied stands. `back`: the way back. `end`: what comes of each part. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
@@ -17,10 +17,11 @@ mod messages;
 mod order;
 mod run;
 mod settle;
+mod stand;
 
 pub use back::Touched;
 pub use end::{BrokenPart, End, PartEnd};
-pub use messages::{Can, Input, Poll, Spec};
+pub use messages::{Can, Input, Poll, Question, Spec};
 
 use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
@@ -32,9 +33,18 @@ use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
+/// A question that is out, and its answer once that has come.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    question: Question,
+    told: Option<Option<bool>>,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Forward,
+    /// All was done; what the configurations stand for is to become true.
+    Standing,
     /// Nothing further begins; what is out comes in.
     Stopping,
     Back,
@@ -81,6 +91,10 @@ pub struct Transaction {
     taken_down: bool,
     reading: bool,
     seen: Option<Option<Snapshot>>,
+    /// What was asked and not used yet, with the answers that came.
+    asked: Vec<Asked>,
+    /// The first part that does not stand for what it should.
+    fallen: Option<usize>,
     cancels: Vec<u32>,
     /// What the components are compared with after mending, and whether that has nothing of what was done.
     target: Option<Box<(System, bool)>>,
@@ -116,6 +130,8 @@ impl Transaction {
             taken_down: false,
             reading: false,
             seen: None,
+            asked: Vec::new(),
+            fallen: None,
             cancels: Vec::new(),
             target: None,
             end: None,
@@ -226,9 +242,15 @@ impl Transaction {
             }
             Input::NotBegun(step) => self.in_hand_mut().not_begun(step),
             Input::Seen(seen) => self.seen = Some(seen),
+            Input::Told { question, is } => {
+                // What is no longer asked is no news.
+                if let Some(asked) = self.asked.iter_mut().find(|asked| asked.question == question) {
+                    asked.told = Some(is);
+                }
+            }
             Input::GiveUp { part } => {
                 // Once it is on its way back, that goes on.
-                if self.phase == Phase::Forward {
+                if matches!(self.phase, Phase::Forward | Phase::Standing) {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
                     self.given_up.push(part);
                     self.asked_back = true;
@@ -249,7 +271,7 @@ impl Transaction {
                 self.touched.join(touched);
             }
             Input::Stop => {
-                if self.phase == Phase::Forward {
+                if matches!(self.phase, Phase::Forward | Phase::Standing) {
                     self.stopped_by.get_or_insert(Reason::TakenDown);
                     self.cancel();
                 }
@@ -294,7 +316,12 @@ impl Transaction {
                             return Poll::Wait;
                         }
                     }
-                    self.carried_out(live, can);
+                    self.carried_out();
+                }
+                Phase::Standing => {
+                    if let Some(poll) = self.stand(live, can) {
+                        return poll;
+                    }
                 }
                 Phase::Stopping => {
                     let run = self.in_hand();
@@ -332,6 +359,9 @@ impl Transaction {
             self.in_hand_mut().settle_by(seen.as_ref(), live);
             return None;
         }
+        if let Some(poll) = self.settle_by_questions(live) {
+            return Some(poll);
+        }
         if !self.in_hand_mut().settle_blind(live) {
             return None;
         }
@@ -347,18 +377,18 @@ impl Transaction {
     /// Whether nothing further of the list in hand is to begin.
     fn is_stopped(&self) -> bool {
         match self.phase {
-            Phase::Forward => self.stopped_by.is_some(),
+            Phase::Forward | Phase::Standing => self.stopped_by.is_some(),
             _ => self.held || self.taken_down,
         }
     }
 
     /// The list in hand is over, or stops.
-    fn carried_out(&mut self, live: &mut System, can: &Can<'_>) {
+    fn carried_out(&mut self) {
         match self.phase {
             Phase::Forward => {
                 let forward = self.forward.as_ref().expect("it was carried out");
                 if forward.is_over() && (self.spec.best_effort || !forward.stops() && back::whole(forward)) {
-                    self.end_forward(live, can);
+                    self.phase = Phase::Standing;
                 } else {
                     self.phase = Phase::Stopping;
                 }
@@ -445,7 +475,7 @@ impl Transaction {
         }
         let forward = self.forward.as_ref().expect("it was carried out");
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());
-        failures.map(|i| self.part_of(i)).min().unwrap_or(0)
+        failures.map(|i| self.part_of(i)).chain(self.fallen).min().unwrap_or(0)
     }
 
     /// The components it is about.

@@ -1,6 +1,8 @@
 //! Unknown outcomes, settled by what was read back; what cannot be settled is named.
 
+use super::messages::{Poll, Question};
 use super::run::Run;
+use super::{Asked, Transaction};
 use crate::model::{Effect, RunState, Snapshot, Step};
 use crate::system::{System, View as _};
 
@@ -9,6 +11,51 @@ enum Settled {
     Happened,
     DidNot,
     Nobody,
+}
+
+/// Whether a call names the condition that settles it.
+fn is_asked(step: &Step, live: &System) -> bool {
+    let Step::Operation(call) = step else { return false };
+    let declared = live.component(step.component()).and_then(|node| node.ty.operations.get(&call.operation.member));
+    declared.is_some_and(|operation| operation.settled_by.is_some())
+}
+
+impl Transaction {
+    /// Settles the calls that name the condition that settles them. None: there are none.
+    pub(super) fn settle_by_questions(&mut self, live: &mut System) -> Option<Poll> {
+        let mut waits = false;
+        let mut at = 0;
+        while at < self.in_hand().unread.len() {
+            let step = self.in_hand().unread[at].0;
+            if !is_asked(&self.step(step).step, live) {
+                at += 1;
+                continue;
+            }
+            let question = Question::WasDone { step };
+            let told = match self.asked.iter().find(|asked| asked.question == question) {
+                // Nobody waits for anything any more.
+                _ if self.taken_down => Some(None),
+                Some(asked) => asked.told,
+                None => {
+                    self.asked.push(Asked { question, told: None });
+                    return Some(Poll::Ask(question));
+                }
+            };
+            let Some(is) = told else {
+                waits = true;
+                at += 1;
+                continue;
+            };
+            self.asked.retain(|asked| asked.question != question);
+            let settled = match is {
+                Some(true) => Settled::Happened,
+                Some(false) => Settled::DidNot,
+                None => Settled::Nobody,
+            };
+            self.in_hand_mut().settle(at, settled, live);
+        }
+        waits.then_some(Poll::Wait)
+    }
 }
 
 /// What is known of a step of unknown outcome without reading anything; none: it must be read.

@@ -8,6 +8,7 @@ mod demo;
 mod explored;
 mod faults;
 mod hot_swap;
+mod lost;
 mod monitor;
 mod motion;
 mod recovery;

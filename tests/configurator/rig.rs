@@ -205,6 +205,7 @@ impl Rig {
             workers: 4,
             answers: Arc::new(move |answer| sink.lock().unwrap().push(answer)),
             progress: Some(Arc::new(move |progress| told.lock().unwrap().push(progress.clone()))),
+            conditions: None,
         });
         let told = handle.clone();
         platform.subscribe(Arc::new(move |event| told.platform_event(&event)));
@@ -218,6 +219,15 @@ impl Rig {
             next: Mutex::new(1),
             _guard: guard,
         }
+    }
+
+    /// Nobody hears what the platform reports meanwhile.
+    pub fn platform_deaf(&self, what: impl FnOnce(&Simulated)) {
+        use davit::platform::Platform as _;
+        self.platform.subscribe(Arc::new(|_| {}));
+        what(&self.platform);
+        let told = self.handle.clone();
+        self.platform.subscribe(Arc::new(move |event| told.platform_event(&event)));
     }
 
     fn request(&self, word: &str, requester: Requester) -> Request {

@@ -56,6 +56,7 @@ impl Bench {
             match machine.poll(&mut self.model, Time::default(), &can) {
                 Poll::Begin(steps) => out.extend(steps),
                 Poll::Cancel(_) => {}
+                Poll::Ask(question) => machine.on(Input::Told { question, is: Some(true) }, &mut self.model),
                 Poll::Read(components) => {
                     let seen = self.platform.snapshot_some(&components);
                     machine.on(Input::Seen(Some(seen)), &mut self.model);

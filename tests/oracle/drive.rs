@@ -16,8 +16,17 @@ use std::time::Duration;
 /// What an observer of the session wrote down.
 #[derive(Debug, Clone)]
 pub enum Note {
-    Answer { request: u64, by: String, answer: String, steps: String },
-    Requested { request: u64, by: String, ask: String },
+    Answer {
+        request: u64,
+        by: String,
+        answer: String,
+        steps: String,
+    },
+    Requested {
+        request: u64,
+        by: String,
+        ask: String,
+    },
     Moved(Vec<String>),
     /// The configurator itself failed.
     Failed(String),

@@ -102,8 +102,10 @@ fn catalogue() -> Catalogue {
     node.properties.insert(ident("s"), property(Tunable::Stopped));
     let operations = [("look", Effect::None, false), ("open", Effect::Undo(ident("close")), false)];
     let more = [("close", Effect::Undo(ident("open")), false), ("lift", Effect::Undo(ident("lower")), true)];
-    for (name, effect, moves) in
-        operations.into_iter().chain(more).chain([("lower", Effect::Undo(ident("lift")), true), ("burn", Effect::Irreversible, false)])
+    for (name, effect, moves) in operations
+        .into_iter()
+        .chain(more)
+        .chain([("lower", Effect::Undo(ident("lift")), true), ("burn", Effect::Irreversible, false)])
     {
         node.operations.insert(ident(name), OperationType { moves, ..OperationType::new(effect) });
     }
@@ -258,13 +260,22 @@ fn scoped(chance: &mut Chance, configurations: usize, kept: bool) -> String {
 
 fn answer(chance: &mut Chance, configurations: usize) -> String {
     let id = chance.below(configurations);
-    let word = chance.of(&["ok", "ok", "ok", "failed", "failed", "undone", "cancelled", "reverted", "undo.failed", "broken"]);
+    let word =
+        chance.of(&["ok", "ok", "ok", "failed", "failed", "undone", "cancelled", "reverted", "undo.failed", "broken"]);
     if chance.percent(10) { (*chance.of(&["undo.done", "undo.failed"])).to_owned() } else { format!("c{id}.{word}") }
 }
 
 /// A coordinator. What answers, its own end or the other coordinator lead to stands further on in the list of states: so it
 /// comes to rest, however fast the answers come.
-fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: usize, several: bool, kept: bool, text: &mut String) -> Coordinator {
+fn coordinator(
+    chance: &mut Chance,
+    name: &str,
+    first: usize,
+    configurations: usize,
+    several: bool,
+    kept: bool,
+    text: &mut String,
+) -> Coordinator {
     let count = 2 + chance.below(4);
     let mut root = State::new(ident("root"));
     let mut names: Vec<String> = vec!["idle".to_owned()];
@@ -361,7 +372,11 @@ fn coordinator(chance: &mut Chance, name: &str, first: usize, configurations: us
                     let further = chance.of(after).clone();
                     add(own, &further, vec![trigger(chance.pick(&TOLD))], effect);
                 }
-                9 if by_itself && at > 0 && after.last().is_some_and(|last| last.starts_with("done")) && chance.percent(50) => {
+                9 if by_itself
+                    && at > 0
+                    && after.last().is_some_and(|last| last.starts_with("done"))
+                    && chance.percent(50) =>
+                {
                     let further = after.last().expect("not empty").clone();
                     add(own, &further, vec![trigger("e_done")], effect);
                 }
@@ -393,7 +408,13 @@ fn told(state: &State, depth: usize, text: &mut String) {
     };
     let config: Vec<String> = state.config.iter().map(|(id, _)| id.to_string()).collect();
     let pad = "  ".repeat(depth);
-    let _ = writeln!(text, "{pad}{} config {config:?} entry {:?} exit {:?}", state.name, names(&state.entry), names(&state.exit));
+    let _ = writeln!(
+        text,
+        "{pad}{} config {config:?} entry {:?} exit {:?}",
+        state.name,
+        names(&state.entry),
+        names(&state.exit)
+    );
     for transition in &state.transitions {
         let end = |end: &Option<(String, Origin)>| end.as_ref().map(|(name, _)| name.clone()).unwrap_or_default();
         let events: Vec<String> = transition.events.iter().map(|(trigger, _)| format!("{trigger:?}")).collect();

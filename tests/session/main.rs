@@ -5,4 +5,6 @@ mod bringup;
 mod flood;
 mod hangs;
 mod life;
+mod settled;
 mod socket;
+mod stands;

@@ -4,7 +4,7 @@
 //!   ports and properties.
 //! * [`steps`]: the steps that are immediate. [`turn`], [`calls`]: those that run a component's own code, on workers under
 //!   a deadline; [`under_way`]: how they are given up; [`workers`]: their threads.
-//! * [`watchers`]: the probes by which monitors look at components. [`prepared`]: fixed lists of immediate steps.
+//! * [`watchers`]: the probes by which monitors and conditions look at components. [`prepared`]: fixed lists of immediate steps.
 //!   [`order`]: the data-flow order.
 //!
 //! What is immediate: everything but operations, the state changes of types that declare a hook for them, and `create` and
@@ -32,14 +32,15 @@ mod watchers;
 mod wiring;
 mod workers;
 
-use super::{Ended, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
+use super::{Ended, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
 use crate::limits;
 use crate::model::{
     Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot,
     Step, Transition, TypeName,
 };
+use crate::monitor::Input;
 use crate::runtime::{Kind, Libraries, Notice, Notices, guard};
-use crate::time::{Clock, Time, lock};
+use crate::time::{Clock, Signal, Time, lock};
 use registry::Registry;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -189,6 +190,10 @@ impl Platform for EmbeddedPlatform {
 
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
         prepared::prepare(&self.inner, steps)
+    }
+
+    fn watch(&self, inputs: &[Input], wake: &Signal) -> Option<Box<dyn Watch>> {
+        Some(Box::new(watchers::Look::new(&self.inner, inputs, wake)))
     }
 
     fn subscribe(&self, sink: EventSink) {

@@ -1,17 +1,25 @@
-//! Probes given to components that want to see others: put in place when what they look at appears, taken away with it.
+//! Probes given to those who want to see components: put in place when what they look at appears, taken away with it. Who
+//! looks is a component (monitors are one), or whoever asked the platform for a [`Watch`].
 
+use super::Inner;
 use super::registry::Registry;
 use crate::model::{ComponentName, Direction, Ident, MemberRef};
-use crate::runtime::beat::Beat;
+use crate::monitor::{Input, Sample};
+use crate::platform::Watch;
+use crate::runtime::beat::{Beat, Notices};
 use crate::runtime::builder::PortEnd;
 use crate::runtime::links::Sender;
-use crate::runtime::probe::{Observed, Probe, ProbesEnd, Tap};
+use crate::runtime::probe::{Observed, Probe, Probes, ProbesEnd, Tap};
+use crate::runtime::sight::Sight;
+use crate::time::{Signal, Time, lock};
 use rustc_hash::FxHashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
-/// A component that looks at others.
+/// Somebody who looks at components.
 pub(super) struct Watcher {
-    name: ComponentName,
+    number: u64,
+    /// The component that looks, if one does.
+    name: Option<ComponentName>,
     wanted: Arc<[Observed]>,
     places: FxHashMap<Observed, usize>,
     sender: Sender<(usize, Probe)>,
@@ -53,9 +61,15 @@ impl Registry {
     /// A component has come that looks at others: shows it what is there.
     pub(super) fn watch(&mut self, slot: u32, probes: ProbesEnd) {
         let name = self.entry(slot).cell.name;
+        self.watch_as(Some(name), probes);
+    }
+
+    /// Somebody looks from now on: shows what is there. Answers the number to end it by.
+    fn watch_as(&mut self, name: Option<ComponentName>, probes: ProbesEnd) -> u64 {
+        let number = self.next_number();
         let ProbesEnd { wanted, sender, wake } = probes;
         let places = wanted.iter().cloned().zip(0..).collect();
-        self.watchers.push(Watcher { name, wanted, places, sender, wake, given: Vec::new() });
+        self.watchers.push(Watcher { number, name, wanted, places, sender, wake, given: Vec::new() });
         let present: Vec<u32> =
             (0..self.slots.len()).filter(|i| self.slots[*i].is_some()).filter_map(|i| u32::try_from(i).ok()).collect();
         let watcher = self.watchers.len() - 1;
@@ -65,6 +79,15 @@ impl Registry {
         let connections: Vec<_> = self.connections.keys().map(|ends| ends.0).collect();
         for (from, to) in connections {
             self.show_connection_to(watcher, from, to);
+        }
+        number
+    }
+
+    /// Who looked looks no more.
+    fn unwatch(&mut self, number: u64) {
+        if let Some(at) = self.watchers.iter().position(|watcher| watcher.number == number) {
+            let mut watcher = self.watchers.swap_remove(at);
+            self.detach(watcher.take(|_, _| true));
         }
     }
 
@@ -121,9 +144,8 @@ impl Registry {
     /// A component is being removed: it looks no more, and is looked at no more.
     pub(super) fn hide(&mut self, slot: u32) {
         let name = self.entry(slot).cell.name;
-        if let Some(at) = self.watchers.iter().position(|watcher| watcher.name == name) {
-            let mut watcher = self.watchers.swap_remove(at);
-            self.detach(watcher.take(|_, _| true));
+        if let Some(number) = self.watchers.iter().find(|w| w.name == Some(name)).map(|w| w.number) {
+            self.unwatch(number);
         }
         self.take_probes(|given, wanted| {
             *wanted == Observed::Component(name) || given.at.is_some_and(|at| at.component == name)
@@ -173,5 +195,44 @@ impl Registry {
         let watcher = &mut self.watchers[watcher];
         watcher.given.push(Given { number, place, at });
         watcher.sender.add(number, (place, probe));
+    }
+}
+
+/// A look from outside, by probes of its own.
+pub(super) struct Look {
+    inner: Weak<Inner>,
+    number: u64,
+    sight: Sight,
+    probes: Probes,
+}
+
+impl Look {
+    /// Begins one; `wake` hears of what is written.
+    pub(super) fn new(inner: &Arc<Inner>, inputs: &[Input], wake: &Signal) -> Self {
+        let sight = Sight::of(inputs);
+        // Nothing is ever raised in this name.
+        let name = ComponentName::new("davit").expect("a plain name");
+        let beat = Arc::new(Beat::new(name, Some(wake.clone()), Arc::new(Notices::default())));
+        let (probes, end) = Probes::new(sight.wanted().clone(), &beat);
+        let number = lock(&inner.registry).watch_as(None, end);
+        Self { inner: Arc::downgrade(inner), number, sight, probes }
+    }
+}
+
+impl Watch for Look {
+    fn shows(&self, _: usize) -> bool {
+        true
+    }
+
+    fn look(&mut self, now: Time, samples: &mut [Sample]) {
+        self.sight.look(&mut self.probes, now, samples);
+    }
+}
+
+impl Drop for Look {
+    fn drop(&mut self) {
+        if let Some(inner) = self.inner.upgrade() {
+            lock(&inner.registry).unwatch(self.number);
+        }
     }
 }

@@ -11,13 +11,14 @@ mod world;
 
 pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, StepPattern, When};
 
-use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared};
+use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
 use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Ident, RunState, Snapshot, Step, Value};
-use crate::time::{Clock, Join, RecvError, Sender, Time, TrySendError};
+use crate::monitor::{Input, Sample, state_value};
+use crate::time::{Clock, Join, RecvError, Sender, Signal, Time, TrySendError};
 use calls::Calls;
 use faults::Chance;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 use world::World;
 
@@ -333,6 +334,11 @@ impl Platform for Simulated {
         steps.iter().all(fixed).then(|| Box::new(Resolved { platform: self.clone(), steps: steps.to_vec() }) as _)
     }
 
+    /// Its components have no code that writes anything: run states can be seen, values cannot.
+    fn watch(&self, inputs: &[Input], _: &Signal) -> Option<Box<dyn Watch>> {
+        Some(Box::new(States { shared: Arc::downgrade(&self.shared), inputs: inputs.to_vec() }))
+    }
+
     fn subscribe(&self, sink: EventSink) {
         self.shared.lock().sink = Some(sink);
     }
@@ -365,6 +371,32 @@ impl Prepared for Resolved {
         match self.steps.get(index) {
             Some(step) => self.platform.execute(step, value, deadline, false),
             None => Outcome::NotDone(Cause::Refused(format!("there is no step {index}"))),
+        }
+    }
+}
+
+/// A look at run states.
+struct States {
+    shared: Weak<Shared>,
+    inputs: Vec<Input>,
+}
+
+impl Watch for States {
+    fn shows(&self, input: usize) -> bool {
+        matches!(self.inputs[input], Input::State(_) | Input::Faulted(_))
+    }
+
+    fn look(&mut self, now: Time, samples: &mut [Sample]) {
+        let Some(shared) = self.shared.upgrade() else { return };
+        let state = shared.lock();
+        for (sample, input) in samples.iter_mut().zip(&self.inputs) {
+            let state = |name: &ComponentName| state.world.components.get(name).map(|it| it.state);
+            let value = match input {
+                Input::State(name) => state(name).map(state_value),
+                Input::Faulted(name) => state(name).map(|state| f64::from(u8::from(state == RunState::Faulted))),
+                Input::Port(_) | Input::Activity { .. } => None,
+            };
+            *sample = Sample { value: value.unwrap_or_default(), at: now, writes: 0, present: value.is_some() };
         }
     }
 }

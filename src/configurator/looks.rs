@@ -1,0 +1,49 @@
+//! Looks at components that are under way, and where the slow one stands (`suspects`, `observing`).
+
+use super::inbox::Ticket;
+use crate::limits;
+use crate::model::ComponentName;
+use crate::time::Time;
+
+/// A look at a component that was reported faulted.
+pub(super) struct SuspectLook {
+    pub ticket: Ticket,
+    pub component: ComponentName,
+    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
+    pub generation: Option<u64>,
+    pub until: Time,
+}
+
+/// A look at some components, as the slow one takes it.
+pub(super) struct Look {
+    pub ticket: Ticket,
+    /// Each with when the model had touched it last: what is done to it meanwhile makes the look stale.
+    pub components: Vec<(ComponentName, Option<u64>)>,
+    pub until: Time,
+}
+
+/// Where it stands.
+#[derive(Default)]
+pub(super) struct Observing {
+    /// When the next round begins; none: nothing is in force.
+    pub next: Option<Time>,
+    /// What is left of this round.
+    pub rest: Vec<ComponentName>,
+    pub out: Option<Look>,
+}
+
+impl Observing {
+    /// When it goes on: in any case, and if time goes on anyway.
+    pub fn until(&self) -> (Time, Time) {
+        match &self.out {
+            Some(look) => (look.until, Time::NEVER),
+            None => (Time::NEVER, self.next.unwrap_or(Time::NEVER)),
+        }
+    }
+
+    /// A round is over, or begins to be waited for.
+    pub fn later(&mut self, now: Time) {
+        self.rest.clear();
+        self.next = Some(now + limits::OBSERVE_EVERY);
+    }
+}

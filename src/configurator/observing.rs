@@ -1,0 +1,193 @@
+//! A slow look at components that nothing is under way with (design §6): are they as the steps have left them? What differs (a
+//! false *done*, a stranger's doing) is a residual like others, and who wrote it last is lost.
+
+use super::engine::Engine;
+use super::inbox::Reply;
+use super::looks::Look;
+use super::pool::Call;
+use super::progress::Progress;
+use super::request::{Reason, Residual};
+use crate::limits;
+use crate::model::{ComponentName, RunState, Snapshot, Step};
+use crate::plan::footprint::Footprint;
+use crate::stack::{Broken, Frame};
+use crate::system::touch::{self, Access, Slot, touches};
+use crate::system::{self, View as _};
+use rustc_hash::FxHashSet;
+use std::sync::Arc;
+
+impl Engine {
+    /// Looks on, when it is time. True: something differs.
+    pub(super) fn observe_slowly(&mut self) -> bool {
+        let now = self.clock.now();
+        if let Some(look) = self.observing.out.take() {
+            match self.take_reply(look.ticket) {
+                Some(Reply::Observed(Ok(seen))) => {
+                    if self.compare(&look, seen) {
+                        return true;
+                    }
+                }
+                Some(_) => {}
+                None if now >= look.until => self.give_up(look.ticket),
+                None => {
+                    self.observing.out = Some(look);
+                    return false;
+                }
+            }
+            if self.observing.rest.is_empty() {
+                self.observing.later(now);
+            }
+        }
+        if self.world.system.is_empty() {
+            self.observing.next = None;
+            self.observing.rest.clear();
+            return false;
+        }
+        match self.observing.next {
+            None => self.observing.later(now),
+            Some(next) if now < next => {}
+            Some(_) if self.pool.has_room_beside(1) => self.look_on(),
+            // Another time: whoever is busy is not to wait for this.
+            Some(_) => self.observing.next = Some(now + limits::OBSERVE_EVERY),
+        }
+        false
+    }
+
+    /// Looks at the next components of a round.
+    fn look_on(&mut self) {
+        let now = self.clock.now();
+        if self.observing.rest.is_empty() {
+            self.observing.rest = self.world.system.graph().node_weights().map(|node| node.name).collect();
+        }
+        let busy = self.not_to_be_judged();
+        let mut components = Vec::new();
+        while components.len() < limits::OBSERVED_AT_ONCE
+            && let Some(name) = self.observing.rest.pop()
+        {
+            let known = self.world.system.component(name).is_some();
+            if known && !busy.contains(&name) {
+                components.push((name, self.generation(name)));
+            }
+        }
+        if components.is_empty() {
+            return self.observing.later(now);
+        }
+        let deadline = now + self.limits.step_timeout;
+        let names = components.iter().map(|(name, _)| *name).collect();
+        let ticket = self.pool.start(Call::ObserveSome(names), deadline);
+        self.observing.out = Some(Look { ticket, components, until: deadline + limits::PLATFORM_GRACE });
+    }
+
+    /// Components that something is under way with, or of which it is known that they are not as they should be.
+    fn not_to_be_judged(&self) -> FxHashSet<ComponentName> {
+        let running = self.running.iter().flat_map(|running| running.machine.components());
+        let broken = self.world.broken.iter().flat_map(|broken| broken.components.iter().copied());
+        running
+            .chain(broken)
+            .chain(self.world.quarantined.iter().copied())
+            .chain(self.suspects.iter().copied())
+            .collect()
+    }
+
+    /// Compares what was seen with the model. True: it differs.
+    fn compare(&mut self, look: &Look, mut seen: Snapshot) -> bool {
+        let mut busy = self.not_to_be_judged();
+        for (name, generation) in &look.components {
+            if self.generation(*name) != *generation {
+                busy.insert(*name);
+            }
+        }
+        // A fault is looked at like one that was reported.
+        for (name, one) in &seen.components {
+            let node = self.world.system.component(*name);
+            if one.state == RunState::Faulted && node.is_some_and(|node| node.state != RunState::Faulted) {
+                self.suspects.push(*name);
+                busy.insert(*name);
+            }
+        }
+        let still = |name: &ComponentName| !busy.contains(name);
+        let names: Vec<ComponentName> = look.components.iter().map(|(name, _)| *name).filter(still).collect();
+        let mut expected = self.world.system.snapshot_some(&names);
+        for snapshot in [&mut seen, &mut expected] {
+            snapshot.components.retain(|name, _| still(name));
+            snapshot.connections.retain(|(from, to), _| still(&from.component) && still(&to.component));
+            snapshot.ports.retain(|port, _| still(&port.component));
+        }
+        if seen == expected {
+            return false;
+        }
+        // Connections to what is not judged stay as the model has them.
+        let model = self.world.system.snapshot_some(&names).connections;
+        seen.connections
+            .extend(model.into_iter().filter(|((from, to), _)| !still(&from.component) || !still(&to.component)));
+        self.differs(&names, &seen)
+    }
+
+    /// What was seen differs: it is broken from now on, and who wrote it last is lost. False: it does not differ in anything
+    /// that a step could bring about.
+    fn differs(&mut self, names: &[ComponentName], seen: &Snapshot) -> bool {
+        let mut actual = self.world.system.clone();
+        if actual.adopt(names, seen).is_err() {
+            return false;
+        }
+        let steps = system::diff(&self.world.system, &actual);
+        if steps.is_empty() {
+            return false;
+        }
+        let mut components: Vec<ComponentName> = steps.iter().flat_map(touch::components).collect();
+        components.sort_unstable();
+        components.dedup();
+        let mut losers: Vec<Arc<Frame>> = Vec::new();
+        for step in &steps {
+            if let Some(frame) = self.wrote(step)
+                && losers.iter().all(|known| known.configuration != frame.configuration)
+            {
+                losers.push(frame);
+            }
+        }
+        let expected = self.world.system.snapshot_some(&components);
+        self.world.system = actual;
+        self.switches.clear();
+        let cause = Reason::SeenOtherwise(steps.clone());
+        let residual = Arc::new(Residual { difference: steps, ..Residual::of(cause.clone()) });
+        let culprit = losers.first().map(|frame| (frame.configuration, frame.requester));
+        self.world.broken.push(Broken {
+            residual: residual.clone(),
+            components: components.into_iter().collect(),
+            culprit,
+            frame: None,
+            // What a stranger did is not taken back unasked.
+            mendable: false,
+            expected,
+        });
+        self.changed();
+        if let Some(progress) = &self.progress {
+            progress(&Progress::Differs(residual));
+        }
+        for frame in losers {
+            self.lose(frame.configuration, cause.clone());
+        }
+        true
+    }
+
+    /// The newest frame that wrote what a step would change.
+    fn wrote(&self, step: &Step) -> Option<Arc<Frame>> {
+        let slots = touches(step, None, &self.world.system);
+        let writes = |footprint: &Footprint| {
+            let mut own = footprint.touches.iter().filter(|touch| touch.access != Access::Need);
+            own.any(|own| {
+                slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| same(own.slot, touch.slot))
+            })
+        };
+        self.world.stack.frames().iter().rev().find(|frame| writes(&frame.footprint)).cloned()
+    }
+}
+
+/// Whether a write of one is a write of the other: the existence of a component is all of it.
+fn same(a: Slot, b: Slot) -> bool {
+    let about = |whole: Slot, other: Slot| match whole {
+        Slot::Component(name) => other.components().0 == name || other.components().1 == name,
+        _ => false,
+    };
+    a == b || about(a, b) || about(b, a)
+}
