@@ -52,7 +52,7 @@ struct State {
     ready: VecDeque<Id>,
     /// Moments waited for; entries of waits that have ended otherwise stay until they come up.
     timers: BinaryHeap<Reverse<(Time, Id, u64)>>,
-    /// Those of them for which alone time does not move on.
+    /// Moments for which alone time does not move on; at most one of each participant, and of few.
     idle: Vec<(Time, Id, u64)>,
     hung: Vec<Wait>,
     shut: bool,
@@ -228,9 +228,8 @@ impl Scheduler {
         let mut state = lock(&self.state);
         let wait = self.begin_wait(&mut state, me, deadline);
         if idle < deadline {
-            let timer = (idle, me, wait.number);
-            state.timers.push(Reverse(timer));
-            state.idle.push(timer);
+            state.idle.retain(|(_, id, _)| *id != me);
+            state.idle.push((idle, me, wait.number));
         }
         register(wait);
         self.block(state, me);
@@ -302,9 +301,9 @@ impl Scheduler {
             self.now.fetch_max(at.0, Ordering::AcqRel);
             while let Some((next, _)) = state.next_timer()
                 && next == at
-                && let Some(Reverse((_, id, number))) = state.timers.pop()
+                && let Some(wait) = state.pop_timer()
             {
-                state.make_ready(Wait { id, number });
+                state.make_ready(wait);
             }
         }
     }
@@ -316,7 +315,8 @@ impl Scheduler {
             && state.running.is_none()
             && !state.participants.is_empty()
         {
-            let limit = state.timers.peek().map_or(Time::NEVER, |Reverse((at, ..))| *at);
+            let idle = state.idle.iter().map(|(at, ..)| *at);
+            let limit = idle.chain(state.timers.peek().map(|Reverse((at, ..))| *at)).min().unwrap_or(Time::NEVER);
             self.now.fetch_max(pace.now().min(limit).0, Ordering::AcqRel);
         }
     }
@@ -357,25 +357,40 @@ impl State {
 
     /// The earliest moment somebody waits for, and who.
     fn next_timer(&mut self) -> Option<(Time, Id)> {
+        let (eager, idle) = (self.next_eager(), self.next_idle());
+        eager.into_iter().chain(idle).min().map(|(at, id, _)| (at, id))
+    }
+
+    /// Takes it.
+    fn pop_timer(&mut self) -> Option<Wait> {
+        let (eager, idle) = (self.next_eager(), self.next_idle());
+        let first = eager.into_iter().chain(idle).min()?;
+        if idle == Some(first) {
+            self.idle.retain(|timer| *timer != first);
+        } else {
+            self.timers.pop();
+        }
+        Some(Wait { id: first.1, number: first.2 })
+    }
+
+    /// Whether nobody waits for a moment for which time moves on.
+    fn is_idle(&mut self) -> bool {
+        self.next_eager().is_none()
+    }
+
+    fn next_eager(&mut self) -> Option<(Time, Id, u64)> {
         while let Some(Reverse((at, id, number))) = self.timers.peek().copied() {
             if self.participants.get(&id).is_some_and(|p| p.wait == Some(number)) {
-                return Some((at, id));
+                return Some((at, id, number));
             }
             self.timers.pop();
         }
         None
     }
 
-    /// Whether nobody waits for a moment for which time moves on. There is a moment that somebody waits for.
-    fn is_idle(&mut self) -> bool {
-        if self.idle.is_empty() {
-            return false;
-        }
-        let Self { participants, idle, timers, .. } = self;
-        let waits = |(_, id, number): &(Time, Id, u64)| participants.get(id).is_some_and(|p| p.wait == Some(*number));
-        idle.retain(waits);
-        // What comes next decides nearly always.
-        timers.peek().is_some_and(|Reverse(next)| idle.contains(next))
-            && timers.iter().all(|Reverse(timer)| !waits(timer) || idle.contains(timer))
+    fn next_idle(&mut self) -> Option<(Time, Id, u64)> {
+        let Self { participants, idle, .. } = self;
+        idle.retain(|(_, id, number)| participants.get(id).is_some_and(|p| p.wait == Some(*number)));
+        idle.iter().min().copied()
     }
 }
