@@ -143,7 +143,7 @@ fn close(lost: Lost) -> (String, String, Duration) {
     session.bring_up().unwrap();
     *platform.lost.lock().unwrap() = Some(lost);
     let asked = clock.now();
-    let request = session.request(Ask::Apply(ConfigId::new("close").unwrap()), "test");
+    let request = session.request(Ask::Apply(ConfigId::new("close").unwrap()), "test", true);
     let answered = loop {
         match session.hub().answer(request) {
             Some(answered) => break answered,

@@ -131,7 +131,7 @@ impl Run {
     }
 
     fn ask(&self, ask: Ask) -> RequestId {
-        self.session.request(ask, "test")
+        self.session.request(ask, "test", true)
     }
 
     /// The answer to a request, which comes within ten seconds.
