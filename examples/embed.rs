@@ -119,6 +119,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let _ = answered.try_send(answer);
         }),
         progress: None,
+        conditions: None,
     });
 
     let apply = |name: &str| -> Result<Ask, Box<dyn Error>> { Ok(Ask::Apply(ConfigId::new(name)?)) };
