@@ -61,6 +61,14 @@ impl Product<'_> {
             .collect();
         // What comes at the instant of something else is armed before that.
         let own_time = |k: usize| k == 0 || times[k] > times[k - 1];
+        for (k, (before, next)) in way.iter().enumerate() {
+            if too_late(before) {
+                all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
+            }
+            if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
+                all[k].does = Does::Cannot("what is there is not known any more");
+            }
+        }
         for k in (0..way.len()).filter(|k| own_time(*k) && !way[*k].0.inbox.is_empty()) {
             all[k].does = Does::Cannot("coordinators hear at different times of one event");
         }
@@ -212,6 +220,15 @@ fn pattern(step: &Step) -> String {
 fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
     let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
     batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
+}
+
+/// Whether an undo came too late to give up what is still under way: it waits for it.
+fn too_late(state: &State) -> bool {
+    let waits = |undo: &Request| {
+        let of = |batch: SmallVec<[Request; 2]>| crate::stack::given_up_of(undo, &batch).is_some();
+        under_way(state).into_iter().any(of)
+    };
+    state.desk.waiting().flat_map(|batch| &batch.requests).any(waits)
 }
 
 /// Whether two lists ask for the same.
