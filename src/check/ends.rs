@@ -170,8 +170,13 @@ impl Product<'_> {
         }
         if let Some(top) = self.worlds.top(state.world) {
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
-            for verdict in [ask.done(), ask.failed(), ask.broken()].into_iter().chain(cancelled) {
-                let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
+            // What is interrupted is not carried out; an undo of what is not there is done without.
+            let done = (interrupted.is_none() || ask.is_undo()).then_some(ask.done());
+            for verdict in [ask.failed(), ask.broken()].into_iter().chain(done).chain(cancelled) {
+                let went = match interrupted.is_some() && verdict == ask.done() {
+                    true => Went::to(state.world),
+                    false => Went::to(self.worlds.answered(top, &requests[0], verdict)),
+                };
                 let given = Given::from_iter([(0, Some(verdict))]);
                 self.ended(state, number, &requests, given, &went, Failed::Nothing, nexts);
             }
