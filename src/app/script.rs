@@ -4,6 +4,7 @@
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
 mod faults;
+mod options;
 mod sandbox;
 mod values;
 
@@ -181,26 +182,19 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         }};
     }
     function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| {
-        let replay = match options {
-            None => false,
-            Some(options) => {
-                option_names(&options, &["replay"])?;
-                options.get::<Option<bool>>("replay")?.unwrap_or(false)
-            }
-        };
-        deploy(h, &file, replay)
+        deploy(h, &file, options::flag(options, "replay")?)
     });
     function!("raise", String, |h, _lua, event| raise(h, &event));
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
-        request(h, Some(&id), Ask::Apply, forced(options)?)
+        request(h, Some(&id), Ask::Apply, options::flag(options, "force")?)
     });
     function!("undo", (Option<String>, Option<Table>), |h, _lua, (id, options)| {
-        request(h, id.as_deref(), Ask::UndoOf, forced(options)?)
+        request(h, id.as_deref(), Ask::UndoOf, options::flag(options, "force")?)
     });
     function!("commit", Option<Table>, |h, _lua, options| {
         let session = session(h)?;
         listen_anew(h, &session);
-        session.request(Ask::Commit { force: forced(options)? }, "operator", false);
+        session.request(Ask::Commit { force: options::flag(options, "force")? }, "operator", false);
         Ok(())
     });
     function!("drift", (), |h, lua, ()| {
@@ -238,7 +232,7 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         h.borrow_mut().faults.add(&step, &how, times, takes)
     });
     function!("shutdown", Option<Table>, |h, _lua, options| {
-        let force = forced(options)?;
+        let force = options::flag(options, "force")?;
         let session = session(h)?;
         let ended = session.take_down(force);
         let mut host = h.borrow_mut();
@@ -265,27 +259,6 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
 
 fn error(message: impl Into<String>) -> mlua::Error {
     mlua::Error::runtime(message.into())
-}
-
-/// `{ force = true }`
-/// Every key of a table of options is one of these.
-fn option_names(options: &Table, known: &[&'static str]) -> mlua::Result<()> {
-    for pair in options.pairs::<mlua::Value, mlua::Value>() {
-        let key = pair?.0.to_string()?;
-        if !known.contains(&key.as_str()) {
-            return Err(error(format!(
-                "there is no option `{key}`: {}",
-                did_you_mean(&key, "options", known.iter().copied())
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn forced(options: Option<Table>) -> mlua::Result<bool> {
-    let Some(options) = options else { return Ok(false) };
-    option_names(&options, &["force"])?;
-    options.get::<Option<bool>>("force").map(|force| force.unwrap_or(false))
 }
 
 fn clock(host: &Shared) -> Clock {

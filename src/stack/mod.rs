@@ -234,7 +234,8 @@ impl Stack {
         let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
         for Edits { pops, push } in edits {
             for (id, hand) in pops {
-                let real = |id: FrameId| numbers.iter().rev().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
+                let real =
+                    |id: FrameId| numbers.iter().rev().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
                 let popped = real(*id);
                 share::hand_over(&mut self.frames, hand, &real);
                 self.frames.retain(|frame| frame.id != popped);

@@ -20,6 +20,7 @@ pub enum Note {
         request: u64,
         by: String,
         answer: String,
+        #[allow(dead_code)] // told when a case disagrees
         steps: String,
     },
     Requested {
