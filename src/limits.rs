@@ -331,6 +331,12 @@ pub const CHECK_DRIVEN: usize = 10_000;
 /// once for what that uncovers.
 pub const FORCE_ROUNDS: usize = 3;
 
+/// Batches that one event leads a coordinator to ask for, and that are followed; one that goes round by itself asks without end.
+pub const CHECK_HANDED: usize = 64;
+
+/// Ways in which what one step asks for may meet what is under way, and that are followed.
+pub const CHECK_FORKS: usize = 64;
+
 /// Between two moves of a way that a script replays: what is to happen at one instant on the way must not happen then by
 /// chance in another order.
 pub const REPLAY_STEP: Duration = Duration::from_millis(20);

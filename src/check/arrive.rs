@@ -22,7 +22,9 @@ impl Product<'_> {
         self.forget(&mut state, by, &reaction.left);
         let mut states = vec![state];
         let requester = self.members[by].by;
-        for handed in &reaction.handed {
+        // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
+        self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
+        for handed in reaction.handed.iter().take(limits::CHECK_HANDED) {
             let batch = match handed {
                 Handed::Batch(asked) => asked.iter().map(|asked| Self::request(requester, asked)).collect(),
                 Handed::Down => {
@@ -30,6 +32,8 @@ impl Product<'_> {
                 }
             };
             states = states.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+            self.forked |= states.len() > limits::CHECK_FORKS;
+            states.truncate(limits::CHECK_FORKS);
         }
         for name in &reaction.emitted {
             for state in &mut states {

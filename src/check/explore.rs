@@ -48,6 +48,8 @@ pub enum Bound {
     Frames,
     /// [`limits::CHECK_INBOX`].
     Inbox,
+    /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
+    Forks,
     /// A coordinator could not be entered.
     Entered,
 }
@@ -115,6 +117,9 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     }
     if graph.product.overflow {
         graph.cut(Bound::Inbox, Failed::Nothing);
+    }
+    if graph.product.forked {
+        graph.cut(Bound::Forks, Failed::Nothing);
     }
     graph
 }

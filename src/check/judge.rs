@@ -380,7 +380,9 @@ impl Graph<'_, '_> {
     /// From everywhere there is a way down. Only what was followed to the end counts: where events were not followed since
     /// too many requests waited, their answers lead on.
     fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
-        let cut = |bound: &Bound| matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Entered);
+        let cut = |bound: &Bound| {
+            matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Forks | Bound::Entered)
+        };
         if self.bounds.keys().any(cut) {
             return;
         }

@@ -39,6 +39,8 @@ pub struct Product<'a> {
     pub others: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
+    /// One step asks for more than is followed, or may meet in more ways what is under way.
+    pub forked: bool,
     /// What was given up was interrupted as well, while others of its batch were carried out with it: which of them stand
     /// then is not followed exactly.
     pub entangled: bool,
@@ -84,6 +86,7 @@ impl<'a> Product<'a> {
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
+            forked: false,
             entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,

@@ -62,7 +62,7 @@ impl Product<'_> {
         // What comes at the instant of something else is armed before that.
         let own_time = |k: usize| k == 0 || times[k] > times[k - 1];
         for (k, (before, next)) in way.iter().enumerate() {
-            if too_late(before) {
+            if too_late(before) || races(before, next) {
                 all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
             }
             if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
@@ -229,6 +229,20 @@ fn too_late(state: &State) -> bool {
         under_way(state).into_iter().any(of)
     };
     state.desk.waiting().flat_map(|batch| &batch.requests).any(waits)
+}
+
+/// Whether what is stopped is through all the same, or what was under way turns out not to have begun.
+fn races(before: &State, next: &Next) -> bool {
+    let stopped = |number: u32| before.stopped.iter().any(|(of, _)| *of == number);
+    let through = |(request, verdict): &(Request, Verdict)| {
+        let of = before.desk.under_way().iter().find(|turn| turn.batch.requests.contains(request));
+        verdict.is_success() && of.is_some_and(|turn| stopped(turn.number))
+    };
+    let back = |requests: &SmallVec<[Request; 2]>| {
+        let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
+        waits && !under_way(&next.state).iter().any(|other| same(other, requests))
+    };
+    next.answers.iter().any(through) || under_way(before).iter().any(back)
 }
 
 /// Whether two lists ask for the same.

@@ -84,6 +84,12 @@ impl Bound {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)
             }
             Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
+            Self::Forks => format!(
+                "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \
+                 followed to its end",
+                limits::CHECK_HANDED,
+                limits::CHECK_FORKS
+            ),
             Self::Entered => "a coordinator could not be entered".to_owned(),
         };
         let behind = match failed {

@@ -115,8 +115,19 @@ impl Transaction {
         // What a component that is made again does is known only then.
         let mut view = Overlay::new(live);
         let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
-        // What may have happened counts as done: its compensation takes it back.
-        for i in self.perhaps_done().into_iter().rev().chain(forward.done.iter().rev().copied()) {
+        // A call that was given up and may have happened counts as done: its compensation takes it back. Of one that nobody
+        // gave up it is not known, and stays so; where it may have moved, nothing goes back past it.
+        let perhaps = self.perhaps_done();
+        if !self.asked_back {
+            let moves =
+                |i: &&u32| !self.may_move(**i) && self.steps_back(**i, part).iter().any(|back| step::moves(back, live));
+            if let Some(i) = perhaps.iter().find(moves) {
+                way.withheld = self.steps_back(*i, part).first().cloned();
+                return way;
+            }
+        }
+        let perhaps = perhaps.into_iter().filter(|_| self.asked_back).rev();
+        for i in perhaps.chain(forward.done.iter().rev().copied()) {
             if held || self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
