@@ -79,8 +79,9 @@ impl Product<'_> {
             if batch.idle && until > times[batch.at] && batch.over.is_some() {
                 all[batch.at].does = Does::Cannot("what has nothing to do is answered at once");
             }
-            // As it is planned when it is answered; at the end of the way it may have become one that is refused.
-            let state = batch.over.map_or(&way[way.len() - 1].1.state, |at| way[at].0);
+            // At the end of the way it may have become one that is refused.
+            let begins = &way[batch.at].1.state;
+            let state = batch.over.map_or(&way[way.len() - 1].1.state, |_| begins);
             let arms = self.arms(state, &batch.requests, answers, until.saturating_sub(times[batch.at]));
             let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);
             all[armed].arms.extend(arms);

@@ -120,7 +120,9 @@ impl Transaction {
             let steps = self.steps_back(*i, part);
             !steps.is_empty() && steps.iter().all(|step| !matches!(step, Step::Operation(_)))
         };
-        let whole = self.mends(part) && remaining.iter().all(plain);
+        // What may have happened is taken back by the frame.
+        let perhaps = self.perhaps_done().iter().any(|i| !self.taken_back.contains(i));
+        let whole = self.mends(part) && !perhaps && remaining.iter().all(plain);
         match (&self.between, whole) {
             (Some(between), true) => wanted = between.as_ref().clone(),
             (None, true) => self.take_back(&remaining, part, &mut wanted),

@@ -203,7 +203,7 @@ impl Case<'_> {
         self.log.push(format!("{} operator {ask}", self.clock.now()));
         let seen = Seen::Operator { ask, force: true };
         self.follower.see(seen).map_err(|why| format!("the operator's {ask}: {why}"))?;
-        self.session.request(ask, "operator", false);
+        self.session.request(ask, "operator", true);
         Ok(())
     }
 
