@@ -121,8 +121,7 @@ impl Transaction {
             !steps.is_empty() && steps.iter().all(|step| !matches!(step, Step::Operation(_)))
         };
         // What may have happened is taken back by the frame.
-        let perhaps = self.perhaps_done().iter().any(|i| !self.taken_back.contains(i));
-        let whole = self.mends(part) && !perhaps && remaining.iter().all(plain);
+        let whole = self.mends(part) && self.perhaps.is_empty() && remaining.iter().all(plain);
         match (&self.between, whole) {
             (Some(between), true) => wanted = between.as_ref().clone(),
             (None, true) => self.take_back(&remaining, part, &mut wanted),
@@ -148,6 +147,7 @@ impl Transaction {
     pub(super) fn compare(&mut self, seen: Option<Snapshot>, live: &mut System, can: &Can<'_>) {
         let part = self.failed_part();
         let own = self.own();
+        self.note_perhaps(live);
         let (wanted, whole) = match self.target.take() {
             Some(target) => *target,
             None => self.wanted(part, live),
@@ -167,6 +167,16 @@ impl Transaction {
             }
         }
         self.judge(part, &wanted, whole, observed, live, can);
+    }
+
+    /// Notes what may have happened and can still be taken back: not what was called of a component that is gone.
+    fn note_perhaps(&mut self, live: &System) {
+        let part = self.failed_part();
+        let open = |i: &u32| {
+            let back = self.steps_back(*i, part);
+            !self.taken_back.contains(i) && back.iter().all(|back| step::precondition(back, live).is_empty())
+        };
+        self.perhaps = self.perhaps_done().into_iter().filter(open).collect();
     }
 
     /// Everything is being taken down: nobody is asked, and the model is what is known.
@@ -284,8 +294,12 @@ impl Transaction {
             let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));
             open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
         } else {
-            let perhaps = self.perhaps_done().into_iter().filter(|i| !self.taken_back.contains(i));
-            let left = self.remaining(part).into_iter().chain(perhaps).filter(|i| self.part_of(*i) == part).rev();
+            let left = self
+                .remaining(part)
+                .into_iter()
+                .chain(self.perhaps.iter().copied())
+                .filter(|i| self.part_of(*i) == part)
+                .rev();
             left.flat_map(|i| {
                 let of = &forward.list[i as usize];
                 self.steps_back(i, part).iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()

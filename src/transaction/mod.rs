@@ -76,6 +76,8 @@ pub struct Transaction {
     /// held part has added to it.
     between: Option<Box<System>>,
     withheld: Option<Step>,
+    /// Calls of which nobody knows, and that the frame takes back.
+    perhaps: Vec<u32>,
     /// Steps of unknown outcome, of ways back too.
     unsettled: Vec<Step>,
     faulted: Vec<(ComponentName, crate::model::RunState)>,
@@ -118,6 +120,7 @@ impl Transaction {
             finished: FxHashSet::default(),
             between: None,
             withheld: None,
+            perhaps: Vec::new(),
             unsettled: Vec::new(),
             faulted: Vec::new(),
             doubted: false,
