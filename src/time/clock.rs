@@ -32,6 +32,7 @@ use std::time::{Duration, Instant};
 #[derive(Clone)]
 pub struct Clock(pub(super) Arc<Kind>);
 
+#[allow(clippy::large_enum_variant)] // one of them in a process, behind an `Arc`
 pub(super) enum Kind {
     Real(Real),
     Simulated(Scheduler),

@@ -10,7 +10,7 @@ pub(super) fn flag(options: Option<Table>, name: &'static str) -> mlua::Result<b
     for pair in options.pairs::<mlua::Value, mlua::Value>() {
         let key = pair?.0.to_string()?;
         if key != name {
-            let help = did_you_mean(&key, "options", [name].into_iter());
+            let help = did_you_mean(&key, "options", [name]);
             return Err(error(format!("there is no option `{key}`: {help}")));
         }
     }
