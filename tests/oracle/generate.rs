@@ -213,7 +213,10 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, tex
             };
             if confirms && made.on_failure != OnFailure::Hold && chance.percent(25) {
                 made.confirm = Some(Confirm {
-                    event: event(chance.of(&[CONFIRMS, "x0"])),
+                    event: event({
+                        let name: &str = [CONFIRMS, "x0"][usize::from(*chance.of(&[false, true]))];
+                        name
+                    }),
                     within: Duration::from_millis(1 + chance.below(6) as u64),
                 });
             }
