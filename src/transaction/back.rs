@@ -3,8 +3,9 @@
 
 use super::Transaction;
 use super::run::Run;
-use crate::model::{ComponentName, OnFailure, Origin, RunState, Step};
+use crate::model::{Cause, ComponentName, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
+use crate::stack::Reason;
 use crate::system::touch::{Slot, components};
 use crate::system::{Overlay, Reversibility, System, Undo, View as _, diff, step};
 use rustc_hash::FxHashSet;
@@ -217,6 +218,28 @@ impl Transaction {
         let from = self.planned.parts[part].range.start as usize;
         let first = whole[from..].iter().find(|planned| crate::system::touch::absolute(&planned.step) == Some(slot));
         &first.unwrap_or(&whole[place as usize]).undo
+    }
+
+    /// Books what a way back has done. Answers whether something of it is left to be tried again.
+    pub(super) fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
+        for i in &run.done {
+            if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
+                *self.partly.entry(*taken).or_default() += 1;
+                if self.steps_back(*taken, self.failed_part()).is_empty() {
+                    self.taken_back.insert(*taken);
+                }
+            }
+            if let Some(Some(place)) = way.finishes.get(*i as usize) {
+                self.finished.insert(*place);
+            }
+        }
+        self.unsettled.extend(run.unsettled.iter().map(|i| run.list[*i as usize].step.clone()));
+        self.faulted.extend(run.faulted.iter().copied());
+        self.doubted |= !run.failures.is_empty();
+        let hopeless = |reason: &Reason| {
+            matches!(reason, Reason::Step { cause: Cause::Timeout | Cause::Quarantined | Cause::Panicked(_), .. })
+        };
+        !whole(run) && run.unsettled.is_empty() && !run.failures.iter().any(|(_, reason)| hopeless(reason))
     }
 
     /// The system that the parts before `part` lead to, as the model knows it before anything is taken back; with what was

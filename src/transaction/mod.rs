@@ -446,28 +446,6 @@ impl Transaction {
         self.phase = Phase::Back;
     }
 
-    /// Books what a way back has done. Answers whether something of it is left to be tried again.
-    fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
-        for i in &run.done {
-            if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
-                *self.partly.entry(*taken).or_default() += 1;
-                if self.steps_back(*taken, self.failed_part()).is_empty() {
-                    self.taken_back.insert(*taken);
-                }
-            }
-            if let Some(Some(place)) = way.finishes.get(*i as usize) {
-                self.finished.insert(*place);
-            }
-        }
-        self.unsettled.extend(run.unsettled.iter().map(|i| run.list[*i as usize].step.clone()));
-        self.faulted.extend(run.faulted.iter().copied());
-        self.doubted |= !run.failures.is_empty();
-        let hopeless = |reason: &Reason| {
-            matches!(reason, Reason::Step { cause: Cause::Timeout | Cause::Quarantined | Cause::Panicked(_), .. })
-        };
-        !back::whole(run) && run.unsettled.is_empty() && !run.failures.iter().any(|(_, reason)| hopeless(reason))
-    }
-
     /// The part from which on everything is taken back.
     fn failed_part(&self) -> usize {
         if self.interrupted || self.taken_down {
