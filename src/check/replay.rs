@@ -243,7 +243,15 @@ fn races(before: &State, next: &Next) -> bool {
         let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
         waits && !under_way(&next.state).iter().any(|other| same(other, requests))
     };
-    next.answers.iter().any(through) || under_way(before).iter().any(back)
+    // Or only some of it had begun: what is left of it begins anew.
+    let shrinks = |requests: &SmallVec<[Request; 2]>| {
+        let within = |other: &SmallVec<[Request; 2]>| {
+            let known = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
+            other.len() < requests.len() && other.iter().all(known)
+        };
+        next.answers.is_empty() && under_way(&next.state).iter().any(within)
+    };
+    next.answers.iter().any(through) || under_way(before).iter().any(|requests| back(requests) || shrinks(requests))
 }
 
 /// Whether two lists ask for the same.

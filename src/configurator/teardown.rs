@@ -220,7 +220,10 @@ impl Engine {
                 let _ = self.adopt(&seen);
                 down.left = seen;
             }
-            None => down.left = self.world.system.snapshot(),
+            None => {
+                down.observed = false;
+                down.left = self.world.system.snapshot();
+            }
         }
         self.note_quarantine();
         down.quarantined.clone_from(&self.world.quarantined);
