@@ -194,7 +194,7 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("commit", Option<Table>, |h, _lua, options| {
         let session = session(h)?;
         listen_anew(h, &session);
-        session.request(Ask::Commit { force: options::flag(options, "force")? }, "operator", false);
+        session.request_on(LINE, Ask::Commit { force: options::flag(options, "force")? }, "operator", false);
         Ok(())
     });
     function!("drift", (), |h, lua, ()| {
@@ -331,6 +331,9 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     }
 }
 
+/// The connection that a script is: what it asks for begins one after the other.
+const LINE: u32 = 1;
+
 fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
     let session = session(host)?;
     let known = session.events();
@@ -365,7 +368,7 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: boo
         }
     };
     listen_anew(host, &session);
-    session.request(ask, "operator", force);
+    session.request_on(LINE, ask, "operator", force);
     Ok(())
 }
 

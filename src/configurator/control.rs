@@ -54,6 +54,8 @@ pub struct View {
     pub broken: Option<Arc<Residual>>,
     /// All that is broken.
     pub residuals: Vec<Arc<Residual>>,
+    /// What the partial frames hold beside that.
+    pub partial: Vec<Residual>,
     /// Components whose call has not returned.
     pub quarantined: Vec<ComponentName>,
 }
@@ -93,6 +95,10 @@ pub struct Drift {
     pub steps: Vec<Step>,
     /// Components that are faulted and should not be.
     pub faulted: Vec<ComponentName>,
+    /// Steps of which nobody knows whether they happened: looking does not tell.
+    pub unsettled: Vec<Step>,
+    /// Components whose call has not returned.
+    pub quarantined: Vec<ComponentName>,
     /// Whether the platform answered.
     pub observed: bool,
 }

@@ -424,6 +424,7 @@ impl Engine {
             waiting: self.desk.len(),
             broken: self.broken_longest(),
             residuals: self.world.broken.iter().map(|broken| broken.residual.clone()).collect(),
+            partial: self.left_partial(),
             quarantined: self.world.quarantined.clone(),
         })
     }
@@ -434,6 +435,13 @@ impl Engine {
         self.partials.retain(|(frame, _)| stack.frame(*frame).is_some_and(|frame| frame.partial));
         let broken = self.world.broken.first().map(|broken| &broken.residual);
         broken.or(self.partials.first().map(|(_, residual)| residual)).cloned()
+    }
+
+    /// What partial frames hold that nothing else tells of.
+    fn left_partial(&self) -> Vec<super::request::Residual> {
+        let told = |frame: &FrameId| self.world.broken.iter().any(|broken| broken.frame == Some(*frame));
+        let left = self.partials.iter().filter(|(frame, _)| !told(frame));
+        left.map(|(_, residual)| residual.of_partial(&self.world.system)).collect()
     }
 
     /// Everything that still waits is answered.

@@ -88,7 +88,9 @@ impl Engine {
         let mut steps = system::diff(&wanted, &actual);
         steps.retain(|step| system::touch::components(step).iter().all(|component| !under_way.contains(component)));
         faulted.retain(|component| !under_way.contains(component));
-        Drift { steps, faulted, observed: true }
+        let residuals = self.world.broken.iter().map(|broken| &broken.residual);
+        let unsettled = residuals.flat_map(|residual| residual.unsettled.iter().cloned()).collect();
+        Drift { steps, faulted, unsettled, quarantined: self.world.quarantined.clone(), observed: true }
     }
 
     /// Recovers what is broken; the error is what remains.

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::log::Happening;
-use crate::configurator::{Drift, Recovery, Residual};
+use crate::configurator::{Drift, Recovery, Residual, View};
 use crate::model::{ComponentName, Step};
 use serde::Serialize;
 use std::fmt;
@@ -57,10 +57,30 @@ impl Difference {
         Self { how, what: What::Component { target }, text: format!("{target} is {word}") }
     }
 
-    /// What the platform shows that should not be so.
+    /// What the platform shows that should not be so, and what it cannot show.
     fn of_drift(drift: &Drift) -> Vec<Self> {
         let steps = drift.steps.iter().map(|step| Self::step(How::Differs, step));
-        steps.chain(drift.faulted.iter().map(|name| Self::component(How::Faulted, *name))).collect()
+        let unknown = drift.unsettled.iter().map(|step| Self::step(How::Unknown, step));
+        let faulted = drift.faulted.iter().map(|name| Self::component(How::Faulted, *name));
+        let quarantined = drift.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
+        steps.chain(unknown).chain(faulted).chain(quarantined).collect()
+    }
+
+    /// Everything that is not as it should be, each once: all that is broken, what partial frames hold, and components that
+    /// still have not come back from a call.
+    pub(super) fn of_view(view: &View) -> Vec<Self> {
+        let residuals = view.residuals.iter().map(|residual| &**residual).chain(&view.partial);
+        let mut all: Vec<Self> = Vec::new();
+        let quarantined = view.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
+        for one in residuals.flat_map(Self::of_residual).chain(quarantined) {
+            // A call that was out then may have come back since.
+            let back = |name: &ComponentName| one.how == How::Quarantined && !view.quarantined.contains(name);
+            let over = matches!(&one.what, What::Component { target } if back(target));
+            if !over && !all.contains(&one) {
+                all.push(one);
+            }
+        }
+        all
     }
 
     /// What is left of an application that is neither done nor undone.
@@ -142,5 +162,38 @@ impl Session {
             why: residual.as_ref().map(|residual| residual.cause.to_string()),
             residual: residual.map(|residual| Difference::of_residual(&residual)).unwrap_or_default(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configurator::Reason;
+    use crate::model::{MemberRef, Value};
+    use std::sync::Arc;
+
+    #[test]
+    fn each_is_told_once_and_what_is_over_not_at_all() {
+        let name = |text: &str| ComponentName::new(text).unwrap();
+        let set = |value| Step::PropertySet { property: MemberRef::new("a.k").unwrap(), value: Value::Float(value) };
+        let residual = |quarantined: &[&str]| Residual {
+            unsettled: vec![set(1.0)],
+            quarantined: quarantined.iter().map(|text| name(text)).collect(),
+            ..Residual::of(Reason::Busy)
+        };
+        let view = View {
+            revision: 0,
+            system: None,
+            stack: Vec::new(),
+            busy: None,
+            waiting: 0,
+            broken: None,
+            residuals: vec![Arc::new(residual(&["a"])), Arc::new(residual(&["b"]))],
+            partial: vec![Residual { left: vec![set(2.0)], ..Residual::of(Reason::Busy) }],
+            quarantined: vec![name("b"), name("c")],
+        };
+        let told: Vec<String> = Difference::of_view(&view).iter().map(ToString::to_string).collect();
+        let unknown = "property_set a.k = 1.0 (nobody knows whether it happened)";
+        assert_eq!(told, [unknown, "b is in quarantine", "property_set a.k = 2.0", "c is in quarantine"]);
     }
 }

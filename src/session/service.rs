@@ -45,7 +45,7 @@ fn view(value: &impl serde::Serialize) -> Json {
 }
 
 impl Service for SessionService {
-    fn call(&self, method: &str, params: &Json) -> Result<Json, RpcError> {
+    fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError> {
         let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
         match method {
             "status" => Ok(view(&session.status())),
@@ -54,7 +54,7 @@ impl Service for SessionService {
             "event" => event(&session, params),
             "apply" => {
                 let name: String = param(params, "configuration")?;
-                request(&session, Ask::Apply(configuration(&session, &name)?), params)
+                request(&session, line, Ask::Apply(configuration(&session, &name)?), params)
             }
             "undo" => {
                 let ask = match (optional::<String>(params, "configuration")?, optional::<usize>(params, "to")?) {
@@ -65,13 +65,13 @@ impl Service for SessionService {
                     (None, Some(to)) => Ask::UndoTo(to),
                     (None, None) => Ask::Undo,
                 };
-                request(&session, ask, params)
+                request(&session, line, ask, params)
             }
             "drift" => drift(&session, params),
             "recover" => recover(&session, params),
             "commit" => {
                 let force = forced(params)?;
-                request(&session, Ask::Commit { force }, params)
+                request(&session, line, Ask::Commit { force }, params)
             }
             "shutdown" => {
                 let force = forced(params)?;
@@ -169,10 +169,10 @@ fn forced(params: &Json) -> Result<bool, RpcError> {
     Ok(optional(params, "force")?.unwrap_or(false))
 }
 
-fn request(session: &Session, ask: Ask, params: &Json) -> Result<Json, RpcError> {
+fn request(session: &Session, line: u32, ask: Ask, params: &Json) -> Result<Json, RpcError> {
     let wait: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params)?;
-    let request = session.request(ask, "operator", forced(params)?);
+    let request = session.request_on(line, ask, "operator", forced(params)?);
     if !wait {
         return Ok(json!({ "request": request }));
     }

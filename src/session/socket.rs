@@ -21,11 +21,11 @@ use std::thread::JoinHandle;
 
 /// What answers the calls.
 pub trait Service: Send + Sync + 'static {
-    /// Answers one call; may wait for as long as it promises to.
+    /// Answers one call of the connection with this number (never 0 or 1); may wait for as long as it promises to.
     ///
     /// # Errors
     /// The error answer to send.
-    fn call(&self, method: &str, params: &Json) -> Result<Json, RpcError>;
+    fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError>;
 }
 
 /// Sends a notification (method, parameters) to all subscribers; never waits.
@@ -176,7 +176,8 @@ fn accept(
     service: &Arc<dyn Service>,
 ) {
     let open = Arc::new(AtomicUsize::new(0));
-    for stream in listener.incoming() {
+    // Scripts have the number 1.
+    for (number, stream) in (2..).zip(listener.incoming()) {
         if stop.load(Ordering::Acquire) {
             return;
         }
@@ -190,7 +191,7 @@ fn accept(
         let (subscribers, service, counter) = (subscribers.clone(), service.clone(), open.clone());
         let calls = calls.clone();
         let serving = std::thread::Builder::new().name("davit-client".to_owned()).spawn(move || {
-            let _ = serve(stream, &subscribers, &calls, &*service);
+            let _ = serve(number, stream, &subscribers, &calls, &*service);
             counter.fetch_sub(1, Ordering::AcqRel);
         });
         if serving.is_err() {
@@ -200,7 +201,7 @@ fn accept(
 }
 
 /// Answers the calls of one connection until it closes.
-fn serve(stream: UnixStream, subscribers: &Subscribers, calls: &Calls, service: &dyn Service) -> io::Result<()> {
+fn serve(number: u32, stream: UnixStream, subscribers: &Subscribers, calls: &Calls, service: &dyn Service) -> io::Result<()> {
     let writer = Arc::new(Mutex::new(stream.try_clone()?));
     // A client that does not read must not hold a thread for ever.
     stream.set_write_timeout(Some(limits::SOCKET_WRITE))?;
@@ -232,7 +233,7 @@ fn serve(stream: UnixStream, subscribers: &Subscribers, calls: &Calls, service: 
                 }
             }
             Ok(call) => calls.run(|| {
-                let result = service.call(&call.method, &call.params);
+                let result = service.call(number, &call.method, &call.params);
                 call.id.as_ref().map_or(Ok(()), |id| send(&writer, &rpc::answer(id, result)))
             })?,
             Err(error) => send(&writer, &rpc::answer(&Json::Null, Err(error)))?,

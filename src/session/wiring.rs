@@ -164,8 +164,13 @@ impl Session {
     /// Makes a request in the name of an operator. `force`: also one that undoes a coordinator's frame, or moves while a safe
     /// configuration is in force.
     pub fn request(&self, ask: Ask, by: &str, force: bool) -> RequestId {
+        self.request_on(0, ask, by, force)
+    }
+
+    /// The same through a connection: requests of one connection (other than 0) begin one after the other.
+    pub fn request_on(&self, line: u32, ask: Ask, by: &str, force: bool) -> RequestId {
         let id = self.hub.request(ask, by);
-        let request = Request { force, ..Request::new(id, ask, Requester::Operator) };
+        let request = Request { force, line, ..Request::new(id, ask, Requester::Operator) };
         // A full queue has answered it already.
         let _ = self.configurator.submit(Batch::one(request));
         id
@@ -217,7 +222,7 @@ impl Session {
         let view = self.view(true);
         let stack = view.iter().flat_map(|v| &v.stack).map(FrameView::of).collect();
         let broken = view.as_ref().and_then(|v| v.broken.as_deref());
-        let residual = broken.map(Difference::of_residual).unwrap_or_default();
+        let residual = view.as_deref().map(Difference::of_view).unwrap_or_default();
         let phase = match self.hub.phase() {
             Phase::Up | Phase::Deploying if broken.is_some() => Phase::Broken,
             phase => phase,

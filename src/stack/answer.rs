@@ -3,6 +3,7 @@
 use super::request::Request;
 use crate::model::codes;
 use crate::model::{Cause, ComponentName, ConfigId, EventName, Finding, Findings, Step, Verdict};
+use crate::system::{System, step};
 use crate::time::Time;
 use std::fmt;
 use std::sync::Arc;
@@ -142,6 +143,20 @@ impl Residual {
     /// Whether everything is known and as the model has it: then nothing is left but a partial frame, if that.
     pub fn is_settled(&self) -> bool {
         self.observed && self.difference.is_empty() && self.unsettled.is_empty() && self.faulted.is_empty()
+    }
+
+    /// What of it is left for as long as nothing but its partial frame is: what has been settled, mended or brought back
+    /// since is not, nor what something else has overwritten.
+    pub fn of_partial(&self, system: &System) -> Self {
+        let overwritten = |step: &Step| {
+            step::absolute(step).is_some() && step::inverse(step, None, system).steps() != std::slice::from_ref(step)
+        };
+        Self {
+            left: self.left.iter().filter(|step| !overwritten(step)).cloned().collect(),
+            withheld: self.withheld.clone(),
+            irreversible: self.irreversible.clone(),
+            ..Self::of(self.cause.clone())
+        }
     }
 
     /// Whether nothing at all is left.

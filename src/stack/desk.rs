@@ -1,7 +1,7 @@
 //! Who waits for whom: batches that have come, in the order in which they begin (design §6, "Claims").
 //!
 //! A batch begins when no earlier one, under way or waiting, claims anything of what it claims, and when the one before of
-//! the same coordinator is over. Then it has all of that until its last request is answered. So no circle of waits can
+//! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no circle of waits can
 //! arise, and none starves.
 
 use super::claims::Claims;
@@ -149,17 +149,15 @@ impl Desk {
     }
 
     fn free(&self, claims: &Claims) -> Option<usize> {
-        let coordinator =
-            |batch: &Batch| batch.requests.first().map(|r| r.requester).filter(|r| *r != Requester::Operator);
         let mut held = claims.of(self.under_way.iter().flat_map(|turn| &turn.batch.requests));
-        let mut asking: Vec<Requester> = self.under_way.iter().filter_map(|turn| coordinator(&turn.batch)).collect();
+        let mut asking: Vec<Line> = self.under_way.iter().filter_map(|turn| line(&turn.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
             let claim = claims.of(&batch.requests);
-            if !claim.meets(&held) && coordinator(batch).is_none_or(|by| !asking.contains(&by)) {
+            if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) {
                 return Some(at);
             }
             held.join(&claim);
-            asking.extend(coordinator(batch));
+            asking.extend(line(batch));
         }
         None
     }
@@ -200,6 +198,14 @@ impl Desk {
     pub fn over(&mut self, number: u32) {
         self.under_way.retain(|turn| turn.number != number);
     }
+}
+
+/// Whose requests begin one after the other: a coordinator's, and those of one connection of an operator.
+type Line = (Requester, u32);
+
+fn line(batch: &Batch) -> Option<Line> {
+    let first = batch.requests.first().map(|request| (request.requester, request.line));
+    first.filter(|line| *line != (Requester::Operator, 0))
 }
 
 /// The request of a batch under way that `undo` gives up: the newest that it may take back.

@@ -63,6 +63,8 @@ pub struct Request {
     pub force: bool,
     /// Raised in the same step as a `safe` configuration: nothing of it may move.
     pub still: bool,
+    /// The connection through which an operator asks: its requests begin one after the other. 0: one that waits for no other.
+    pub line: u32,
     /// Why it is there.
     pub why: Why,
     /// Comes back with the answer; means nothing to the configurator.
@@ -72,7 +74,7 @@ pub struct Request {
 impl Request {
     /// What `requester` asks.
     pub fn new(id: RequestId, ask: Ask, requester: Requester) -> Self {
-        Self { id, ask, requester, scope: None, force: false, still: false, why: Why::Asked, tag: (0, 0) }
+        Self { id, ask, requester, scope: None, force: false, still: false, line: 0, why: Why::Asked, tag: (0, 0) }
     }
 }
 

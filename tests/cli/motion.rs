@@ -21,7 +21,9 @@ shutdown: { event: e_stop, down: idle, within_s: 5 }
 ";
 
 const CONFIGURATIONS: &str = r#"ConfiguratorConf {
-  base  = Configuration { create("a", "T"), post_conf_state = { "a:running" } },
+  base  = Configuration { create("a", "T"), create("b", "T"), post_conf_state = { "a:running" } },
+  first = Configuration { property_set("a.k", 1) },
+  other = Configuration { property_set("b.k", 1) },
   lift  = Configuration { operation_call("a.up") },
   open  = Configuration { operation_call("a.open") },
   tried = Configuration { confirm = { event = "e_conf", within = 1.0 }, operation_call("a.up") },
@@ -94,4 +96,24 @@ fn force_tries_again_what_failed_once() {
 fn recover_leaves_alone_what_is_whole() {
     run("apply('lift') wait_answer('lift.ok', 1) recover('accept') assert(#stack() == 2)
         undo('lift') wait_answer('lift.undone', 1) recover('back') assert(#stack() == 1)");
+}
+
+/// Requests of one connection begin one after the other, also where they have nothing to do with each other; a script is one.
+#[test]
+fn what_one_asks_for_begins_one_after_the_other() {
+    let log = run("fault('property_set a.k = 1', 'slow', 1, 0.5) apply('first') apply('other')
+        wait_answer('other.ok', 5) assert(property('a.k') == 1)");
+    let at = |answer: &str| log.find(answer).unwrap_or_else(|| panic!("no `{answer}`: {log}"));
+    assert!(at("first.ok") < at("other.ok"), "{log}");
+}
+
+/// What looking does not tell, and who has not come back, are told all the same, until that is over.
+#[test]
+fn drift_tells_of_what_is_unknown_and_of_who_has_not_come_back() {
+    let told = |what: &str| format!("local f for _, d in ipairs(drift()) do if d.text:find('{what}', 1, true) then f = d end end");
+    let (unknown, quarantined) = (told("nobody knows"), told("a is in quarantine"));
+    run(&format!("fault('operation_call a.open', 'late') apply('open') wait_answer('open.broken', 5)
+        do {unknown} assert(f and f.how == 'unknown') end
+        do {quarantined} assert(f and f.how == 'quarantined') end
+        wait(10) assert(#drift() == 0)"));
 }

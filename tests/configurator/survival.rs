@@ -112,6 +112,28 @@ fn a_failure_after_an_irreversible_step_is_broken() {
     assert_eq!(rig.ask("undo"), ["undo.failed"], "a floor");
 }
 
+/// What is left of it is told for as long as it is so.
+#[test]
+fn what_something_else_has_overwritten_is_not_left_any_more() {
+    let mut hold = configuration("hold", "B:stopped", "set B.k 9; set B.s 3", "B:running");
+    hold.on_failure = OnFailure::Hold;
+    let calm = Configuration { safe: true, ..configuration("calm", "", "set B.k 0", "") };
+    let rig = up_with(vec![hold, calm]);
+    let left = || -> Vec<String> {
+        let view = rig.view();
+        let mut left: Vec<String> = view.partial.iter().flat_map(|part| &part.left).map(ToString::to_string).collect();
+        left.sort();
+        left
+    };
+    rig.inject("start B", Fault::Fail);
+    assert_eq!(rig.ask("hold"), ["hold.broken"]);
+    assert_eq!(left(), ["property_set B.k = 9.0", "property_set B.s = 3.0", "stop B"]);
+    assert_eq!(rig.ask("calm"), ["calm.ok"]);
+    assert_eq!(left(), ["property_set B.s = 3.0", "stop B"]);
+    assert_eq!(rig.ask("hold.undo"), ["hold.undone"]);
+    assert!(left().is_empty());
+}
+
 #[test]
 fn hold_undoes_nothing() {
     let mut hold = configuration("hold", "B:stopped", "set B.k 9; set B.s 3", "B:running");

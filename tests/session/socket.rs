@@ -15,7 +15,7 @@ const LIMIT: Duration = Duration::from_secs(10);
 struct Echo;
 
 impl Service for Echo {
-    fn call(&self, method: &str, params: &Json) -> Result<Json, RpcError> {
+    fn call(&self, _: u32, method: &str, params: &Json) -> Result<Json, RpcError> {
         match method {
             "echo" => Ok(params.clone()),
             "need" => rpc::param::<String>(params, "text").map(Json::String),

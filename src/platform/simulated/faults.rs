@@ -5,14 +5,15 @@ use std::fmt;
 use std::time::Duration;
 
 /// Steps, by how they are printed: `start`, `start Dynamics`, `property_set A.k`, `property_set A.k = 2.0`,
-/// `operation_call youbot.park`. A pattern names every step whose text begins with it at a word's end.
+/// `operation_call youbot.park`. A pattern names every step whose text begins with it at a word's end; `2` and `2.0` are one
+/// number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StepPattern(String);
 
 impl StepPattern {
     /// The pattern with that text; an empty one names every step.
     pub fn new(text: &str) -> Self {
-        Self(text.trim().to_owned())
+        Self(plain(text.trim()))
     }
 
     /// Whether it names `step`.
@@ -25,10 +26,32 @@ impl StepPattern {
         if verb != step.verb() {
             return false;
         }
-        let text = step.to_string();
+        let text = plain(&step.to_string());
         text.strip_prefix(self.0.as_str())
             .is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/')))
     }
+}
+
+/// The text with its numbers written one way, as floats are.
+fn plain(text: &str) -> String {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/');
+    let mut plain = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let within = plain.chars().next_back().is_some_and(is_name);
+        let number = rest.find(|c: char| !(is_name(c) || matches!(c, '-' | '+'))).map_or(rest, |end| &rest[..end]);
+        match number.parse::<f64>() {
+            Ok(value) if !within && value.is_finite() => {
+                plain.push_str(&format!("{value:?}"));
+                rest = &rest[number.len()..];
+            }
+            _ => {
+                plain.push(first);
+                rest = &rest[first.len_utf8()..];
+            }
+        }
+    }
+    plain
 }
 
 impl fmt::Display for StepPattern {
@@ -199,7 +222,10 @@ mod tests {
             ("property_set A.k", &set, true),
             ("property_set A", &set, false),
             ("property_set A.k = 2.0", &set, true),
-            ("property_set A.k = 2", &set, false),
+            ("property_set A.k = 2", &set, true),
+            ("property_set A.k = 2.01", &set, false),
+            ("property_set A.k = -2", &set, false),
+            ("property_set A.k = 20", &set, false),
             ("start", &set, false),
         ] {
             assert_eq!(StepPattern::new(pattern).matches(step), fits, "{pattern} / {step}");
