@@ -10,6 +10,7 @@ use crate::app::PLATFORMS;
 use crate::app::script::{self, Options, ScriptFailure};
 use crate::model::Ident;
 use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX, TEXT_NO_FILE};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
@@ -43,8 +44,11 @@ impl Run for Args {
         let clock = self.clock.make(0.0);
         let say = {
             let progress = progress.clone();
-            let out = context.out;
-            Box::new(move |text: &str| progress.line(out.paint(Style::Bold, text)))
+            let (out, clock, json) = (context.out, clock.clone(), self.json);
+            Box::new(move |text: &str| match json {
+                true => out.json_line(&json!({ "at": clock.now().as_secs_f64(), "what": "said", "text": text })),
+                false => progress.line(out.paint(Style::Bold, text)),
+            })
         };
         let end = script::run(
             &self.script,

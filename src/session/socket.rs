@@ -201,7 +201,13 @@ fn accept(
 }
 
 /// Answers the calls of one connection until it closes.
-fn serve(number: u32, stream: UnixStream, subscribers: &Subscribers, calls: &Calls, service: &dyn Service) -> io::Result<()> {
+fn serve(
+    number: u32,
+    stream: UnixStream,
+    subscribers: &Subscribers,
+    calls: &Calls,
+    service: &dyn Service,
+) -> io::Result<()> {
     let writer = Arc::new(Mutex::new(stream.try_clone()?));
     // A client that does not read must not hold a thread for ever.
     stream.set_write_timeout(Some(limits::SOCKET_WRITE))?;

@@ -219,3 +219,29 @@ fn a_state_is_judged_by_its_best_way() {
     let answers = Said::answers(wrong[0]);
     assert_eq!(answers, ["base.ok"], "{:#}", said.0);
 }
+
+/// A coordinator that goes round by itself asks without end: what is followed of it has a bound, and that is told.
+#[test]
+fn what_asks_without_end_is_followed_up_to_a_bound() {
+    let configurations = format!(
+        "{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }}, two = Configuration {{ property_set(\"a.mode\", 1) }},"
+    );
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {},
+        ping = state { entry = { \"one\", \"two.undo\" } }, pong = state { entry = { \"two\", \"one.undo\" } },
+        leaving = state { entry = \"base.undo\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"ping\", events = { \"e_go\" } },
+        trans { src = \"ping\", tgt = \"pong\", events = { \"e_done\" } },
+        trans { src = \"pong\", tgt = \"ping\", events = { \"e_done\" } },
+        trans { src = \"ping\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"pong\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },";
+    let said = Small::new(&configurations, states, "").check().0;
+    let left = said["left"].as_array().unwrap();
+    assert!(left.iter().any(|left| left.as_str().unwrap().contains("more than 64 things")), "{said:#}");
+    assert_eq!(said["explored"]["complete"], false);
+    assert!(said["explored"]["states"].as_u64().unwrap() < 100_000, "{}", said["explored"]);
+}

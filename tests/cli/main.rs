@@ -1,5 +1,6 @@
 //! The command line as people and programs meet it: what is printed, in which shape, with which exit status.
 
+mod agree;
 mod background;
 mod breakages;
 mod commands;

@@ -110,10 +110,14 @@ fn what_one_asks_for_begins_one_after_the_other() {
 /// What looking does not tell, and who has not come back, are told all the same, until that is over.
 #[test]
 fn drift_tells_of_what_is_unknown_and_of_who_has_not_come_back() {
-    let told = |what: &str| format!("local f for _, d in ipairs(drift()) do if d.text:find('{what}', 1, true) then f = d end end");
+    let told = |what: &str| {
+        format!("local f for _, d in ipairs(drift()) do if d.text:find('{what}', 1, true) then f = d end end")
+    };
     let (unknown, quarantined) = (told("nobody knows"), told("a is in quarantine"));
-    run(&format!("fault('operation_call a.open', 'late') apply('open') wait_answer('open.broken', 5)
+    run(&format!(
+        "fault('operation_call a.open', 'late') apply('open') wait_answer('open.broken', 5)
         do {unknown} assert(f and f.how == 'unknown') end
         do {quarantined} assert(f and f.how == 'quarantined') end
-        wait(10) assert(#drift() == 0)"));
+        wait(10) assert(#drift() == 0)"
+    ));
 }
