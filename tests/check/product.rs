@@ -227,7 +227,7 @@ fn what_asks_without_end_is_followed_up_to_a_bound() {
         "{BASE} one = Configuration {{ property_set(\"a.gain\", 2.0) }}, two = Configuration {{ property_set(\"a.mode\", 1) }},"
     );
     let states = "idle = state {}, building = state { entry = \"base\" }, up = state {},
-        ping = state { entry = { \"one\", \"two.undo\" } }, pong = state { entry = { \"two\", \"one.undo\" } },
+        ping = state { entry = \"one\" }, pong = state { entry = \"two\" },
         leaving = state { entry = \"base.undo\" },
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
