@@ -3,7 +3,7 @@
 use super::coordinator::ask_of;
 use super::reactions::{Reaction, Reactions};
 use super::shape::Undone;
-use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, OperatorMay};
+use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, OperatorMay, Verdict};
 use crate::stack::Requester;
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashSet;
@@ -69,6 +69,12 @@ pub fn requester(name: Ident) -> Requester {
     Requester::Coordinator(ComponentName::new(name.as_str()).expect("a plain name"))
 }
 
+/// Whether one of these coordinators listens to the loss of a configuration.
+pub fn hears_loss(charts: &[&Chart], numbers: &[usize], id: ConfigId) -> bool {
+    let event = Verdict::Lost.event(Ask::Apply(id));
+    numbers.iter().any(|number| charts[*number].event(event) != EventId::OTHER)
+}
+
 /// The coordinators of these numbers, and which frames count with them.
 pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usize]) -> (Vec<Member<'a>>, Undone) {
     let mut ids: FxHashSet<ConfigId> = FxHashSet::default();
@@ -77,6 +83,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
     ids.extend(
         counts.filter(|c| c.group.is_some() || c.confirm.is_some() || c.holds.is_some() || c.safe).map(|c| c.id),
     );
+    ids.extend(deployment.configurations.iter().map(|c| c.id).filter(|id| hears_loss(charts, numbers, *id)));
     ids.extend(deployment.operator.iter().filter_map(|(may, _)| match may {
         OperatorMay::Apply(id) => Some(*id),
         OperatorMay::Set(_) => None,

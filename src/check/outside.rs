@@ -71,8 +71,8 @@ impl Product<'_> {
             nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
             self.unconfirmed(state, at, id, nexts);
         }
-        for at in 0..self.holds.len() {
-            let id = self.holds[at];
+        for at in 0..self.losable.len() {
+            let (id, holds) = self.losable[at];
             let busy = |request: &Request| matches!(request.ask, Ask::Apply(of) | Ask::UndoOf(of) if of == id);
             let under_way = state.desk.under_way().iter().any(|turn| turn.batch.requests.iter().any(busy));
             if state.lost.contains(&id) || under_way || !self.worlds.is_in_force(state.world, id) {
@@ -82,20 +82,27 @@ impl Product<'_> {
             let mut next = state.clone();
             next.lost.push(id);
             next.lost.sort_unstable();
+            let class = if holds { Failed::Apply } else { Failed::Broken };
+            if !holds {
+                // What differs stays as it is until somebody undoes or recovers it.
+                next.world = self.worlds.broken(state.world, std::iter::empty());
+                next.unconfirmed.clear();
+            }
             self.spread(&mut next, event, None);
             let by = Move::Lost(id);
             match next.inbox[..] {
+                [] if !holds => {}
                 [] => {
                     nexts.troubles.push(Trouble::Unheard(id));
-                    nexts.all.push(Next::plain(by, next, Failed::Apply));
+                    nexts.all.push(Next::plain(by, next, class));
                 }
                 [(only, event)] => {
                     next.inbox.clear();
                     let from = nexts.all.len();
                     self.hear(next, usize::from(only), event, by, nexts);
-                    nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Apply));
+                    nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(class));
                 }
-                _ => nexts.all.push(Next::plain(by, next, Failed::Apply)),
+                _ => nexts.all.push(Next::plain(by, next, class)),
             }
         }
     }

@@ -11,7 +11,7 @@
 //! inboxes are empty.
 
 use super::coordinator::outside_events;
-use super::members::{Member, members};
+use super::members::{Member, hears_loss, members};
 use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, index};
 use super::world::{Comes, EMPTY, Went, Worlds};
@@ -48,8 +48,9 @@ pub struct Product<'a> {
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
-    /// Configurations that stand for something.
-    pub holds: Vec<ConfigId>,
+    /// Configurations that may be lost, and whether they stand for something. Those that do not are lost where the platform is
+    /// found to differ: followed where somebody listens.
+    pub losable: Vec<(ConfigId, bool)>,
     /// Answers that nobody hears are given as well.
     pub tells_all: bool,
 }
@@ -77,7 +78,8 @@ impl<'a> Product<'a> {
         }));
         operator.sort_unstable();
         operator.dedup();
-        let holds = deployment.configurations.iter().filter(|c| c.holds.is_some()).map(|c| c.id).collect();
+        let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
+        let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
         let mut product = Self {
             deployment,
             members,
@@ -90,7 +92,7 @@ impl<'a> Product<'a> {
             entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
-            holds,
+            losable,
             tells_all: false,
         };
         for (place, number) in numbers.iter().enumerate() {

@@ -65,6 +65,26 @@ fn what_is_lost_is_heard_wherever_it_may_be_in_force() {
     assert!(heard.of("coord::lost_unheard").is_empty(), "{:#}", heard.0);
 }
 
+/// A platform that is found to differ is a loss too: where it is listened to, it is followed.
+#[test]
+fn what_is_found_to_differ_is_followed_where_it_is_heard() {
+    let configurations = "base = Configuration { create(\"arm\", \"Arm\") }, stop = Configuration { safe = true, post_conf_state = { \"arm:stopped\" } },";
+    let stopped = "stopped = state { entry = \"stop\" }, trans { src = \"stopped\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"stop.undo\" },";
+    let heard: String = ["building", "up", "leaving", "failed"]
+        .iter()
+        .map(|state| format!("trans {{ src = \"{state}\", tgt = \"stopped\", events = {{ \"e_estop\" }} }},"))
+        .collect();
+    let lost = "odd = state {}, trans { src = \"up\", tgt = \"odd\", events = { \"base.lost\" } }, trans { src = \"odd\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let said = |more: &str| {
+        Small::new(configurations, &format!("{STATES}{stopped}{heard}{more}"), "safety: [e_estop]\n").check()
+    };
+    assert!(said("").of("coord::safety_unheard").is_empty());
+    let said = said(lost);
+    let found = said.of("coord::safety_unheard");
+    assert!(found.len() == 1 && found[0]["message"].as_str().unwrap().contains("root.odd"), "{:#}", said.0);
+    assert!(said.of("coord::lost_unheard").is_empty(), "nobody has to listen: {:#}", said.0);
+}
+
 /// A frame that is not confirmed is taken back, and what is asked for then does not fit any more.
 #[test]
 fn what_is_reverted_is_followed() {
