@@ -31,6 +31,8 @@ pub struct Edge {
     pub failed: Failed,
     /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
     pub quiet: bool,
+    /// The event that ends the deployment comes once more.
+    pub again: bool,
 }
 
 /// A bound that cut something off.
@@ -231,9 +233,12 @@ impl Graph<'_, '_> {
             }
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
-            let (state, class) = self.abstracted(next);
-            let to = self.reach(state, so_far.max(class), depth);
-            self.edges.push(Edge { from: at, to, place, failed: class, quiet });
+            let again = state.stopping && self.product.is_shutdown(next.by);
+            let (mut next, class) = self.abstracted(next);
+            // Behind undoings that failed it is taken down by force anyway: only operators mind.
+            next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
+            let to = self.reach(next, so_far.max(class), depth);
+            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again });
         }
     }
 
@@ -339,7 +344,7 @@ impl Graph<'_, '_> {
         state.unconfirmed.clear();
         let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
-        self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false });
+        self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false, again: false });
     }
 
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but

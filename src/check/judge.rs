@@ -1,14 +1,13 @@
 //! What is judged of everything that was followed: findings, each with its own shortest way.
 
 use super::coordinator::{answers, place};
-use super::explore::{Bound, Graph};
+use super::explore::Graph;
 use super::reactions::triggers;
 use super::state::{Failed, State, Trouble};
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
-    COORD_ENDLESS, COORD_LEFTOVERS, COORD_LOST_UNHEARD, COORD_NO_WAY_DOWN, COORD_REFUSED_BY_OTHER,
-    COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK,
+    COORD_ENDLESS, COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK,
 };
 use crate::model::{
     Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,
@@ -350,91 +349,6 @@ impl Graph<'_, '_> {
             )
         };
         finding.at(chart.origin(leaf)).path(format!("coordinator.{fqn}"))
-    }
-
-    /// Ways down that leave something behind.
-    fn leftovers(&mut self, found: &mut Traced) {
-        let left = |state: &State| -> Vec<ComponentName> {
-            let mut names = Vec::new();
-            if let Some(world) = self.product.worlds.get(state.world).filter(|_| self.product.is_down(state)) {
-                world.system.for_each_component(&mut |node| names.push(node.name));
-            }
-            names.sort_unstable();
-            names
-        };
-        let first = self.in_order().into_iter().find_map(|at| {
-            let left = left(&self.states[at as usize]);
-            (!left.is_empty()).then_some((at, left))
-        });
-        let Some((at, left)) = first else { return };
-        let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
-        let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
-        let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
-            .at(self.product.deployment.key_origin("shutdown.down"))
-            .path("shutdown.down")
-            .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
-        let trace = self.trace(at);
-        found.push((finding, trace));
-    }
-
-    /// From everywhere there is a way down. Only what was followed to the end counts: where events were not followed since
-    /// too many requests waited, their answers lead on.
-    fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
-        let cut = |bound: &Bound| {
-            matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Forks | Bound::Entered)
-        };
-        if self.bounds.keys().any(cut) {
-            return;
-        }
-        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
-        self.edges.iter().for_each(|edge| before[edge.to as usize].push(edge.from));
-        let forced = |state: &State| self.product.worlds.top(state.world).is_some();
-        let mut reaches: Vec<bool> =
-            self.states.iter().map(|state| self.product.is_down(state) || forced(state)).collect();
-        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
-        ends.for_each(|at| reaches[at as usize] = true);
-        // What the broken ends lead to is taken away by force: that is no way down of an intact system.
-        let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
-        open.retain(|at| !forced(&self.states[*at as usize]));
-        while let Some(at) = open.pop() {
-            for from in &before[at as usize] {
-                if !std::mem::replace(&mut reaches[*from as usize], true) {
-                    open.push(*from);
-                }
-            }
-        }
-        let several = self.product.members.len() > 1;
-        let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
-        let order = self.in_order();
-        let leaves: FxHashSet<&[NodeId]> = stuck.iter().map(|at| &self.states[*at as usize].leaves[..]).collect();
-        let first = if several {
-            // Where nothing leads on at all tells most.
-            let first = order.iter().copied().find(|at| lost(at) && stuck.contains(at));
-            first.or_else(|| order.iter().copied().find(lost))
-        } else {
-            order.iter().copied().find(|at| lost(at) && !leaves.contains(&self.states[*at as usize].leaves[..]))
-        };
-        let Some(at) = first else { return };
-        let deployment = self.product.deployment;
-        let state = &self.states[at as usize];
-        let finding = if several {
-            let message = format!("from {} no way leads down together", self.product.place(state));
-            Finding::warning(COORD_NO_WAY_DOWN, message)
-                .at(deployment.key_origin("shutdown.down"))
-                .path("shutdown.down")
-                .help("look at the trace: which of them waits for the other, and for what?")
-        } else {
-            let member = &self.product.members[0];
-            let (leaf, fqn) = (state.leaves[0], member.chart.fqn(state.leaves[0]).to_string());
-            let down = deployment.coordinator_named(member.name).map_or("", |c| c.down.as_str());
-            Finding::warning(COORD_NO_WAY_DOWN, format!("from `{fqn}` no way leads to `{down}`"))
-                .at(member.chart.origin(leaf))
-                .path(format!("coordinator.{fqn}"))
-                .also(deployment.key_origin("shutdown.down"), "the state that means down")
-                .help("add transitions that lead down from there")
-        };
-        let trace = self.trace(at);
-        found.push((finding, trace));
     }
 }
 

@@ -9,6 +9,7 @@ mod beside;
 mod configurations;
 mod coordinator;
 mod declared;
+mod down;
 mod drive;
 mod ends;
 mod explore;

@@ -51,6 +51,8 @@ impl Product<'_> {
     pub(super) fn raised(&mut self, state: &State, name: EventName, by: Move, nexts: &mut Nexts) {
         let mut next = state.clone();
         next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping();
+        // Somebody wants it up again.
+        next.stopping &= name != self.deployment.deploy.event;
         self.confirm(&mut next, name);
         self.spread(&mut next, name, None);
         // If one alone hears it, there is nothing to wait for.

@@ -186,9 +186,15 @@ impl<'a> Product<'a> {
         }
     }
 
-    /// Whether it makes a difference that the deployment is being stopped.
+    /// Whether it is kept that the deployment is being stopped. Of several coordinators without an operator it would be
+    /// kept for long, until all are down, and make too many states.
     pub(super) fn minds_stopping(&self) -> bool {
-        !self.operator.is_empty()
+        !self.operator.is_empty() || self.members.len() == 1
+    }
+
+    /// Whether the event that ends the deployment comes.
+    pub(super) fn is_shutdown(&self, by: Move) -> bool {
+        matches!(by, Move::Event(at) if self.outside[usize::from(at)] == self.deployment.shutdown.event)
     }
 
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no

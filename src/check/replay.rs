@@ -10,6 +10,7 @@ use super::state::{Move, Next, State};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
 use crate::stack::Request;
+use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::time::Duration;
 
@@ -65,6 +66,11 @@ impl Product<'_> {
             if too_late(before) || races(before, next) {
                 all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
             }
+            if let Move::Time(number, event) = next.by
+                && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
+            {
+                all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
+            }
             if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
                 all[k].does = Does::Cannot("what is there is not known any more");
             }
@@ -113,23 +119,36 @@ impl Product<'_> {
                 at = at.max(since.map_or(at, |since| since + limits::REPLAY_STEP));
             }
             if let Move::Time(number, event) = next.by {
-                at += self.members[usize::from(number)].chart.time_of(event).unwrap_or_default();
+                at = at.max(self.time_due(&way[..k], &times, usize::from(number), event));
             }
             times.push(at);
         }
         times
     }
 
+    /// When a time event comes after these moves: so long after its state was entered.
+    fn time_due(&self, way: &[(&State, &Next)], times: &[Duration], number: usize, event: EventId) -> Duration {
+        let chart = self.members[number].chart;
+        let takes = chart.time_of(event).unwrap_or_default();
+        let owner = chart.nodes().find(|node| chart.time_event(*node) == Some(event));
+        let inside = |state: &State| owner.is_some_and(|owner| chart.is_inside(state.leaves[number], owner));
+        let entered = way.iter().rposition(|(before, next)| inside(&next.state) && !inside(before));
+        entered.map_or(Duration::ZERO, |at| times[at]) + takes
+    }
+
     /// The batches that begin on a way, and safe configurations.
     fn begun(&self, way: &[(&State, &Next)]) -> Vec<Begun> {
         let mut all: Vec<Begun> = Vec::new();
         for (k, (before, next)) in way.iter().enumerate() {
-            let known = under_way(before);
+            // One that is over may be followed at once by another of the same requests.
+            let known: Vec<_> = under_way(before).into_iter().filter(|batch| !answered(next, batch)).collect();
             for requests in under_way(&next.state) {
                 if known.iter().any(|other| same(other, &requests)) {
                     continue;
                 }
-                let gone = |next: &Next| !under_way(&next.state).iter().any(|other| same(other, &requests));
+                let gone = |next: &Next| {
+                    answered(next, &requests) || !under_way(&next.state).iter().any(|other| same(other, &requests))
+                };
                 let over = way[k + 1..].iter().position(|(_, next)| gone(next)).map(|after| k + 1 + after);
                 let group = self.worlds.group(next.state.world, &requests);
                 let idle = group.is_some_and(|group| group.planned.is_none_or(|planned| planned.steps.is_empty()));
@@ -252,6 +271,14 @@ fn races(before: &State, next: &Next) -> bool {
         next.answers.is_empty() && under_way(&next.state).iter().any(within)
     };
     next.answers.iter().any(through) || under_way(before).iter().any(|requests| back(requests) || shrinks(requests))
+}
+
+/// Whether a move answers all of a batch.
+fn answered(next: &Next, batch: &[Request]) -> bool {
+    let is = |request: &Request| {
+        next.answers.iter().any(|(other, _)| (other.ask, other.requester) == (request.ask, request.requester))
+    };
+    batch.iter().all(is)
 }
 
 /// Whether two lists ask for the same.

@@ -123,6 +123,31 @@ fn after_broken_safety_events_are_heard() {
     assert!(crate::support::Said::answers(found[0]).contains(&"base.broken".to_owned()), "{:#}", found[0]);
 }
 
+/// The event that ends the deployment is raised once: where it takes two of them, nothing ever comes down.
+#[test]
+fn one_shutdown_event_leads_down() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, park = Configuration { property_set(\"a.gain\", 0.0) },";
+    let parked = STATES.replace(
+        "trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },",
+        "parked = state { entry = \"park\" }, trans { src = \"up\", tgt = \"parked\", events = { \"e_shutdown\" } },
+         trans { src = \"parked\", tgt = \"leaving\", events = { LEADS }, effect = \"park.undo\" },",
+    );
+    let said = |leads: &str| Small::new(configurations, &parked.replace("LEADS", leads), "").check();
+    let twice = said("\"e_shutdown\"");
+    let found = twice.of("coord::no_way_down");
+    assert!(found.len() == 1 && found[0]["severity"] == "warning", "{:#}", twice.0);
+    assert!(
+        found[0]["message"].as_str().unwrap().contains("from `root.parked` only a second `e_shutdown`"),
+        "{:#}",
+        found[0]
+    );
+    for leads in ["\"park.ok\", \"park.failed\", \"park.broken\"", "\"e_shutdown\", \"e_after(1.0)\""] {
+        let once = said(leads);
+        assert!(once.of("coord::no_way_down").iter().all(|found| found["severity"] == "info"), "{leads}: {:#}", once.0);
+    }
+}
+
 /// With `up`, `leaving` and `failed`, the second visit of `leaving` asks for no undo: that is what is wrong.
 #[test]
 fn advice_names_what_never_comes() {

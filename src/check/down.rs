@@ -1,0 +1,126 @@
+//! Whether every way leads down, and what it leaves behind.
+
+use super::explore::{Bound, Edge, Graph};
+use super::judge::Traced;
+use super::state::{Failed, State};
+use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
+use crate::model::{ComponentName, Finding, Severity};
+use crate::statechart::NodeId;
+use crate::system::View;
+use rustc_hash::FxHashSet;
+
+impl Graph<'_, '_> {
+    /// Ways down that leave something behind.
+    pub(super) fn leftovers(&mut self, found: &mut Traced) {
+        let left = |state: &State| -> Vec<ComponentName> {
+            let mut names = Vec::new();
+            if let Some(world) = self.product.worlds.get(state.world).filter(|_| self.product.is_down(state)) {
+                world.system.for_each_component(&mut |node| names.push(node.name));
+            }
+            names.sort_unstable();
+            names
+        };
+        let first = self.in_order().into_iter().find_map(|at| {
+            let left = left(&self.states[at as usize]);
+            (!left.is_empty()).then_some((at, left))
+        });
+        let Some((at, left)) = first else { return };
+        let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
+        let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
+        let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
+            .at(self.product.deployment.key_origin("shutdown.down"))
+            .path("shutdown.down")
+            .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
+        let trace = self.trace(at);
+        found.push((finding, trace));
+    }
+
+    /// From everywhere there is a way down. Only what was followed to the end counts: where events were not followed since
+    /// too many requests waited, their answers lead on.
+    pub(super) fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
+        let cut = |bound: &Bound| {
+            matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Forks | Bound::Entered)
+        };
+        if self.bounds.keys().any(cut) {
+            return;
+        }
+        let reaches = self.reaching_down(|_| true);
+        let several = self.product.members.len() > 1;
+        let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
+        let order = self.in_order();
+        let leaves: FxHashSet<&[NodeId]> = stuck.iter().map(|at| &self.states[*at as usize].leaves[..]).collect();
+        let first = if several {
+            // Where nothing leads on at all tells most.
+            let first = order.iter().copied().find(|at| lost(at) && stuck.contains(at));
+            first.or_else(|| order.iter().copied().find(lost))
+        } else {
+            order.iter().copied().find(|at| lost(at) && !leaves.contains(&self.states[*at as usize].leaves[..]))
+        };
+        let Some(at) = first else { return self.once_down(&reaches, found) };
+        let deployment = self.product.deployment;
+        let state = &self.states[at as usize];
+        let finding = if several {
+            let message = format!("from {} no way leads down together", self.product.place(state));
+            Finding::warning(COORD_NO_WAY_DOWN, message)
+                .at(deployment.key_origin("shutdown.down"))
+                .path("shutdown.down")
+                .help("look at the trace: which of them waits for the other, and for what?")
+        } else {
+            let member = &self.product.members[0];
+            let (leaf, fqn) = (state.leaves[0], member.chart.fqn(state.leaves[0]).to_string());
+            let down = deployment.coordinator_named(member.name).map_or("", |c| c.down.as_str());
+            Finding::warning(COORD_NO_WAY_DOWN, format!("from `{fqn}` no way leads to `{down}`"))
+                .at(member.chart.origin(leaf))
+                .path(format!("coordinator.{fqn}"))
+                .also(deployment.key_origin("shutdown.down"), "the state that means down")
+                .help("add transitions that lead down from there")
+        };
+        let trace = self.trace(at);
+        found.push((finding, trace));
+    }
+
+    /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
+    fn reaching_down(&self, counts: impl Fn(&Edge) -> bool) -> Vec<bool> {
+        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
+        let edges = self.edges.iter().filter(|edge| counts(edge));
+        edges.for_each(|edge| before[edge.to as usize].push(edge.from));
+        let forced = |state: &State| self.product.worlds.top(state.world).is_some();
+        let mut reaches: Vec<bool> =
+            self.states.iter().map(|state| self.product.is_down(state) || forced(state)).collect();
+        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
+        ends.for_each(|at| reaches[at as usize] = true);
+        // What the broken ends lead to is taken away by force: that is no way down of an intact system.
+        let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
+        open.retain(|at| !forced(&self.states[*at as usize]));
+        while let Some(at) = open.pop() {
+            for from in &before[at as usize] {
+                if !std::mem::replace(&mut reaches[*from as usize], true) {
+                    open.push(*from);
+                }
+            }
+        }
+        reaches
+    }
+
+    /// The event that ends the deployment is raised once: it must not take another one to come down.
+    fn once_down(&mut self, reaches: &[bool], found: &mut Traced) {
+        let once = self.reaching_down(|edge| !edge.again);
+        let again = |at: &u32| {
+            let state = &self.states[*at as usize];
+            state.stopping && state.is_at_rest() && reaches[*at as usize] && !once[*at as usize]
+        };
+        let Some(at) = self.in_order().into_iter().find(again) else { return };
+        let (deployment, state) = (self.product.deployment, &self.states[at as usize]);
+        let severity = if self.failed[at as usize] == Failed::Nothing { Severity::Warning } else { Severity::Info };
+        let (event, place) = (deployment.shutdown.event, self.product.place(state));
+        let message = format!("from `{place}` only a second `{event}` leads down, and it is raised once");
+        let finding = Finding::new(severity, COORD_NO_WAY_DOWN, message)
+            .at(self.product.members[0].chart.origin(state.leaves[0]))
+            .path("shutdown.event")
+            .help(
+                "let an answer or a time lead on from there; else what is left is taken down without the coordinator",
+            );
+        let trace = self.trace(at);
+        found.push((finding, trace));
+    }
+}
