@@ -3,6 +3,7 @@
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
+use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
@@ -125,7 +126,7 @@ impl Product<'_> {
             let among = |turn: &Turn| {
                 let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
-                stops.contains(&turn.number) && (turn.batch.requests.len() > 1 || twice)
+                stops.contains(&turn.number) && (self.tells_all || turn.batch.requests.len() > 1 || twice)
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 // Any of them, but no more than a few at once.
@@ -158,7 +159,11 @@ impl Product<'_> {
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         for (request, verdict, _) in &arrival.told {
             self.owed(&mut state, request);
-            state.stayed |= *verdict == Verdict::UndoFailed;
+            if *verdict == Verdict::UndoFailed {
+                state.stayed = true;
+                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request));
+                self.go(&mut state, &went);
+            }
             self.due(&mut state, *request, *verdict);
         }
         for (number, undo) in arrival.given_up {
@@ -198,7 +203,15 @@ impl Product<'_> {
         let planned = planned.unwrap_or(state.world);
         let begun = match self.worlds.top(planned) {
             Some(_) => place == 0,
-            None => self.worlds.comes(planned, &requests).parts.iter().any(|part| part.place == place),
+            None => {
+                let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+                let comes = self.worlds.comes(planned, &requests, &beside);
+                // What was begun as one stays so, whatever of it is answered now.
+                if comes.takes > 1 && !beside.joined {
+                    state.joined.push(number);
+                }
+                comes.parts.iter().any(|part| part.place == place)
+            }
         };
         if begun {
             state.stopped.push((number, Stop::GivenUp(undo)));
@@ -295,7 +308,7 @@ impl Product<'_> {
     /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
     /// its turn.
     pub(super) fn confirm(&self, state: &mut State, name: EventName) {
-        if !state.desk.is_empty() {
+        if !state.desk.is_empty() && !self.tells_all {
             return;
         }
         state.unconfirmed.retain(|waits| match waits.request.ask {

@@ -2,10 +2,21 @@
 
 use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
-use super::world::{Comes, Top, Went, WorldId};
+use super::world::{Beside, Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
 use crate::stack::{Request, Requester, Why, given_up_of};
 use smallvec::SmallVec;
+
+/// A request as it is answered: what takes back what was not confirmed tells of that.
+fn as_told(request: Request, verdict: Verdict) -> (Request, Verdict) {
+    match (request.why, verdict, request.ask) {
+        (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
+            (Request { ask: Ask::Apply(id), why: Why::Asked, ..request }, Verdict::Reverted)
+        }
+        (Why::Unconfirmed(..), ..) => (Request { why: Why::Asked, ..request }, verdict),
+        _ => (request, verdict),
+    }
+}
 
 /// Requests of a batch that are answered: place and verdict; none: nobody is told.
 type Given = SmallVec<[(usize, Option<Verdict>); 2]>;
@@ -22,7 +33,7 @@ impl Product<'_> {
         if let Some(top) = self.worlds.top(state.world) {
             return self.ends_somehow(state, number, top, &requests, nexts);
         }
-        let comes = self.comes(state, &requests);
+        let comes = self.comes(state, number, &requests);
         for (place, reasons) in &comes.refused {
             if requests[*place].requester != Requester::Operator {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
@@ -43,6 +54,37 @@ impl Product<'_> {
             self.ended(state, number, &requests, failed, went, class, nexts);
             broken.push((part.place, Some(ask.broken())));
             self.broke(state, number, &requests, broken, nexts);
+            self.missing(state, number, &requests, &comes, k, &[ask.failed(), ask.broken()], nexts);
+        }
+    }
+
+    /// What stands before a part that ends so was to stand, and cannot be finished: it is broken too.
+    #[allow(clippy::too_many_arguments)]
+    fn missing(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        k: usize,
+        verdicts: &[Verdict],
+        nexts: &mut Nexts,
+    ) {
+        // Nothing is known after either; only whoever compares answers minds which ones it were.
+        for some in 1..1u32 << if self.tells_all { k.min(4) } else { 0 } {
+            let is_broken = |part: usize| some & (1 << part) != 0;
+            let first = comes.parts[some.trailing_zeros() as usize].place;
+            let mut given: Given = comes.told.iter().copied().filter(|(told, _)| *told < first).collect();
+            for (at, part) in comes.parts[..k].iter().enumerate() {
+                let ask = requests[part.place].ask;
+                given.push((part.place, Some(if is_broken(at) { ask.broken() } else { ask.done() })));
+            }
+            for verdict in verdicts {
+                let mut given = given.clone();
+                given.push((comes.parts[k].place, Some(*verdict)));
+                given.sort_by_key(|(place, _)| *place);
+                self.broke(state, number, requests, given, nexts);
+            }
         }
     }
 
@@ -95,6 +137,7 @@ impl Product<'_> {
             }
             !over
         });
+        next.joined.retain(|of| *of != number);
         // From the last on, so that places stay.
         for (place, _) in given.iter().rev() {
             next.desk.answered(number, *place);
@@ -104,7 +147,7 @@ impl Product<'_> {
         for (place, verdict) in &given {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
-            answers.push((request, verdict));
+            answers.push(as_told(request, verdict));
             let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
@@ -118,7 +161,10 @@ impl Product<'_> {
             }
         }
         // What was given up together with one before it is not taken up anew.
-        if next.desk.under_way().iter().any(|turn| turn.number == number) {
+        let left = Self::requests(&next, number);
+        if !left.is_empty() {
+            // In the order of the batch.
+            given_up.sort_by_key(|undo| given_up_of(undo, &left));
             given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
         }
         for undo in late.into_iter().rev() {
@@ -182,22 +228,44 @@ impl Product<'_> {
             }
             return;
         }
-        let comes = self.comes(state, &requests);
-        let Some(k) = comes.parts.iter().position(|part| given_up.contains(&part.place)) else {
-            // It is refused by now, or was.
-            return self.ends(state, number, nexts);
-        };
+        let comes = self.comes(state, number, &requests);
+        let first = |given_up: &[usize]| comes.parts.iter().position(|part| given_up.contains(&part.place));
+        // It may be refused by now, or have been; or it was on its way back, or through, when that came.
+        if self.tells_all || first(&given_up).is_none() {
+            self.ends(state, number, nexts);
+        }
+        // What came when it was on its way back already came too late.
+        let some = if self.tells_all { 1 } else { given_up.len().max(1) };
+        let mut met: SmallVec<[usize; 2]> = SmallVec::new();
+        for count in some..=given_up.len() {
+            let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
+            met.push(k);
+            self.given_up_ends(state, number, &requests, &comes, k, nexts);
+        }
+    }
+
+    /// How a batch under way may end of which that part was given up.
+    fn given_up_ends(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        k: usize,
+        nexts: &mut Nexts,
+    ) {
         let part = &comes.parts[k];
-        let mut cancelled = Self::done_before(&requests, &comes, k, part.place);
+        let mut cancelled = Self::done_before(requests, comes, k, part.place);
         let mut broken = cancelled.clone();
         cancelled.push((part.place, Some(Verdict::Cancelled)));
-        self.ended(state, number, &requests, cancelled, &part.before, Failed::Nothing, nexts);
+        self.ended(state, number, requests, cancelled, &part.before, Failed::Nothing, nexts);
         // The last of it may have been done when that came.
-        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
-        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
+        let done = Self::done_before(requests, comes, comes.parts.len(), comes.takes);
+        self.ended(state, number, requests, done, &comes.done, Failed::Nothing, nexts);
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
-            self.broke(state, number, &requests, broken, nexts);
+            self.broke(state, number, requests, broken, nexts);
+            self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
         }
     }
 
@@ -212,7 +280,8 @@ impl Product<'_> {
         given_up: &[usize],
         nexts: &mut Nexts,
     ) {
-        let comes = self.worlds.comes(planned, requests);
+        let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+        let comes = self.worlds.comes(planned, requests, &beside);
         self.entangled |= !given_up.is_empty() && comes.parts.len() > 1;
         let end =
             |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
@@ -246,7 +315,8 @@ impl Product<'_> {
             }
             return;
         }
-        let comes = self.worlds.safe(state.world, request);
+        let beside = self.beside(state, None);
+        let comes = self.worlds.safe(state.world, request, &beside.held);
         let from = nexts.all.len();
         if !comes.troubles.is_empty() && request.requester != Requester::Operator {
             nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));

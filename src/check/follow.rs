@@ -236,8 +236,6 @@ impl<'a> Follower<'a> {
     /// The components that what is under way may be changing just now; none: any.
     fn busy(&self, state: &State) -> Option<BTreeSet<ComponentName>> {
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests).chain(&state.safe);
-        // What was not confirmed may be on its way back.
-        let under_way = under_way.chain(state.unconfirmed.iter().map(|waits| &waits.request));
         let mut busy = BTreeSet::new();
         for request in under_way {
             let (Ask::Apply(id) | Ask::UndoOf(id)) = request.ask else { return None };

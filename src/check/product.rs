@@ -13,11 +13,11 @@
 use super::coordinator::outside_events;
 use super::members::{Member, members};
 use super::reactions::Asked;
-use super::state::{Failed, Move, Next, Nexts, State, index};
-use super::world::{Comes, EMPTY, Went, Worlds};
+use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
+use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId};
-use crate::stack::{Desk, Request, Requester};
+use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
@@ -109,6 +109,7 @@ impl<'a> Product<'a> {
             world: EMPTY,
             desk: Desk::default(),
             stopped: SmallVec::new(),
+            joined: SmallVec::new(),
             safe: SmallVec::new(),
             crowded: false,
             due: SmallVec::new(),
@@ -198,7 +199,17 @@ impl<'a> Product<'a> {
 
     /// Takes over a world.
     pub(super) fn go(&self, state: &mut State, went: &Went) {
-        state.world = went.world;
+        let from = std::mem::replace(&mut state.world, went.world);
+        if let Some(places) = &went.places {
+            // Frames have the numbers of their world.
+            for request in state.desk.requests_mut() {
+                if let Why::Unconfirmed(frame, event, within) = request.why {
+                    let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
+                    let frame = place.and_then(|place| self.worlds.frame(went.world, place));
+                    request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)), event, within);
+                }
+            }
+        }
         if let Some(places) = &went.places {
             state.unconfirmed.retain(|waits| match places.get(usize::from(waits.place)).copied().flatten() {
                 Some(place) => {
@@ -211,8 +222,28 @@ impl<'a> Product<'a> {
     }
 
     /// What `requests` come to in the state's world.
-    pub fn comes(&mut self, state: &State, requests: &[Request]) -> Rc<Comes> {
-        self.worlds.comes(state.world, requests)
+    pub fn comes(&mut self, state: &State, number: u32, requests: &[Request]) -> Rc<Comes> {
+        let beside = self.beside(state, Some(number));
+        self.worlds.comes(state.world, requests, &beside)
+    }
+
+    /// What stands beside a batch under way (none: beside what does not wait) in the state's world.
+    pub(super) fn beside(&mut self, state: &State, number: Option<u32>) -> Beside {
+        let joined = |number: u32| state.joined.contains(&number);
+        let mut held = Held::new();
+        for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
+            let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+                Stop::Interrupted(planned) if *of == turn.number => Some(*planned),
+                _ => None,
+            });
+            let planned = planned.unwrap_or(state.world);
+            let own = self.worlds.held_by(planned, &turn.batch.requests, joined(turn.number));
+            held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
+        }
+        held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
+        held.sort_unstable();
+        held.dedup();
+        Beside { held, joined: number.is_some_and(joined) }
     }
 
     /// Whether all of them are down, with nothing left to be answered or heard.

@@ -50,6 +50,8 @@ pub struct State {
     pub desk: Desk,
     /// Batches under way that are stopped, by their numbers.
     pub stopped: SmallVec<[(u32, Stop); 1]>,
+    /// Batches under way that were begun as one, of which some requests were answered since.
+    pub joined: SmallVec<[u32; 1]>,
     /// Safe configurations that are being applied, in their order.
     pub safe: SmallVec<[Request; 1]>,
     /// Several of them are, or were just now: one may meet with steps of another.

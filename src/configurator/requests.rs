@@ -45,7 +45,15 @@ impl Engine {
             }
             let configurations = self.configurations.clone();
             let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
-            let rules = Rules { configurations: &configurations, context: &self.context, at: self.clock.now(), busy };
+            let held = self.held_frames();
+            let rules = Rules {
+                configurations: &configurations,
+                context: &self.context,
+                at: self.clock.now(),
+                busy,
+                held: &held,
+                joined: false,
+            };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs {
                 if self.repair_for(&requests[0], at) {
@@ -176,6 +184,10 @@ impl Engine {
                 }
             }
         }
+        // Not carried out, whatever came of the others.
+        for (_, frame) in group.stay.iter().filter(|(place, _)| *place < end) {
+            self.world.stack.unscope(*frame);
+        }
         if group.commits {
             answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), None)));
         }
@@ -259,12 +271,14 @@ impl Engine {
 
     /// A partial frame lies below those of the safe configurations that interrupted what it is left of.
     fn push_partial(&mut self, frame: Frame) -> FrameId {
-        self.world.stack.push_below_safe(frame)
+        let held = self.held_frames();
+        self.world.stack.push_below_safe(frame, &held)
     }
 
-    /// Frames that those under way pop or hand over to.
+    /// Frames that those under way pop or hand over to, and those that wait for their confirmation.
     pub(super) fn held_frames(&self) -> Vec<FrameId> {
-        self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned())).collect()
+        let under_way = self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned()));
+        under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
     }
 
     /// What is under way is given up by its own undo.
@@ -307,6 +321,8 @@ impl Engine {
             {
                 group.takes -= usize::from(gone < group.takes);
                 group.told.retain(|told| told.place != gone);
+                group.stay.retain(|(place, _)| *place != gone);
+                group.stay.iter_mut().filter(|(place, _)| *place > gone).for_each(|(place, _)| *place -= 1);
                 group.places.iter_mut().filter(|place| **place > gone).for_each(|place| *place -= 1);
                 group.told.iter_mut().filter(|told| told.place > gone).for_each(|told| told.place -= 1);
             }

@@ -104,7 +104,7 @@ impl Engine {
     /// goes back.
     pub(super) fn safe_ended(&mut self, safe: (Request, Frame, Touched), machine: Transaction, stood: Option<u64>) {
         let (request, frame, touched) = safe;
-        let edits = machine.planned().parts[0].edits.pops.clone();
+        let edits = machine.planned().parts[0].edits.clone();
         let end = machine.end();
         let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
         let mut troubles = troubles.map(|at| self.troubles.remove(at).1).unwrap_or_default();
@@ -117,7 +117,8 @@ impl Engine {
             (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
             _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
         };
-        let pushed = self.world.stack.push_safe(edits, frame);
+        let held = self.held_frames();
+        let pushed = self.world.stack.push_safe(edits, frame, &held);
         let (verdict, reason) = match broken {
             None if troubles.is_empty() => (Verdict::Ok, None),
             None => {
