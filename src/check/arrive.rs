@@ -181,7 +181,6 @@ impl Product<'_> {
         for request in arrival.safe {
             self.owed(&mut state, &request);
             state.safe.push(request);
-            state.crowded = state.safe.len() > 1;
         }
         self.begin(&mut state);
         state

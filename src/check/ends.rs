@@ -206,11 +206,11 @@ impl Product<'_> {
             }
         }
         if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
-            self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
-            if !late.is_empty() {
-                // What came at the same moment may have been told first.
-                given_up.append(&mut late);
-                self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            // What came at the same moment may have been told first; and what came when it was on its way back, too late.
+            let some = if self.tells_all { 0 } else { given_up.len() };
+            given_up.append(&mut late);
+            for count in some..=given_up.len() {
+                self.interrupted_ends(state, number, &requests, planned, &given_up[..count], nexts);
             }
             return;
         }
@@ -282,7 +282,6 @@ impl Product<'_> {
     ) {
         let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
         let comes = self.worlds.comes(planned, requests, &beside);
-        self.entangled |= !given_up.is_empty() && comes.parts.len() > 1;
         let end =
             |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
         let mut given: Given = comes.told.clone();
@@ -294,19 +293,23 @@ impl Product<'_> {
         let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
         let world = self.worlds.stay(state.world, planned, undone);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
-        if let Some(part) = comes.parts.first().filter(|_| comes.parts.iter().any(|part| part.failed.is_some())) {
+        let can: SmallVec<[usize; 2]> =
+            comes.parts.iter().filter(|part| part.failed.is_some()).map(|part| part.place).collect();
+        // Of each part something may be left; only whoever compares answers minds of which.
+        let all = if self.tells_all { (1u32 << can.len().min(5)) - 1 } else { u32::from(!can.is_empty()) };
+        for some in 1..=all {
+            let left = |place: usize| can.iter().position(|of| *of == place).is_some_and(|at| some & (1 << at) != 0);
             let broken = |(place, verdict): (usize, Option<Verdict>)| {
-                (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
+                (place, if left(place) { Some(requests[place].ask.broken()) } else { verdict })
             };
-            self.broke(state, number, requests, given.into_iter().map(broken).collect(), nexts);
+            self.broke(state, number, requests, given.iter().copied().map(broken).collect(), nexts);
         }
     }
 
     /// How a safe configuration may end.
-    pub(super) fn safe_ends(&mut self, state: &State, request: &Request, nexts: &mut Nexts) {
+    pub(super) fn safe_ends(&mut self, state: &State, at: usize, nexts: &mut Nexts) {
         let mut over = state.clone();
-        over.safe.remove(0);
-        over.crowded &= !over.safe.is_empty();
+        let request = &over.safe.remove(at);
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
@@ -334,7 +337,7 @@ impl Product<'_> {
         // What is under way may have made or changed what it finds, and goes on while it is applied.
         let claim = self.worlds.claims.of([request]);
         let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
-        if comes.may_fail || meets || state.crowded {
+        if comes.may_fail || meets {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));

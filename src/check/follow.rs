@@ -173,10 +173,9 @@ impl<'a> Follower<'a> {
         self.told(rest.iter())
     }
 
-    /// Whether something came together of which not all is followed: more on its way between coordinators than that, or a
-    /// safe configuration and an undo that both stop one of several requests that are carried out as one.
+    /// Whether more was on its way between coordinators than is followed.
     pub fn overflowed(&self) -> bool {
-        self.product.overflow || self.product.entangled
+        self.product.overflow
     }
 
     /// All states in which it may be without anything further being seen, and those that the next answer would lead to.

@@ -41,9 +41,6 @@ pub struct Product<'a> {
     pub overflow: bool,
     /// One step asks for more than is followed, or may meet in more ways what is under way.
     pub forked: bool,
-    /// What was given up was interrupted as well, while others of its batch were carried out with it: which of them stand
-    /// then is not followed exactly.
-    pub entangled: bool,
     /// Whether it is followed what comes where a batch under way may not have begun, or be over already, when it is stopped.
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
@@ -87,7 +84,6 @@ impl<'a> Product<'a> {
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
             forked: false,
-            entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
             holds,
@@ -111,7 +107,6 @@ impl<'a> Product<'a> {
             stopped: SmallVec::new(),
             joined: SmallVec::new(),
             safe: SmallVec::new(),
-            crowded: false,
             due: SmallVec::new(),
             telling: SmallVec::new(),
             stayed: false,
@@ -172,8 +167,12 @@ impl<'a> Product<'a> {
                 self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
             }
         }
-        if let Some(request) = state.safe.first().copied() {
-            self.safe_ends(state, &request, nexts);
+        // Those that have nothing to do with each other end in any order.
+        for (at, request) in state.safe.iter().enumerate() {
+            let claim = self.worlds.claims.of([request]);
+            if state.safe[..at].iter().all(|before| !self.worlds.claims.of([before]).meets(&claim)) {
+                self.safe_ends(state, at, nexts);
+            }
         }
     }
 

@@ -54,8 +54,6 @@ pub struct State {
     pub joined: SmallVec<[u32; 1]>,
     /// Safe configurations that are being applied, in their order.
     pub safe: SmallVec<[Request; 1]>,
-    /// Several of them are, or were just now: one may meet with steps of another.
-    pub crowded: bool,
     /// Answers on their way.
     pub due: SmallVec<[(Request, Verdict); 1]>,
     /// Answers that are being given; none in a state between moves.

@@ -117,7 +117,7 @@ impl Engine {
 
     /// A transaction is over.
     pub(super) fn ended(&mut self, running: Running) {
-        let Running { machine, purpose, asked, stood, .. } = running;
+        let Running { number: own, machine, purpose, asked, stood, .. } = running;
         self.forget_conditions(asked.iter().map(|asked| asked.number));
         if let Some(conditions) = &self.conditions {
             conditions.nudge();
@@ -129,7 +129,9 @@ impl Engine {
                 self.book(number, group, end.parts, Some((&planned, &stood)));
                 self.take_up(number);
             }
-            Purpose::Safe(safe) => self.safe_ended(*safe, machine, stood.first().map(|(_, number)| *number)),
+            Purpose::Safe(safe) => {
+                self.safe_ended(own, *safe, machine, stood.first().map(|(_, number)| *number));
+            }
             Purpose::Own => {}
         }
     }
