@@ -46,6 +46,8 @@ struct Case<'a> {
     log: Vec<String>,
     classes: &'a mut Classes,
     names: Vec<String>,
+    /// Something ended *broken*, as `check` said it might.
+    broken: bool,
 }
 
 /// What goes wrong. Left out: what leaves a component faulted or in quarantine, and a platform that lies, which `check` takes
@@ -124,10 +126,20 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
         })
     });
     let names = made.deployment.coordinators.iter().map(|c| c.name.to_string()).collect();
-    let mut case = Case { session, platform, clock: clock.clone(), follower, notes, log: vec![said], classes, names };
+    let mut case = Case {
+        session,
+        platform,
+        clock: clock.clone(),
+        follower,
+        notes,
+        log: vec![said],
+        classes,
+        names,
+        broken: false,
+    };
     let went = case.go(made, chance);
     let overflowed = case.follower.overflowed();
-    let lost = case.follower.is_lost();
+    let lost = case.broken;
     let log = std::mem::take(&mut case.log);
     drop(case);
     clock.shutdown();
@@ -174,10 +186,7 @@ impl Case<'_> {
                     self.clock.sleep(Duration::from_millis(1));
                     self.rest(0)?;
                 }
-                // Left out: something goes wrong while a safe configuration stops it.
-                if !made.kept {
-                    self.platform.set_faults(faults(chance));
-                }
+                self.platform.set_faults(faults(chance));
             }
             for _ in 0..chance.of(&[0, 0, 1, 1, 2, 3, 8]).to_owned() {
                 self.clock.sleep(Duration::from_millis(1));
@@ -228,6 +237,7 @@ impl Case<'_> {
                 };
                 let seen = Seen::Answer { by, event: event(answer) };
                 self.follower.see(seen).map_err(|why| format!("the answer {answer}: {why}"))?;
+                self.broken |= answer.ends_with(".broken");
                 if self.classes.tells {
                     self.log.push(format!("after {answer}: {}", self.follower.may()));
                 }
