@@ -62,6 +62,9 @@ impl Product<'_> {
         state.due.iter_mut().for_each(|(request, _)| gone(request));
         state.due.retain(|(request, _)| self.tells_all || request.tag.0 != 0);
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
+        if self.tells_all && self.members.len() > 1 {
+            state.telling.retain(|(request, _)| request.tag.0 != 0);
+        }
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
         for (_, stop) in &mut state.stopped {
@@ -323,6 +326,16 @@ impl Product<'_> {
         self.begin(&mut state);
         // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
         state.telling.extend(answers.iter().copied());
+        if self.tells_all && self.members.len() > 1 {
+            // Each hears it in its own time: what another one asks for meanwhile may come first.
+            state.telling.retain(|(request, _)| request.tag.0 != 0);
+            let states = if state.flight.is_empty() { SmallVec::from_iter([state]) } else { self.lands(state) };
+            for state in states {
+                let state = self.settle(state);
+                nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
+            }
+            return;
+        }
         // What is in flight may come between what begins now and what is heard now.
         let mut states = if state.flight.is_empty() { vec![state] } else { self.lands(state).into_vec() };
         for _ in 0..answers.len() {

@@ -284,7 +284,9 @@ impl Product<'_> {
         let comes = self.worlds.comes(planned, requests, &beside);
         let end =
             |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
-        let mut given: Given = comes.told.clone();
+        // What was decided of those behind took the first for done: they are taken up anew.
+        let first = comes.parts.first().map_or(usize::MAX, |part| part.place);
+        let mut given: Given = comes.told.iter().copied().filter(|(place, _)| *place < first).collect();
         given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
         given.sort_by_key(|(place, _)| *place);
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.

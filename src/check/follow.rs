@@ -195,7 +195,7 @@ impl<'a> Follower<'a> {
         }
         while let Some(state) = open.pop() {
             let mut nexts = self.product.goes_on(&state);
-            if state.flight.is_empty() && state.inbox.is_empty() {
+            if state.flight.is_empty() && state.inbox.is_empty() && state.telling.is_empty() {
                 self.product.notices(&state, &mut nexts);
             }
             for next in nexts.all {
@@ -277,7 +277,7 @@ impl<'a> Follower<'a> {
 
 /// Whether nothing is on its way: what is there stays until something comes from outside, or something under way ends.
 fn is_quiet(state: &State) -> bool {
-    state.inbox.is_empty() && state.flight.is_empty() && state.due.is_empty()
+    state.inbox.is_empty() && state.flight.is_empty() && state.due.is_empty() && state.telling.is_empty()
 }
 
 fn sorted(list: &[String]) -> Vec<String> {

@@ -16,7 +16,7 @@ use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
 use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
 use crate::limits;
-use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId};
+use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use smallvec::SmallVec;
@@ -150,6 +150,15 @@ impl<'a> Product<'a> {
         }
         for number in 0..self.members.len() {
             let own = index(number);
+            // Answers go first.
+            let mine = |(request, _): &(Request, Verdict)| self.member(request.requester) == Some(number);
+            if let Some(at) = state.telling.iter().position(mine) {
+                let mut next = state.clone();
+                let (request, verdict) = next.telling.remove(at);
+                let event = self.members[number].chart.event(verdict.event(request.ask));
+                self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
+                continue;
+            }
             let Some(at) = state.inbox.iter().position(|(to, _)| *to == own) else { continue };
             let mut next = state.clone();
             let (_, event) = next.inbox.remove(at);

@@ -56,7 +56,7 @@ pub struct State {
     pub safe: SmallVec<[Request; 1]>,
     /// Answers on their way.
     pub due: SmallVec<[(Request, Verdict); 1]>,
-    /// Answers that are being given; none in a state between moves.
+    /// Answers that are given and not heard yet; where coordinators hear them at once, none in a state between moves.
     pub telling: SmallVec<[(Request, Verdict); 2]>,
     /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
     pub stayed: bool,
@@ -106,6 +106,7 @@ impl State {
         self.desk.is_empty()
             && self.safe.is_empty()
             && self.due.is_empty()
+            && self.telling.is_empty()
             && self.inbox.is_empty()
             && self.flight.is_empty()
     }

@@ -153,7 +153,7 @@ impl Engine {
         let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
         // What was decided of those behind one that failed took that for done: they are taken up anew.
         let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
-        if let Some(part) = failed.filter(|part| !was_stopped(&parts[*part])) {
+        if let Some(part) = failed.filter(|part| !was_taken_down(&parts[*part])) {
             end = group.places[part] + 1;
         }
         for (part, ended) in parts.into_iter().enumerate() {
@@ -400,12 +400,12 @@ impl Engine {
     }
 }
 
-/// Whether a part ended since everything was stopped.
-fn was_stopped(part: &PartEnd) -> bool {
+/// Whether a part ended since everything is taken down.
+fn was_taken_down(part: &PartEnd) -> bool {
     let reason = match part {
         PartEnd::Failed(reason) => reason,
         PartEnd::Broken(broken) => &broken.residual.cause,
         _ => return false,
     };
-    matches!(reason, Reason::Interrupted(_) | Reason::TakenDown)
+    matches!(reason, Reason::TakenDown)
 }

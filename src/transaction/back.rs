@@ -48,6 +48,8 @@ pub(super) struct WayBack {
     pub withheld: Option<Step>,
     /// Steps of the forward list that need no way back: a safe configuration has touched what they did.
     pub superseded: Vec<u32>,
+    /// Something that a safe configuration wrote is brought back first.
+    pub restores: bool,
     /// Steps of the forward list of whose several steps back some are left out for that reason.
     pub left_out: Vec<u32>,
 }
@@ -103,7 +105,8 @@ impl Transaction {
             if self.touched.has(step) && !self.touched.overwrote(step, *revision) {
                 for back in undo.steps() {
                     if step::apply(back, &mut view).is_ok() {
-                        way.add(back.clone(), waves + 1, SmallVec::new(), None, None);
+                        way.add(back.clone(), 0, SmallVec::new(), None, None);
+                        way.restores = true;
                     }
                 }
             }

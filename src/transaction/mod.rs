@@ -446,6 +446,8 @@ impl Transaction {
         let way = self.way_back(part, live);
         self.withheld.clone_from(&way.withheld);
         self.taken_back.extend(way.superseded.iter().copied());
+        failed |= way.restores;
+        self.late_back.clear();
         let again = self.interrupted || self.attempts < 2;
         if way.list.is_empty() || !(failed && again) || self.attempts > 8 {
             if self.taken_down {
