@@ -292,7 +292,13 @@ impl Product<'_> {
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
         let undo = comes.parts.iter().any(|part| part.undo);
         let class = if undo { Failed::Undo } else { Failed::Nothing };
-        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
+        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| part.place);
+        let refused =
+            given.iter().filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed)).map(|(place, _)| *place);
+        let mut undone: SmallVec<[usize; 2]> = undone.chain(refused).collect();
+        undone.sort_unstable();
+        undone.dedup();
+        let undone = undone.into_iter().map(|place| requests[place]);
         let world = self.worlds.stay(state.world, planned, undone);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
         let can: SmallVec<[usize; 2]> =

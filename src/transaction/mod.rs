@@ -275,13 +275,13 @@ impl Transaction {
                 self.asked_back = false;
                 self.held = true;
                 self.cancel();
-                if self.between.take().is_some() {
-                    // Wholly: also what stood before the failure, and was being finished or looked at.
+                self.in_hand_mut().late_from_now = true;
+                // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
+                let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
+                if self.between.take().is_some() || looks {
                     self.target = None;
                     self.phase = Phase::Stopping;
                 }
-                let run = self.in_hand_mut();
-                run.late_from_now = true;
             }
             Input::Release(touched) => {
                 self.held = false;
