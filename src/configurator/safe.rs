@@ -68,6 +68,7 @@ impl Engine {
                 touched.add_state(component, entry.state);
             }
         }
+        touched.planned_at(self.world.system.revision());
         self.troubles.push((request.id, troubles));
         let spec = Spec {
             until: Time::NEVER,

@@ -102,7 +102,8 @@ impl Transaction {
         let mut heed = Heed::new(&self.touched, open.map(|i| &forward.list[*i as usize].step));
         // What of a way back came in only when a safe configuration had written the same.
         for (step, undo, revision) in &self.late_back {
-            if self.touched.has(step) && !self.touched.overwrote(step, *revision) {
+            let theirs = self.touched.has(step) && !self.touched.knew(step, *revision);
+            if theirs && !self.touched.overwrote(step, *revision) {
                 for back in undo.steps() {
                     if step::apply(back, &mut view).is_ok() {
                         way.add(back.clone(), 0, SmallVec::new(), None, None);
@@ -193,7 +194,9 @@ impl Transaction {
     /// What takes back a step that came in after a safe configuration had begun, and the revision of the model it led to.
     fn late(&self, i: u32) -> Option<(&Undo, u64)> {
         let forward = self.forward.as_ref().expect("something was carried out");
-        forward.late.iter().find(|late| late.step == i).map(|late| (&late.undo, late.revision))
+        let late = forward.late.iter().find(|late| late.step == i)?;
+        let known = self.touched.knew(&forward.list[i as usize].step, late.revision);
+        (!known).then_some((&late.undo, late.revision))
     }
 
     /// The steps that are still to be done to take a step of the forward list back.
