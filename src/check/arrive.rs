@@ -134,10 +134,15 @@ impl Product<'_> {
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 // Any of them, but no more than a few at once.
                 for some in 1..1u32 << stops.len().min(3) {
-                    let mut waits = state.clone();
-                    let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
-                    those.rev().for_each(|(_, number)| waits.desk.put_back(*number));
-                    states.push(self.take_in(waits, batch.clone()));
+                    // Where others wait, it may have come before or after them.
+                    for last in
+                        [false, true].into_iter().take(if self.tells_all && state.desk.len() > 0 { 2 } else { 1 })
+                    {
+                        let mut waits = state.clone();
+                        let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
+                        those.rev().for_each(|(_, number)| waits.desk.put_back(*number, last));
+                        states.push(self.take_in(waits, batch.clone()));
+                    }
                 }
             }
         }

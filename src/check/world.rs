@@ -287,8 +287,11 @@ impl<'a> Worlds<'a> {
     /// A frame of the world `from` in the world `to`, in which it lies below others.
     pub fn below(&self, from: WorldId, to: WorldId, frame: FrameId) -> Option<FrameId> {
         let (from, to) = (self.get(from)?, self.get(to)?);
-        let of = |frame: &Frame| (frame.configuration, frame.requester, frame.scope);
+        let of = |frame: &Frame| (frame.configuration, frame.requester);
         let like = of(from.stack.frame(frame)?);
+        if to.stack.frame(frame).is_some_and(|frame| of(frame) == like) {
+            return Some(frame);
+        }
         let alike = |stack: &Stack| -> Vec<FrameId> {
             stack.frames().iter().filter(|frame| of(frame) == like).map(|frame| frame.id).collect()
         };
