@@ -284,9 +284,12 @@ impl Product<'_> {
         let comes = self.worlds.comes(planned, requests, &beside);
         let end =
             |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
-        // What was decided of those behind took the first for done: they are taken up anew.
+        // What was decided of those behind took the first for done.
         let first = comes.parts.first().map_or(usize::MAX, |part| part.place);
-        let mut given: Given = comes.told.iter().copied().filter(|(place, _)| *place < first).collect();
+        let told = |(place, verdict): (usize, Option<Verdict>)| {
+            (place, verdict.map(|verdict| if place < first { verdict } else { requests[place].ask.failed() }))
+        };
+        let mut given: Given = comes.told.iter().copied().map(told).collect();
         given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
         given.sort_by_key(|(place, _)| *place);
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.

@@ -125,8 +125,9 @@ impl Engine {
         match purpose {
             Purpose::Requests(number, group) => {
                 let planned = machine.planned().clone();
+                let interrupted = machine.interrupted();
                 let end = machine.end();
-                self.book(number, group, end.parts, Some((&planned, &stood)));
+                self.book(number, group, end.parts, Some((&planned, &stood, interrupted)));
                 self.take_up(number);
             }
             Purpose::Safe(safe) => {
@@ -137,7 +138,13 @@ impl Engine {
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<(&Planned, &[(usize, u64)])>) {
+    fn book(
+        &mut self,
+        number: u32,
+        group: Group,
+        parts: Vec<PartEnd>,
+        planned: Option<(&Planned, &[(usize, u64)], Option<Reason>)>,
+    ) {
         let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
@@ -147,19 +154,21 @@ impl Engine {
         // All at once: one may pop what another one of them pushes.
         let done = (0..parts.len()).filter(|part| matches!(parts[*part], PartEnd::Done));
         let mut edits = SmallVec::<[_; 2]>::new();
-        if let Some((planned, _)) = planned {
+        if let Some((planned, ..)) = &planned {
             edits.extend(done.map(|part| &planned.parts[part].edits));
         }
         let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
         // What was decided of those behind one that failed took that for done: they are taken up anew.
         let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
-        if let Some(part) = failed.filter(|part| !was_taken_down(&parts[*part])) {
+        let interrupted = planned.as_ref().and_then(|(.., reason)| reason.clone());
+        if let Some(part) = failed.filter(|part| interrupted.is_none() && !was_taken_down(&parts[*part])) {
             end = group.places[part] + 1;
         }
+        let first = failed.map_or(usize::MAX, |part| group.places[part]);
         for (part, ended) in parts.into_iter().enumerate() {
             let place = group.places[part];
             let request = requests[place];
-            let Some((planned, stood)) = planned else { break };
+            let Some((planned, stood, _)) = &planned else { break };
             let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
             if !matches!(ended, PartEnd::Done) {
                 self.forget_conditions(stood);
@@ -193,8 +202,17 @@ impl Engine {
         if group.commits {
             answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), None)));
         }
-        let told = group.told.into_iter().filter(|told| told.place < end);
-        answers.extend(told.map(|told| (told.place, told.verdict, told.reason)));
+        for told in group.told.into_iter().filter(|told| told.place < end) {
+            match &interrupted {
+                // Interrupted with the others, whatever it would have come to after them.
+                Some(reason) if told.place > first && told.verdict.is_some() => {
+                    let request = &requests[told.place];
+                    self.world.stays(request);
+                    answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
+                }
+                _ => answers.push((told.place, told.verdict, told.reason)),
+            }
+        }
         answers.sort_by_key(|(place, ..)| *place);
         self.forget_confirmations();
         self.changed();

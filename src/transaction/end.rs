@@ -72,6 +72,11 @@ impl Transaction {
         can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()
     }
 
+    /// That a safe configuration interrupted it, if one did.
+    pub fn interrupted(&self) -> Option<Reason> {
+        self.stopped_by.clone().filter(|_| self.interrupted)
+    }
+
     /// Why it did not simply succeed.
     fn reason(&self) -> Reason {
         let forward = self.forward.as_ref().expect("it was carried out");
@@ -277,7 +282,8 @@ impl Transaction {
 
     /// The end of a part of which nothing is left.
     fn taken_back_whole(&self, at: usize) -> PartEnd {
-        match self.given_up.contains(&at) && matches!(self.stopped_by, Some(Reason::GivenUp)) {
+        let stopped = matches!(self.stopped_by, Some(Reason::GivenUp | Reason::Interrupted(_)));
+        match self.given_up.contains(&at) && stopped {
             true => PartEnd::Cancelled,
             false => PartEnd::Failed(self.reason()),
         }

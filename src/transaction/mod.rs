@@ -270,7 +270,7 @@ impl Transaction {
                 }
             }
             Input::Interrupt(by) => {
-                self.stopped_by.get_or_insert(Reason::Interrupted(by));
+                self.stopped_by = Some(Reason::Interrupted(by));
                 self.interrupted = true;
                 self.asked_back = false;
                 self.held = true;

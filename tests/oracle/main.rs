@@ -12,6 +12,7 @@
 mod classes;
 mod drive;
 mod generate;
+mod laws;
 
 use classes::{CLASSES, Classes};
 use generate::Chance;
