@@ -3,6 +3,7 @@
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
+use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
@@ -61,6 +62,9 @@ impl Product<'_> {
         state.due.iter_mut().for_each(|(request, _)| gone(request));
         state.due.retain(|(request, _)| self.tells_all || request.tag.0 != 0);
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
+        if self.tells_all && self.members.len() > 1 {
+            state.telling.retain(|(request, _)| request.tag.0 != 0);
+        }
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
         for (_, stop) in &mut state.stopped {
@@ -125,15 +129,20 @@ impl Product<'_> {
             let among = |turn: &Turn| {
                 let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
-                stops.contains(&turn.number) && (turn.batch.requests.len() > 1 || twice)
+                stops.contains(&turn.number) && (self.tells_all || turn.batch.requests.len() > 1 || twice)
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 // Any of them, but no more than a few at once.
                 for some in 1..1u32 << stops.len().min(3) {
-                    let mut waits = state.clone();
-                    let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
-                    those.rev().for_each(|(_, number)| waits.desk.put_back(*number));
-                    states.push(self.take_in(waits, batch.clone()));
+                    // Where others wait, it may have come before or after them.
+                    for last in
+                        [false, true].into_iter().take(if self.tells_all && state.desk.len() > 0 { 2 } else { 1 })
+                    {
+                        let mut waits = state.clone();
+                        let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
+                        those.rev().for_each(|(_, number)| waits.desk.put_back(*number, last));
+                        states.push(self.take_in(waits, batch.clone()));
+                    }
                 }
             }
         }
@@ -158,7 +167,11 @@ impl Product<'_> {
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         for (request, verdict, _) in &arrival.told {
             self.owed(&mut state, request);
-            state.stayed |= *verdict == Verdict::UndoFailed;
+            if *verdict == Verdict::UndoFailed {
+                state.stayed = true;
+                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request));
+                self.go(&mut state, &went);
+            }
             self.due(&mut state, *request, *verdict);
         }
         for (number, undo) in arrival.given_up {
@@ -176,7 +189,6 @@ impl Product<'_> {
         for request in arrival.safe {
             self.owed(&mut state, &request);
             state.safe.push(request);
-            state.crowded = state.safe.len() > 1;
         }
         self.begin(&mut state);
         state
@@ -198,7 +210,15 @@ impl Product<'_> {
         let planned = planned.unwrap_or(state.world);
         let begun = match self.worlds.top(planned) {
             Some(_) => place == 0,
-            None => self.worlds.comes(planned, &requests).parts.iter().any(|part| part.place == place),
+            None => {
+                let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+                let comes = self.worlds.comes(planned, &requests, &beside);
+                // What was begun as one stays so, whatever of it is answered now.
+                if comes.takes > 1 && !beside.joined {
+                    state.joined.push(number);
+                }
+                comes.parts.iter().any(|part| part.place == place)
+            }
         };
         if begun {
             state.stopped.push((number, Stop::GivenUp(undo)));
@@ -295,7 +315,7 @@ impl Product<'_> {
     /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
     /// its turn.
     pub(super) fn confirm(&self, state: &mut State, name: EventName) {
-        if !state.desk.is_empty() {
+        if !state.desk.is_empty() && !self.tells_all {
             return;
         }
         state.unconfirmed.retain(|waits| match waits.request.ask {
@@ -311,6 +331,16 @@ impl Product<'_> {
         self.begin(&mut state);
         // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
         state.telling.extend(answers.iter().copied());
+        if self.tells_all && self.members.len() > 1 {
+            // Each hears it in its own time: what another one asks for meanwhile may come first.
+            state.telling.retain(|(request, _)| request.tag.0 != 0);
+            let states = if state.flight.is_empty() { SmallVec::from_iter([state]) } else { self.lands(state) };
+            for state in states {
+                let state = self.settle(state);
+                nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
+            }
+            return;
+        }
         // What is in flight may come between what begins now and what is heard now.
         let mut states = if state.flight.is_empty() { vec![state] } else { self.lands(state).into_vec() };
         for _ in 0..answers.len() {

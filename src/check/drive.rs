@@ -8,6 +8,7 @@ use super::beside;
 use super::members::Member;
 use super::product::Product;
 use super::state::{Move, Next, State};
+use super::world::Held;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
@@ -95,16 +96,16 @@ impl Product<'_> {
     /// What happens next by itself when every request is answered *ok*; none: nothing does, or it is refused.
     fn by_itself(&mut self, state: &State) -> Result<Option<Next>, (Request, Findings)> {
         if let Some(turn) = state.desk.under_way().first().filter(|_| state.safe.is_empty() && state.due.is_empty()) {
-            let requests = turn.batch.requests.clone();
+            let (number, requests) = (turn.number, turn.batch.requests.clone());
             if self.worlds.get(state.world).is_some() {
-                let comes = self.comes(state, &requests);
+                let comes = self.comes(state, number, &requests);
                 if let Some((place, reasons)) = comes.refused.first() {
                     return Err((requests[*place], reasons.to_vec()));
                 }
             }
         }
         if let Some(request) = state.safe.first().copied()
-            && let reasons = self.worlds.safe(state.world, &request).troubles.clone()
+            && let reasons = self.worlds.safe(state.world, &request, &Held::new()).troubles.clone()
             && !reasons.is_empty()
         {
             return Err((request, reasons.to_vec()));

@@ -2,10 +2,21 @@
 
 use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
-use super::world::{Comes, Top, Went, WorldId};
+use super::world::{Beside, Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
 use crate::stack::{Request, Requester, Why, given_up_of};
 use smallvec::SmallVec;
+
+/// A request as it is answered: what takes back what was not confirmed tells of that.
+fn as_told(request: Request, verdict: Verdict) -> (Request, Verdict) {
+    match (request.why, verdict, request.ask) {
+        (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
+            (Request { ask: Ask::Apply(id), why: Why::Asked, ..request }, Verdict::Reverted)
+        }
+        (Why::Unconfirmed(..), ..) => (Request { why: Why::Asked, ..request }, verdict),
+        _ => (request, verdict),
+    }
+}
 
 /// Requests of a batch that are answered: place and verdict; none: nobody is told.
 type Given = SmallVec<[(usize, Option<Verdict>); 2]>;
@@ -22,7 +33,7 @@ impl Product<'_> {
         if let Some(top) = self.worlds.top(state.world) {
             return self.ends_somehow(state, number, top, &requests, nexts);
         }
-        let comes = self.comes(state, &requests);
+        let comes = self.comes(state, number, &requests);
         for (place, reasons) in &comes.refused {
             if requests[*place].requester != Requester::Operator {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
@@ -43,6 +54,37 @@ impl Product<'_> {
             self.ended(state, number, &requests, failed, went, class, nexts);
             broken.push((part.place, Some(ask.broken())));
             self.broke(state, number, &requests, broken, nexts);
+            self.missing(state, number, &requests, &comes, k, &[ask.failed(), ask.broken()], nexts);
+        }
+    }
+
+    /// What stands before a part that ends so was to stand, and cannot be finished: it is broken too.
+    #[allow(clippy::too_many_arguments)]
+    fn missing(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        k: usize,
+        verdicts: &[Verdict],
+        nexts: &mut Nexts,
+    ) {
+        // Nothing is known after either; only whoever compares answers minds which ones it were.
+        for some in 1..1u32 << if self.tells_all { k.min(4) } else { 0 } {
+            let is_broken = |part: usize| some & (1 << part) != 0;
+            let first = comes.parts[some.trailing_zeros() as usize].place;
+            let mut given: Given = comes.told.iter().copied().filter(|(told, _)| *told < first).collect();
+            for (at, part) in comes.parts[..k].iter().enumerate() {
+                let ask = requests[part.place].ask;
+                given.push((part.place, Some(if is_broken(at) { ask.broken() } else { ask.done() })));
+            }
+            for verdict in verdicts {
+                let mut given = given.clone();
+                given.push((comes.parts[k].place, Some(*verdict)));
+                given.sort_by_key(|(place, _)| *place);
+                self.broke(state, number, requests, given, nexts);
+            }
         }
     }
 
@@ -95,6 +137,7 @@ impl Product<'_> {
             }
             !over
         });
+        next.joined.retain(|of| *of != number);
         // From the last on, so that places stay.
         for (place, _) in given.iter().rev() {
             next.desk.answered(number, *place);
@@ -104,7 +147,7 @@ impl Product<'_> {
         for (place, verdict) in &given {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
-            answers.push((request, verdict));
+            answers.push(as_told(request, verdict));
             let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
@@ -118,7 +161,10 @@ impl Product<'_> {
             }
         }
         // What was given up together with one before it is not taken up anew.
-        if next.desk.under_way().iter().any(|turn| turn.number == number) {
+        let left = Self::requests(&next, number);
+        if !left.is_empty() {
+            // In the order of the batch.
+            given_up.sort_by_key(|undo| given_up_of(undo, &left));
             given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
         }
         for undo in late.into_iter().rev() {
@@ -160,11 +206,11 @@ impl Product<'_> {
             }
         }
         if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
-            self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
-            if !late.is_empty() {
-                // What came at the same moment may have been told first.
-                given_up.append(&mut late);
-                self.interrupted_ends(state, number, &requests, planned, &given_up, nexts);
+            // What came at the same moment may have been told first; and what came when it was on its way back, too late.
+            let some = if self.tells_all { 0 } else { given_up.len() };
+            given_up.append(&mut late);
+            for count in some..=given_up.len() {
+                self.interrupted_ends(state, number, &requests, planned, &given_up[..count], nexts);
             }
             return;
         }
@@ -182,22 +228,44 @@ impl Product<'_> {
             }
             return;
         }
-        let comes = self.comes(state, &requests);
-        let Some(k) = comes.parts.iter().position(|part| given_up.contains(&part.place)) else {
-            // It is refused by now, or was.
-            return self.ends(state, number, nexts);
-        };
+        let comes = self.comes(state, number, &requests);
+        let first = |given_up: &[usize]| comes.parts.iter().position(|part| given_up.contains(&part.place));
+        // It may be refused by now, or have been; or it was on its way back, or through, when that came.
+        if self.tells_all || first(&given_up).is_none() {
+            self.ends(state, number, nexts);
+        }
+        // What came when it was on its way back already came too late.
+        let some = if self.tells_all { 1 } else { given_up.len().max(1) };
+        let mut met: SmallVec<[usize; 2]> = SmallVec::new();
+        for count in some..=given_up.len() {
+            let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
+            met.push(k);
+            self.given_up_ends(state, number, &requests, &comes, k, nexts);
+        }
+    }
+
+    /// How a batch under way may end of which that part was given up.
+    fn given_up_ends(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        k: usize,
+        nexts: &mut Nexts,
+    ) {
         let part = &comes.parts[k];
-        let mut cancelled = Self::done_before(&requests, &comes, k, part.place);
+        let mut cancelled = Self::done_before(requests, comes, k, part.place);
         let mut broken = cancelled.clone();
         cancelled.push((part.place, Some(Verdict::Cancelled)));
-        self.ended(state, number, &requests, cancelled, &part.before, Failed::Nothing, nexts);
+        self.ended(state, number, requests, cancelled, &part.before, Failed::Nothing, nexts);
         // The last of it may have been done when that came.
-        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
-        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
+        let done = Self::done_before(requests, comes, comes.parts.len(), comes.takes);
+        self.ended(state, number, requests, done, &comes.done, Failed::Nothing, nexts);
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
-            self.broke(state, number, &requests, broken, nexts);
+            self.broke(state, number, requests, broken, nexts);
+            self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
         }
     }
 
@@ -212,32 +280,47 @@ impl Product<'_> {
         given_up: &[usize],
         nexts: &mut Nexts,
     ) {
-        let comes = self.worlds.comes(planned, requests);
-        self.entangled |= !given_up.is_empty() && comes.parts.len() > 1;
+        let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+        let comes = self.worlds.comes(planned, requests, &beside);
         let end =
             |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
-        let mut given: Given = comes.told.clone();
+        // What was decided of those behind took the first for done.
+        let first = comes.parts.first().map_or(usize::MAX, |part| part.place);
+        let told = |(place, verdict): (usize, Option<Verdict>)| {
+            (place, verdict.map(|verdict| if place < first { verdict } else { requests[place].ask.failed() }))
+        };
+        let mut given: Given = comes.told.iter().copied().map(told).collect();
         given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
         given.sort_by_key(|(place, _)| *place);
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
         let undo = comes.parts.iter().any(|part| part.undo);
         let class = if undo { Failed::Undo } else { Failed::Nothing };
-        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| requests[part.place]);
+        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| part.place);
+        let refused =
+            given.iter().filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed)).map(|(place, _)| *place);
+        let mut undone: SmallVec<[usize; 2]> = undone.chain(refused).collect();
+        undone.sort_unstable();
+        undone.dedup();
+        let undone = undone.into_iter().map(|place| requests[place]);
         let world = self.worlds.stay(state.world, planned, undone);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
-        if let Some(part) = comes.parts.first().filter(|_| comes.parts.iter().any(|part| part.failed.is_some())) {
+        let can: SmallVec<[usize; 2]> =
+            comes.parts.iter().filter(|part| part.failed.is_some()).map(|part| part.place).collect();
+        // Of each part something may be left; only whoever compares answers minds of which.
+        let all = if self.tells_all { (1u32 << can.len().min(5)) - 1 } else { u32::from(!can.is_empty()) };
+        for some in 1..=all {
+            let left = |place: usize| can.iter().position(|of| *of == place).is_some_and(|at| some & (1 << at) != 0);
             let broken = |(place, verdict): (usize, Option<Verdict>)| {
-                (place, if place == part.place { Some(requests[place].ask.broken()) } else { verdict })
+                (place, if left(place) { Some(requests[place].ask.broken()) } else { verdict })
             };
-            self.broke(state, number, requests, given.into_iter().map(broken).collect(), nexts);
+            self.broke(state, number, requests, given.iter().copied().map(broken).collect(), nexts);
         }
     }
 
     /// How a safe configuration may end.
-    pub(super) fn safe_ends(&mut self, state: &State, request: &Request, nexts: &mut Nexts) {
+    pub(super) fn safe_ends(&mut self, state: &State, at: usize, nexts: &mut Nexts) {
         let mut over = state.clone();
-        over.safe.remove(0);
-        over.crowded &= !over.safe.is_empty();
+        let request = &over.safe.remove(at);
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
@@ -246,7 +329,8 @@ impl Product<'_> {
             }
             return;
         }
-        let comes = self.worlds.safe(state.world, request);
+        let beside = self.beside(state, None);
+        let comes = self.worlds.safe(state.world, request, &beside.held);
         let from = nexts.all.len();
         if !comes.troubles.is_empty() && request.requester != Requester::Operator {
             nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
@@ -264,7 +348,7 @@ impl Product<'_> {
         // What is under way may have made or changed what it finds, and goes on while it is applied.
         let claim = self.worlds.claims.of([request]);
         let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
-        if comes.may_fail || meets || state.crowded {
+        if comes.may_fail || meets {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));

@@ -173,10 +173,9 @@ impl<'a> Follower<'a> {
         self.told(rest.iter())
     }
 
-    /// Whether something came together of which not all is followed: more on its way between coordinators than that, or a
-    /// safe configuration and an undo that both stop one of several requests that are carried out as one.
+    /// Whether more was on its way between coordinators than is followed.
     pub fn overflowed(&self) -> bool {
-        self.product.overflow || self.product.entangled
+        self.product.overflow
     }
 
     /// All states in which it may be without anything further being seen, and those that the next answer would lead to.
@@ -196,7 +195,7 @@ impl<'a> Follower<'a> {
         }
         while let Some(state) = open.pop() {
             let mut nexts = self.product.goes_on(&state);
-            if state.flight.is_empty() && state.inbox.is_empty() {
+            if state.flight.is_empty() && state.inbox.is_empty() && state.telling.is_empty() {
                 self.product.notices(&state, &mut nexts);
             }
             for next in nexts.all {
@@ -236,8 +235,6 @@ impl<'a> Follower<'a> {
     /// The components that what is under way may be changing just now; none: any.
     fn busy(&self, state: &State) -> Option<BTreeSet<ComponentName>> {
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests).chain(&state.safe);
-        // What was not confirmed may be on its way back.
-        let under_way = under_way.chain(state.unconfirmed.iter().map(|waits| &waits.request));
         let mut busy = BTreeSet::new();
         for request in under_way {
             let (Ask::Apply(id) | Ask::UndoOf(id)) = request.ask else { return None };
@@ -280,7 +277,7 @@ impl<'a> Follower<'a> {
 
 /// Whether nothing is on its way: what is there stays until something comes from outside, or something under way ends.
 fn is_quiet(state: &State) -> bool {
-    state.inbox.is_empty() && state.flight.is_empty() && state.due.is_empty()
+    state.inbox.is_empty() && state.flight.is_empty() && state.due.is_empty() && state.telling.is_empty()
 }
 
 fn sorted(list: &[String]) -> Vec<String> {

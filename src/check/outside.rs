@@ -118,7 +118,15 @@ impl Product<'_> {
         let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
         let mut left = state.clone();
         left.unconfirmed.remove(at);
-        let comes = self.worlds.comes(state.world, &[request]);
+        if self.tells_all {
+            // It is a request like others, and takes its time.
+            let _ = left.desk.arrive(Batch::one(request), |_| false, &self.worlds.claims);
+            self.begin(&mut left);
+            nexts.all.push(Next::plain(Move::Confirmed(id), left, Failed::Nothing));
+            return;
+        }
+        let beside = self.beside(&left, None);
+        let comes = self.worlds.comes(state.world, &[request], &beside);
         let stays = Answers::from_iter([(Request { why: Why::Asked, ..request }, Verdict::UndoFailed)]);
         if !comes.refused.is_empty() {
             let told = Request { why: Why::Asked, ..request };

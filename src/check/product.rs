@@ -13,11 +13,11 @@
 use super::coordinator::outside_events;
 use super::members::{Member, hears_loss, members};
 use super::reactions::Asked;
-use super::state::{Failed, Move, Next, Nexts, State, index};
-use super::world::{Comes, EMPTY, Went, Worlds};
+use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
+use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
 use crate::limits;
-use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId};
-use crate::stack::{Desk, Request, Requester};
+use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId, Verdict};
+use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
@@ -41,9 +41,6 @@ pub struct Product<'a> {
     pub overflow: bool,
     /// One step asks for more than is followed, or may meet in more ways what is under way.
     pub forked: bool,
-    /// What was given up was interrupted as well, while others of its batch were carried out with it: which of them stand
-    /// then is not followed exactly.
-    pub entangled: bool,
     /// Whether it is followed what comes where a batch under way may not have begun, or be over already, when it is stopped.
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
@@ -89,7 +86,6 @@ impl<'a> Product<'a> {
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
             forked: false,
-            entangled: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
             losable,
@@ -111,8 +107,8 @@ impl<'a> Product<'a> {
             world: EMPTY,
             desk: Desk::default(),
             stopped: SmallVec::new(),
+            joined: SmallVec::new(),
             safe: SmallVec::new(),
-            crowded: false,
             due: SmallVec::new(),
             telling: SmallVec::new(),
             stayed: false,
@@ -156,6 +152,15 @@ impl<'a> Product<'a> {
         }
         for number in 0..self.members.len() {
             let own = index(number);
+            // Answers go first.
+            let mine = |(request, _): &(Request, Verdict)| self.member(request.requester) == Some(number);
+            if let Some(at) = state.telling.iter().position(mine) {
+                let mut next = state.clone();
+                let (request, verdict) = next.telling.remove(at);
+                let event = self.members[number].chart.event(verdict.event(request.ask));
+                self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
+                continue;
+            }
             let Some(at) = state.inbox.iter().position(|(to, _)| *to == own) else { continue };
             let mut next = state.clone();
             let (_, event) = next.inbox.remove(at);
@@ -173,8 +178,12 @@ impl<'a> Product<'a> {
                 self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
             }
         }
-        if let Some(request) = state.safe.first().copied() {
-            self.safe_ends(state, &request, nexts);
+        // Those that have nothing to do with each other end in any order.
+        for (at, request) in state.safe.iter().enumerate() {
+            let claim = self.worlds.claims.of([request]);
+            if state.safe[..at].iter().all(|before| !self.worlds.claims.of([before]).meets(&claim)) {
+                self.safe_ends(state, at, nexts);
+            }
         }
     }
 
@@ -206,7 +215,17 @@ impl<'a> Product<'a> {
 
     /// Takes over a world.
     pub(super) fn go(&self, state: &mut State, went: &Went) {
-        state.world = went.world;
+        let from = std::mem::replace(&mut state.world, went.world);
+        if let Some(places) = &went.places {
+            // Frames have the numbers of their world.
+            for request in state.desk.requests_mut() {
+                if let Why::Unconfirmed(frame, event, within) = request.why {
+                    let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
+                    let frame = place.and_then(|place| self.worlds.frame(went.world, place));
+                    request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)), event, within);
+                }
+            }
+        }
         if let Some(places) = &went.places {
             state.unconfirmed.retain(|waits| match places.get(usize::from(waits.place)).copied().flatten() {
                 Some(place) => {
@@ -219,8 +238,28 @@ impl<'a> Product<'a> {
     }
 
     /// What `requests` come to in the state's world.
-    pub fn comes(&mut self, state: &State, requests: &[Request]) -> Rc<Comes> {
-        self.worlds.comes(state.world, requests)
+    pub fn comes(&mut self, state: &State, number: u32, requests: &[Request]) -> Rc<Comes> {
+        let beside = self.beside(state, Some(number));
+        self.worlds.comes(state.world, requests, &beside)
+    }
+
+    /// What stands beside a batch under way (none: beside what does not wait) in the state's world.
+    pub(super) fn beside(&mut self, state: &State, number: Option<u32>) -> Beside {
+        let joined = |number: u32| state.joined.contains(&number);
+        let mut held = Held::new();
+        for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
+            let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+                Stop::Interrupted(planned) if *of == turn.number => Some(*planned),
+                _ => None,
+            });
+            let planned = planned.unwrap_or(state.world);
+            let own = self.worlds.held_by(planned, &turn.batch.requests, joined(turn.number));
+            held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
+        }
+        held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
+        held.sort_unstable();
+        held.dedup();
+        Beside { held, joined: number.is_some_and(joined) }
     }
 
     /// Whether all of them are down, with nothing left to be answered or heard.

@@ -7,6 +7,7 @@
 
 use super::product::Product;
 use super::state::{Move, Next, State};
+use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
 use crate::stack::Request;
@@ -150,7 +151,7 @@ impl Product<'_> {
                     answered(next, &requests) || !under_way(&next.state).iter().any(|other| same(other, &requests))
                 };
                 let over = way[k + 1..].iter().position(|(_, next)| gone(next)).map(|after| k + 1 + after);
-                let group = self.worlds.group(next.state.world, &requests);
+                let group = self.worlds.group(next.state.world, &requests, &Beside::default());
                 let idle = group.is_some_and(|group| group.planned.is_none_or(|planned| planned.steps.is_empty()));
                 // As they are when they are answered: whoever asked may have left the state that hears it.
                 let requests = over.map_or(requests.clone(), |at| {
@@ -171,7 +172,7 @@ impl Product<'_> {
         takes: Duration,
     ) -> Vec<(String, FaultKind, Duration)> {
         let mut arms = Vec::new();
-        let Some(group) = self.worlds.group(state.world, requests) else { return arms };
+        let Some(group) = self.worlds.group(state.world, requests, &Beside::default()) else { return arms };
         let Some(planned) = &group.planned else { return arms };
         let text = |at: usize| pattern(&planned.steps[at].step);
         if let Some(first) = planned.steps.first()

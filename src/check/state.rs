@@ -50,13 +50,13 @@ pub struct State {
     pub desk: Desk,
     /// Batches under way that are stopped, by their numbers.
     pub stopped: SmallVec<[(u32, Stop); 1]>,
+    /// Batches under way that were begun as one, of which some requests were answered since.
+    pub joined: SmallVec<[u32; 1]>,
     /// Safe configurations that are being applied, in their order.
     pub safe: SmallVec<[Request; 1]>,
-    /// Several of them are, or were just now: one may meet with steps of another.
-    pub crowded: bool,
     /// Answers on their way.
     pub due: SmallVec<[(Request, Verdict); 1]>,
-    /// Answers that are being given; none in a state between moves.
+    /// Answers that are given and not heard yet; where coordinators hear them at once, none in a state between moves.
     pub telling: SmallVec<[(Request, Verdict); 2]>,
     /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
     pub stayed: bool,
@@ -106,6 +106,7 @@ impl State {
         self.desk.is_empty()
             && self.safe.is_empty()
             && self.due.is_empty()
+            && self.telling.is_empty()
             && self.inbox.is_empty()
             && self.flight.is_empty()
     }

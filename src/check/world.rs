@@ -14,7 +14,7 @@ use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Fi
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
-    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, take_up,
+    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, held, take_up,
 };
 use crate::system::{System, View, step};
 use crate::time::Time;
@@ -95,6 +95,18 @@ pub struct Comes {
     pub takes: usize,
 }
 
+/// Frames that must stay as they are.
+pub type Held = SmallVec<[FrameId; 2]>;
+
+/// What is under way beside a batch, as far as the batch minds it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Beside {
+    /// Frames that others pop or hand over to, or that wait for their confirmation.
+    pub held: Held,
+    /// The batch was begun as one, and some of it were answered since.
+    pub joined: bool,
+}
+
 /// What a safe configuration comes to.
 #[derive(Debug, Clone)]
 pub struct SafeComes {
@@ -118,12 +130,18 @@ pub struct Worlds<'a> {
     confirms: bool,
     worlds: Vec<Known>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>), Rc<Comes>>,
-    safes: FxHashMap<(WorldId, Request), Rc<SafeComes>>,
+    comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
+    safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
+    helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
     asked: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
     warned: FxHashSet<(Code, String)>,
+}
+
+/// Requests without what means nothing to what they come to.
+fn plain(requests: &[Request]) -> SmallVec<[Request; 2]> {
+    requests.iter().map(|request| Request { tag: (0, 0), ..*request }).collect()
 }
 
 /// The context in which a deployment's configurations are planned.
@@ -145,6 +163,7 @@ impl<'a> Worlds<'a> {
             index: FxHashMap::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
+            helds: FxHashMap::default(),
             asked: FxHashSet::default(),
             warnings: Vec::new(),
             warned: FxHashSet::default(),
@@ -225,27 +244,64 @@ impl<'a> Worlds<'a> {
     }
 
     /// What the rest of a batch comes to in a world that is known.
-    pub fn comes(&mut self, id: WorldId, requests: &[Request]) -> Rc<Comes> {
-        let plain: SmallVec<[Request; 2]> = requests.iter().map(|r| Request { tag: (0, 0), ..*r }).collect();
-        let key = (id, plain);
+    pub fn comes(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Rc<Comes> {
+        let key = (id, plain(requests), beside.clone());
         if let Some(known) = self.comes.get(&key) {
             return known.clone();
         }
-        let comes = Rc::new(self.work_out(id, &key.1));
+        let comes = Rc::new(self.work_out(id, &key.1, beside));
         self.comes.insert(key, comes.clone());
         comes
     }
 
     /// The first requests of a batch, as the stack decides.
-    pub fn group(&self, id: WorldId, requests: &[Request]) -> Option<Group> {
-        let rules =
-            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
+    pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
+        let rules = Rules { held: &beside.held, joined: beside.joined, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 
-    fn work_out(&mut self, id: WorldId, requests: &[Request]) -> Comes {
+    fn rules(&self) -> Rules<'_> {
+        Rules {
+            configurations: &self.configurations,
+            context: &self.context,
+            at: Time::default(),
+            busy: false,
+            held: &[],
+            joined: false,
+        }
+    }
+
+    /// The frames that a batch under way pops or hands over to.
+    pub fn held_by(&mut self, id: WorldId, requests: &[Request], joined: bool) -> Held {
+        let key = (id, plain(requests), joined);
+        if let Some(known) = self.helds.get(&key) {
+            return known.clone();
+        }
+        let group = self.group(id, &key.1, &Beside { joined, ..Beside::default() });
+        let planned = group.and_then(|group| group.planned);
+        let held: Held = planned.iter().flat_map(held).collect();
+        self.helds.insert(key, held.clone());
+        held
+    }
+
+    /// A frame of the world `from` in the world `to`, in which it lies below others.
+    pub fn below(&self, from: WorldId, to: WorldId, frame: FrameId) -> Option<FrameId> {
+        let (from, to) = (self.get(from)?, self.get(to)?);
+        let of = |frame: &Frame| (frame.configuration, frame.requester);
+        let like = of(from.stack.frame(frame)?);
+        if to.stack.frame(frame).is_some_and(|frame| of(frame) == like) {
+            return Some(frame);
+        }
+        let alike = |stack: &Stack| -> Vec<FrameId> {
+            stack.frames().iter().filter(|frame| of(frame) == like).map(|frame| frame.id).collect()
+        };
+        let place = alike(&from.stack).iter().position(|id| *id == frame)?;
+        alike(&to.stack).get(place).copied()
+    }
+
+    fn work_out(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Comes {
         self.asked.extend(requests.iter().filter_map(|r| if let Ask::Apply(id) = r.ask { Some(id) } else { None }));
-        let group = self.group(id, requests).unwrap_or_default();
+        let group = self.group(id, requests, beside).unwrap_or_default();
         let refused = group.told.iter().filter_map(|told| {
             let reasons = match told.reason.as_ref()? {
                 Reason::Overtaken | Reason::GivenUp | Reason::SafeCame(_) => return None,
@@ -260,7 +316,14 @@ impl<'a> Worlds<'a> {
             done: Went::to(id),
             takes: group.takes.max(1),
         };
-        let Some(planned) = group.planned else { return comes };
+        let refused = |before: usize| -> Held {
+            group.stay.iter().filter(|(place, _)| *place < before).map(|(_, frame)| *frame).collect()
+        };
+        let Some(planned) = group.planned else {
+            comes.done = self.unscoped(id, &refused(comes.takes));
+            return comes;
+        };
+        let held = &beside.held;
         for warning in &planned.warnings {
             if self.warned.insert((warning.code, warning.message.clone())) {
                 self.warnings.push(warning.clone());
@@ -273,21 +336,28 @@ impl<'a> Worlds<'a> {
         for (k, part) in planned.parts.iter().enumerate() {
             let place = group.places[k];
             let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
-            let before = if k == 0 { comes.done.clone() } else { self.after(id, &planned, k, &[]) };
+            let mut stay = refused(place);
+            let before = self.after(id, &planned, k, &stay, held);
             let request = &requests[place];
             let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
             let failed = (may_fail[k] || holds).then(|| match stays {
-                Some(frame) => self.after(id, &planned, k, &[frame.id]),
+                Some(frame) => {
+                    stay.push(frame.id);
+                    self.after(id, &planned, k, &stay, held)
+                }
                 None => before.clone(),
             });
             comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
         }
-        comes.done = self.after(id, &planned, planned.parts.len(), &[]);
+        comes.done = self.after(id, &planned, planned.parts.len(), &refused(comes.takes), held);
         comes
     }
 
     /// The world after the first `parts` of a plan. `stay`: frames that were to be undone with the state they belonged to.
-    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stay: &[FrameId]) -> Went {
+    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stay: &[FrameId], held: &[FrameId]) -> Went {
+        if parts == 0 {
+            return self.unscoped(id, stay);
+        }
         let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
         let mut world = before.clone();
         if parts == planned.parts.len() {
@@ -297,7 +367,7 @@ impl<'a> Worlds<'a> {
             planned.whole()[..steps].iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
         }
         let edits = planned.parts[..parts].iter().map(|part| &part.edits);
-        let pushed = world.stack.apply(edits, &[]);
+        let pushed = world.stack.apply(edits, held);
         stay.iter().for_each(|frame| world.stack.unscope(*frame));
         self.went(id, world, &pushed)
     }
@@ -316,17 +386,20 @@ impl<'a> Worlds<'a> {
             let count = planned.stack.frames().iter().filter(fits).count();
             stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
         }
-        if stay.is_empty() {
-            return Went::to(id);
-        }
+        self.unscoped(id, &stay)
+    }
+
+    /// The world in which these frames no longer belong to a state.
+    fn unscoped(&mut self, id: WorldId, stay: &[FrameId]) -> Went {
+        let Some(before) = self.get(id).filter(|_| !stay.is_empty()) else { return Went::to(id) };
         let mut world = before.clone();
         stay.iter().for_each(|frame| world.stack.unscope(*frame));
         self.went(id, world, &[])
     }
 
     /// What a safe configuration comes to in a world that is known.
-    pub fn safe(&mut self, id: WorldId, request: &Request) -> Rc<SafeComes> {
-        let key = (id, Request { tag: (0, 0), ..*request });
+    pub fn safe(&mut self, id: WorldId, request: &Request, held: &Held) -> Rc<SafeComes> {
+        let key = (id, Request { tag: (0, 0), ..*request }, held.clone());
         if let Some(known) = self.safes.get(&key) {
             return known.clone();
         }
@@ -338,8 +411,8 @@ impl<'a> Worlds<'a> {
             effort(&before.system, &before.stack, configuration, request, Time::default(), &self.context);
         let mut world = before.clone();
         planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
-        let pops = planned.parts[0].edits.pops.clone();
-        let pushed = world.stack.push_safe(pops, Frame { partial: !troubles.is_empty(), ..frame });
+        let edits = planned.parts[0].edits.clone();
+        let pushed = world.stack.push_safe(edits, Frame { partial: !troubles.is_empty(), ..frame }, held);
         let may_fail = !planned.steps.is_empty();
         let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
         let comes = SafeComes { done: self.went(id, world, &[pushed]), troubles, may_fail };
@@ -368,6 +441,14 @@ impl<'a> Worlds<'a> {
         }
     }
 
+    /// The place of a frame that counts.
+    pub fn place(&self, id: WorldId, frame: FrameId) -> Option<usize> {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => exact.ids.iter().position(|id| *id == frame),
+            Known::Top(_) => None,
+        }
+    }
+
     /// Whether a frame of this configuration by this requester counts.
     pub fn counts(&self, id: ConfigId, by: Requester) -> bool {
         let named = self.shapes.undone.ids.as_ref().is_none_or(|ids| ids.contains(&id));
@@ -376,8 +457,7 @@ impl<'a> Worlds<'a> {
 
     /// Carries out requests that are answered together in a world of the caller's own. False: one is refused.
     pub fn carry_out(&self, world: &mut World, requests: &[Request]) -> bool {
-        let rules =
-            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
+        let rules = self.rules();
         let mut rest = requests;
         while !rest.is_empty() {
             let group = take_up(world, rest, &rules);
@@ -426,15 +506,15 @@ impl<'a> Worlds<'a> {
             stack.push((**frame).clone());
         }
         let alone = World::new(world.system.clone(), stack);
-        let rules =
-            Rules { configurations: &self.configurations, context: &self.context, at: Time::default(), busy: false };
-        let group = take_up(&alone, std::slice::from_ref(request), &rules);
+        let group = take_up(&alone, std::slice::from_ref(request), &self.rules());
         group.told.iter().any(|told| told.reason.is_some())
     }
 
     /// The steps of a group, for who shows them.
     pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
-        self.group(id, requests).and_then(|group| group.planned).map_or_else(Vec::new, |planned| planned.steps)
+        self.group(id, requests, &Beside::default())
+            .and_then(|group| group.planned)
+            .map_or_else(Vec::new, |planned| planned.steps)
     }
 
     fn next(&self) -> WorldId {

@@ -44,7 +44,8 @@ impl Engine {
                 }
             }
             let room = self.has_room(running);
-            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined };
+            let busy = self.busy_before(running);
+            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
             match running.machine.poll(&mut self.world.system, now, &can) {
                 Poll::Over => {
                     running.over = true;
@@ -220,16 +221,21 @@ impl Engine {
                 did |= self.advance(at);
             }
         }
-        // Answers of one moment: of safe configurations first, then in the order in which they began.
-        let over = |running: &&Running| running.over && !matches!(running.purpose, Purpose::Own);
-        let order = |running: &&Running| (!running.is_safe(), running.number);
-        while let Some(number) = self.running.iter().filter(over).min_by_key(order).map(|running| running.number) {
+        while let Some(number) = self.next_over() {
             let Some(at) = self.running.iter().position(|running| running.number == number) else { break };
             let running = self.running.remove(at);
             self.ended(running);
             did = true;
         }
         did
+    }
+
+    /// The next that is over and is answered. Of one moment: safe configurations first, then in the order in which they began.
+    fn next_over(&self) -> Option<u64> {
+        let waits = |running: &Running| self.running.iter().any(|other| running.after.contains(&other.number));
+        let over = self.running.iter().filter(|running| running.over && !matches!(running.purpose, Purpose::Own));
+        let over = over.filter(|running| !waits(running));
+        over.min_by_key(|running| (!running.is_safe(), running.number)).map(|running| running.number)
     }
 
     /// When something that is under way must be looked at again.

@@ -294,6 +294,9 @@ impl Engine {
         let arrival = self.desk.arrive(batch, safe, &self.claims);
         for (request, verdict, reason) in arrival.told {
             self.owe(request);
+            if verdict == Verdict::UndoFailed {
+                self.world.stays(&request);
+            }
             let reason = (verdict != Verdict::Undone).then_some(reason);
             self.answer(request, verdict, reason);
         }

@@ -153,11 +153,11 @@ impl Engine {
         let (edits, frame) = if undoing {
             let top = self.world.stack.top().cloned();
             let pops = top.iter().map(|top| (top.id, crate::stack::HandOver::default())).collect();
-            (Edits { pops, push: None }, top)
+            (Edits { pops, ..Edits::default() }, top)
         } else {
             let frame = crate::stack::switch_frame(switch, request.requester, self.clock.now(), request.scope);
             let frame = Some(std::sync::Arc::new(frame));
-            (Edits { pops: Vec::new(), push: frame.clone() }, frame)
+            (Edits { push: frame.clone(), ..Edits::default() }, frame)
         };
         let mut planned = own_plan(steps, &self.world.system);
         planned.parts[0].edits = edits;

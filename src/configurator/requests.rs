@@ -45,7 +45,15 @@ impl Engine {
             }
             let configurations = self.configurations.clone();
             let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
-            let rules = Rules { configurations: &configurations, context: &self.context, at: self.clock.now(), busy };
+            let held = self.held_frames();
+            let rules = Rules {
+                configurations: &configurations,
+                context: &self.context,
+                at: self.clock.now(),
+                busy,
+                held: &held,
+                joined: false,
+            };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs {
                 if self.repair_for(&requests[0], at) {
@@ -109,7 +117,7 @@ impl Engine {
 
     /// A transaction is over.
     pub(super) fn ended(&mut self, running: Running) {
-        let Running { machine, purpose, asked, stood, .. } = running;
+        let Running { number: own, machine, purpose, asked, stood, .. } = running;
         self.forget_conditions(asked.iter().map(|asked| asked.number));
         if let Some(conditions) = &self.conditions {
             conditions.nudge();
@@ -117,17 +125,26 @@ impl Engine {
         match purpose {
             Purpose::Requests(number, group) => {
                 let planned = machine.planned().clone();
+                let interrupted = machine.interrupted();
                 let end = machine.end();
-                self.book(number, group, end.parts, Some((&planned, &stood)));
+                self.book(number, group, end.parts, Some((&planned, &stood, interrupted)));
                 self.take_up(number);
             }
-            Purpose::Safe(safe) => self.safe_ended(*safe, machine, stood.first().map(|(_, number)| *number)),
+            Purpose::Safe(safe) => {
+                self.safe_ended(own, *safe, machine, stood.first().map(|(_, number)| *number));
+            }
             Purpose::Own => {}
         }
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, planned: Option<(&Planned, &[(usize, u64)])>) {
+    fn book(
+        &mut self,
+        number: u32,
+        group: Group,
+        parts: Vec<PartEnd>,
+        planned: Option<(&Planned, &[(usize, u64)], Option<Reason>)>,
+    ) {
         let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
@@ -137,19 +154,21 @@ impl Engine {
         // All at once: one may pop what another one of them pushes.
         let done = (0..parts.len()).filter(|part| matches!(parts[*part], PartEnd::Done));
         let mut edits = SmallVec::<[_; 2]>::new();
-        if let Some((planned, _)) = planned {
+        if let Some((planned, ..)) = &planned {
             edits.extend(done.map(|part| &planned.parts[part].edits));
         }
         let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
         // What was decided of those behind one that failed took that for done: they are taken up anew.
         let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
-        if let Some(part) = failed.filter(|part| !was_stopped(&parts[*part])) {
+        let interrupted = planned.as_ref().and_then(|(.., reason)| reason.clone());
+        if let Some(part) = failed.filter(|part| interrupted.is_none() && !was_taken_down(&parts[*part])) {
             end = group.places[part] + 1;
         }
+        let first = failed.map_or(usize::MAX, |part| group.places[part]);
         for (part, ended) in parts.into_iter().enumerate() {
             let place = group.places[part];
             let request = requests[place];
-            let Some((planned, stood)) = planned else { break };
+            let Some((planned, stood, _)) = &planned else { break };
             let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
             if !matches!(ended, PartEnd::Done) {
                 self.forget_conditions(stood);
@@ -176,11 +195,24 @@ impl Engine {
                 }
             }
         }
+        // Not carried out, whatever came of the others.
+        for (_, frame) in group.stay.iter().filter(|(place, _)| *place < end) {
+            self.world.stack.unscope(*frame);
+        }
         if group.commits {
             answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), None)));
         }
-        let told = group.told.into_iter().filter(|told| told.place < end);
-        answers.extend(told.map(|told| (told.place, told.verdict, told.reason)));
+        for told in group.told.into_iter().filter(|told| told.place < end) {
+            match &interrupted {
+                // Interrupted with the others, whatever it would have come to after them.
+                Some(reason) if told.place > first && told.verdict.is_some() => {
+                    let request = &requests[told.place];
+                    self.world.stays(request);
+                    answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
+                }
+                _ => answers.push((told.place, told.verdict, told.reason)),
+            }
+        }
         answers.sort_by_key(|(place, ..)| *place);
         self.forget_confirmations();
         self.changed();
@@ -259,12 +291,14 @@ impl Engine {
 
     /// A partial frame lies below those of the safe configurations that interrupted what it is left of.
     fn push_partial(&mut self, frame: Frame) -> FrameId {
-        self.world.stack.push_below_safe(frame)
+        let held = self.held_frames();
+        self.world.stack.push_below_safe(frame, &held)
     }
 
-    /// Frames that those under way pop or hand over to.
+    /// Frames that those under way pop or hand over to, and those that wait for their confirmation.
     pub(super) fn held_frames(&self) -> Vec<FrameId> {
-        self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned())).collect()
+        let under_way = self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned()));
+        under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
     }
 
     /// What is under way is given up by its own undo.
@@ -307,6 +341,8 @@ impl Engine {
             {
                 group.takes -= usize::from(gone < group.takes);
                 group.told.retain(|told| told.place != gone);
+                group.stay.retain(|(place, _)| *place != gone);
+                group.stay.iter_mut().filter(|(place, _)| *place > gone).for_each(|(place, _)| *place -= 1);
                 group.places.iter_mut().filter(|place| **place > gone).for_each(|place| *place -= 1);
                 group.told.iter_mut().filter(|told| told.place > gone).for_each(|told| told.place -= 1);
             }
@@ -382,12 +418,12 @@ impl Engine {
     }
 }
 
-/// Whether a part ended since everything was stopped.
-fn was_stopped(part: &PartEnd) -> bool {
+/// Whether a part ended since everything is taken down.
+fn was_taken_down(part: &PartEnd) -> bool {
     let reason = match part {
         PartEnd::Failed(reason) => reason,
         PartEnd::Broken(broken) => &broken.residual.cause,
         _ => return false,
     };
-    matches!(reason, Reason::Interrupted(_) | Reason::TakenDown)
+    matches!(reason, Reason::TakenDown)
 }

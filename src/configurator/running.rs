@@ -51,6 +51,8 @@ pub(super) struct Running {
     pub asked: Vec<Asked>,
     /// Parts that stand for what they should, with the numbers of their conditions.
     pub stood: Vec<(usize, u64)>,
+    /// Safe configurations that came before and do something about the same components: its end comes after theirs.
+    pub after: SmallVec<[u64; 1]>,
     pub over: bool,
 }
 
@@ -65,6 +67,7 @@ impl Running {
             read: None,
             asked: Vec::new(),
             stood: Vec::new(),
+            after: SmallVec::new(),
             over: false,
         }
     }

@@ -6,12 +6,14 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ConfigId, Target, Verdict};
-use crate::stack::{Effort, Frame, effort};
-use crate::system::{System, View as _, step};
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Step, Target, Verdict};
+use crate::stack::claims::components as components_of;
+use crate::stack::{Effort, Frame, Stack, effort};
+use crate::system::{System, step, touch};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
+use std::borrow::Cow;
 use std::time::Duration;
 
 impl Engine {
@@ -41,23 +43,32 @@ impl Engine {
         let Some(configuration) = configurations.get(&id) else { return };
         let before = self.interrupt(id);
         let at = self.clock.now();
-        let plan = |system: &System| effort(system, &self.world.stack, configuration, &request, at, &self.context);
-        let Effort { planned, frame, troubles } = plan(&self.world.system);
-        // The frame as it would be if what is interrupted had never been.
-        let frame = before.map_or(frame, |before| plan(&before).frame);
+        // What earlier safe ones will have done counts as done; but what both write only this one does.
+        let (earlier, comes_after) = self.earlier_safe(configuration);
+        let plan = |system: &System, stack: &Stack, earlier: &[Step]| {
+            effort(&with(system, earlier), stack, configuration, &request, at, &self.context)
+        };
+        let Effort { mut planned, frame, troubles } = plan(&self.world.system, &self.world.stack, &earlier);
+        let mut yields = false;
+        for other in self.running.iter_mut().filter(|other| comes_after.contains(&other.number)) {
+            // Its own frame tells what it wanted, whoever does it.
+            yields |= other.machine.yield_to(planned.steps.iter().map(|planned| &planned.step));
+        }
+        if yields {
+            let (left, _) = self.earlier_safe(configuration);
+            planned = plan(&self.world.system, &self.world.stack, &left).planned;
+        }
         let mut touched = Touched::default();
+        planned.steps.iter().for_each(|planned| touched.add(&planned.step));
+        // The frame as it would be if what is interrupted had never been.
+        let frame = before.map_or(frame, |before| plan(&before, &self.world.stack, &earlier).frame);
+        frame.steps().iter().for_each(|planned| touched.add(&planned.step));
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
-            // What is not there is left out, and does not keep what is taken back from bringing it back.
-            if let Target::Component(component) = entry.target
-                && self.world.system.component(component).is_some()
-            {
-                touched.add_state(component);
+            if let Target::Component(component) = entry.target {
+                touched.add_state(component, entry.state);
             }
         }
-        planned.steps.iter().for_each(|planned| touched.add(&planned.step));
-        for planned in frame.steps() {
-            touched.add(&planned.step);
-        }
+        touched.planned_at(self.world.system.revision());
         self.troubles.push((request.id, troubles));
         let spec = Spec {
             until: Time::NEVER,
@@ -69,42 +80,63 @@ impl Engine {
         let purpose = Purpose::Safe(Box::new((request, frame, touched)));
         let machine = Transaction::new(planned, spec);
         let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
-        self.running.insert(0, running);
+        self.running.insert(0, Running { after: comes_after, ..running });
         self.review_standings();
         // Now, not after what else waits to go on.
         self.advance(0);
     }
 
+    /// The steps that safe configurations under way have still to do about what this one is about, and their numbers.
+    fn earlier_safe(&self, configuration: &Configuration) -> (Vec<Step>, SmallVec<[u64; 1]>) {
+        let about = components_of(configuration);
+        let (mut steps, mut numbers) = (Vec::new(), SmallVec::new());
+        for other in self.running.iter().rev().filter(|other| other.is_safe()) {
+            let Purpose::Safe(safe) = &other.purpose else { continue };
+            let theirs = self.configurations.get(&safe.1.configuration).map(components_of).unwrap_or_default();
+            if theirs.iter().any(|component| about.contains(component)) {
+                steps.extend(other.machine.open_steps().cloned());
+                numbers.push(other.number);
+            }
+        }
+        (steps, numbers)
+    }
+
+    /// Components for which safe configurations that came before have steps that are not over.
+    pub(super) fn busy_before(&self, running: &Running) -> Vec<ComponentName> {
+        let before = self.running.iter().filter(|other| running.after.contains(&other.number));
+        before.flat_map(|other| other.machine.open_steps()).flat_map(touch::components).collect()
+    }
+
     /// Interrupts what is under way; the picture without it, if it has done anything.
     fn interrupt(&mut self, id: ConfigId) -> Option<System> {
-        let mut before: Option<System> = None;
+        let meets = |running: &Running| !running.is_safe() && !running.over;
         for at in 0..self.running.len() {
-            let running = &mut self.running[at];
-            if running.is_safe() || running.over {
-                continue;
+            if meets(&self.running[at]) {
+                self.running[at].machine.on(Input::Interrupt(id), &mut self.world.system);
+                // Calls that are out are told first, and what is back is taken in.
+                self.running[at].stop_brief();
+                self.advance(at);
             }
-            running.machine.on(Input::Interrupt(id), &mut self.world.system);
-            let done: Vec<_> = running.machine.done_so_far().map(|(_, undo)| undo.clone()).collect();
-            if !done.is_empty() {
-                let picture = before.get_or_insert_with(|| self.world.system.clone());
-                for undo in done.iter().rev() {
-                    for back in undo.steps() {
-                        let _ = step::apply(back, picture);
-                    }
-                }
-            }
-            // Calls that are out are told first.
-            self.running[at].stop_brief();
-            self.advance(at);
+        }
+        let mut before: Option<System> = None;
+        for running in self.running.iter().filter(|running| meets(running) && running.machine.did_anything()) {
+            running.machine.take_out(before.get_or_insert_with(|| self.world.system.clone()));
         }
         before
     }
 
     /// A safe configuration has been applied as far as it goes: its frame is pushed, it is answered, and what it interrupted
     /// goes back.
-    pub(super) fn safe_ended(&mut self, safe: (Request, Frame, Touched), machine: Transaction, stood: Option<u64>) {
-        let (request, frame, touched) = safe;
-        let edits = machine.planned().parts[0].edits.pops.clone();
+    pub(super) fn safe_ended(
+        &mut self,
+        number: u64,
+        safe: (Request, Frame, Touched),
+        machine: Transaction,
+        stood: Option<u64>,
+    ) {
+        let (request, frame, mut touched) = safe;
+        machine.note_done(&mut touched);
+        let edits = machine.planned().parts[0].edits.clone();
         let end = machine.end();
         let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
         let mut troubles = troubles.map(|at| self.troubles.remove(at).1).unwrap_or_default();
@@ -117,7 +149,16 @@ impl Engine {
             (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
             _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
         };
-        let pushed = self.world.stack.push_safe(edits, frame);
+        let held = self.held_frames();
+        let pushed = self.world.stack.push_safe(edits, frame, &held);
+        if let Some(part) = &broken {
+            // Those that came later took what this one was to do for done.
+            let later = self.running.iter().filter(|other| other.after.contains(&number));
+            let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
+            for (_, troubles) in self.troubles.iter_mut().filter(|(id, _)| served.contains(id)) {
+                troubles.push(Reason::Broken(part.residual.clone()));
+            }
+        }
         let (verdict, reason) = match broken {
             None if troubles.is_empty() => (Verdict::Ok, None),
             None => {
@@ -158,4 +199,13 @@ impl Engine {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
         }
     }
+}
+
+/// A system in which these steps are done.
+fn with<'s>(system: &'s System, steps: &[Step]) -> Cow<'s, System> {
+    let mut picture = Cow::Borrowed(system);
+    for step in steps {
+        let _ = step::apply(step, picture.to_mut());
+    }
+    picture
 }

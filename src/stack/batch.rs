@@ -26,6 +26,10 @@ pub struct Rules<'a> {
     pub at: Time,
     /// Whether other requests are under way.
     pub busy: bool,
+    /// Frames that others under way pop or hand over to, and those that wait for their confirmation.
+    pub held: &'a [FrameId],
+    /// Undos and pushes of the batch were begun together, though not all of them may be left: some were answered since.
+    pub joined: bool,
 }
 
 /// A request of a batch that is answered.
@@ -56,6 +60,9 @@ pub struct Group {
     pub commits: bool,
     /// A coordinator has come to its *down* state.
     pub down: bool,
+    /// Frames that were to be undone with the state they belong to and stay, since that is refused, by the place of the
+    /// request: from now on they are frames like others.
+    pub stay: SmallVec<[(usize, FrameId); 1]>,
 }
 
 /// What one request comes to.
@@ -68,7 +75,7 @@ enum Resolved<'a> {
 
 /// What the first requests of a batch (arranged, not empty) come to in `world`: as many as are carried out together.
 pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group {
-    let together = together(world, requests);
+    let together = together(world, requests, rules.joined);
     let repairs = (together == 1).then(|| repairs(world, &requests[0])).flatten();
     let avoiding;
     let context = if world.broken.is_empty() && world.quarantined.is_empty() {
@@ -100,7 +107,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             }
         }
         if !group.places.is_empty() {
-            match work.finish(&world.system) {
+            match work.finish(&world.system, rules.held) {
                 Err(refusal) => {
                     let place = group.places[refusal.request.min(group.places.len() - 1)];
                     refused.push(no(place, &requests[place], Reason::Refused(refusal.findings)));
@@ -117,6 +124,8 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             }
         }
         group.told.sort_by_key(|told| told.place);
+        let failed = group.told.iter().filter(|told| told.verdict == Some(Verdict::UndoFailed));
+        group.stay = failed.filter_map(|told| Some((told.place, world.of_visit(&requests[told.place])?))).collect();
         return group;
     }
 }
@@ -126,11 +135,14 @@ fn no(place: usize, request: &Request, reason: Reason) -> Told {
 }
 
 /// How many of the first requests are carried out together: undos and pushes of one batch, else one.
-fn together(world: &World, requests: &[Request]) -> usize {
+fn together(world: &World, requests: &[Request], joined: bool) -> usize {
     let plain = |request: &Request| {
         request.why == Why::Asked && matches!(request.ask, Ask::Apply(_) | Ask::UndoOf(_) | Ask::Undo)
     };
     let mixed = requests.iter().any(|r| r.ask.is_undo()) && requests.iter().any(|r| !r.ask.is_undo());
+    if joined {
+        return requests.len();
+    }
     if !mixed || !requests.iter().all(plain) || !requests[0].ask.is_undo() {
         return 1;
     }

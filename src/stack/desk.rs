@@ -167,10 +167,11 @@ impl Desk {
         self.waiting.push_front(Batch::one(undo));
     }
 
-    /// A batch that could begin has not done so after all: it is the first that waits.
-    pub fn put_back(&mut self, number: u32) {
+    /// A batch that could begin has not done so after all: it is the first that waits, or the last, since it had just come.
+    pub fn put_back(&mut self, number: u32, last: bool) {
         if let Some(at) = self.under_way.iter().position(|turn| turn.number == number) {
-            self.waiting.push_front(self.under_way.remove(at).batch);
+            let batch = self.under_way.remove(at).batch;
+            self.waiting.insert(if last { self.waiting.len() } else { 0 }, batch);
         }
     }
 

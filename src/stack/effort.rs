@@ -88,7 +88,11 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
     };
     let part = Part {
         range: 0..u32::try_from(steps.len()).expect("fewer steps than that"),
-        edits: Edits { pops: Vec::new(), push: Some(Arc::new(frame.clone())) },
+        edits: Edits {
+            push: Some(Arc::new(frame.clone())),
+            waits: configuration.confirm.is_some(),
+            ..Edits::default()
+        },
         pushes: Some(configuration.id),
         holds: configuration.holds.is_some(),
         on_failure: configuration.on_failure,

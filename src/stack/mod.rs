@@ -43,6 +43,7 @@ use crate::plan::prepare::Act;
 use crate::plan::undo::Item;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -150,6 +151,8 @@ pub struct Edits {
     pub pops: Vec<(FrameId, HandOver)>,
     /// A frame that comes; its number is given when it does.
     pub push: Option<Arc<Frame>>,
+    /// That frame waits for its confirmation: until then it is not squashed, since it may have to be taken back alone.
+    pub waits: bool,
 }
 
 impl Stack {
@@ -219,7 +222,8 @@ impl Stack {
     }
 
     /// Takes over what the parts of a transaction do to the stack, in their order, now that their steps are done. Answers
-    /// the numbers of the frames pushed. `busy` are frames that others under way pop or hand over to.
+    /// the numbers of the frames pushed. `busy` are frames that others under way pop or hand over to, and those that wait for
+    /// their confirmation: they are not squashed.
     pub fn apply<'e>(&mut self, edits: impl IntoIterator<Item = &'e Edits>, busy: &[FrameId]) -> Vec<FrameId> {
         self.apply_each(edits, busy).into_iter().flatten().collect()
     }
@@ -232,7 +236,8 @@ impl Stack {
     ) -> Vec<Option<FrameId>> {
         let mut pushed: Vec<Option<FrameId>> = Vec::new();
         let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
-        for Edits { pops, push } in edits {
+        let mut busy = SmallVec::<[FrameId; 4]>::from_slice(busy);
+        for Edits { pops, push, waits } in edits {
             for (id, hand) in pops {
                 let real =
                     |id: FrameId| numbers.iter().rev().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
@@ -253,8 +258,9 @@ impl Stack {
                 Arc::make_mut(&mut frame).id = id;
                 let requester = frame.requester;
                 self.frames.push(frame);
+                busy.extend(waits.then_some(id));
                 // Room was made sure of when it began; where others hold on to frames since, there is one more for a while.
-                squash::fit(&mut self.frames, requester, self.bound, busy);
+                squash::fit(&mut self.frames, requester, self.bound, &busy);
             }
         }
         pushed
@@ -273,8 +279,8 @@ impl Stack {
     }
 
     /// Pushes a frame, but below those of safe configurations at the top: they stand above what they interrupted.
-    pub fn push_below_safe(&mut self, frame: Frame) -> FrameId {
-        let id = self.push(frame);
+    pub fn push_below_safe(&mut self, frame: Frame, busy: &[FrameId]) -> FrameId {
+        let id = self.push_beside(frame, busy);
         let mut at = self.frames.len() - 1;
         while at > 0 && self.frames[at - 1].safe && self.frames[at].id == id {
             self.frames.swap(at - 1, at);
@@ -283,16 +289,20 @@ impl Stack {
         id
     }
 
-    /// Pushes the frame of a safe configuration that has been applied as far as it goes; `pops` go with it.
-    pub fn push_safe(&mut self, pops: Vec<(FrameId, HandOver)>, frame: Frame) -> FrameId {
+    /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it.
+    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId]) -> FrameId {
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
-        let pushed = self.apply([&Edits { pops, push }], &[]);
+        let pushed = self.apply([&Edits { push, ..edits }], busy);
         pushed.first().copied().unwrap_or(FrameId(0))
     }
 
     /// Pushes a frame as it is, but for its number.
     pub fn push(&mut self, frame: Frame) -> FrameId {
-        let pushed = self.apply([&Edits { pops: Vec::new(), push: Some(Arc::new(frame)) }], &[]);
+        self.push_beside(frame, &[])
+    }
+
+    fn push_beside(&mut self, frame: Frame, busy: &[FrameId]) -> FrameId {
+        let pushed = self.apply([&Edits { push: Some(Arc::new(frame)), ..Edits::default() }], busy);
         pushed.first().copied().unwrap_or(FrameId(0))
     }
 }

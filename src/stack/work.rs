@@ -104,7 +104,7 @@ pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Con
     for (i, op) in ops.iter().enumerate() {
         work.add(op, context).map_err(|refusal| Refusal { request: i, ..refusal })?;
     }
-    work.finish(system)
+    work.finish(system, &[])
 }
 
 /// A plan in the making.
@@ -264,6 +264,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         });
         self.frames.push(frame.clone());
         edits.push = Some(frame);
+        edits.waits = configuration.confirm.is_some();
         Ok(())
     }
 
@@ -302,11 +303,11 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         Ok(())
     }
 
-    /// Ends the plan: the net of what is undone and pushed, and room on the stack.
+    /// Ends the plan: the net of what is undone and pushed, and room on the stack, where `held` frames are not squashed.
     ///
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
-    pub(super) fn finish(self, system: &System) -> Result<Planned, Refusal> {
+    pub(super) fn finish(self, system: &System, held: &[FrameId]) -> Result<Planned, Refusal> {
         let Self { mut script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
         let undone = parts.iter().any(|part| part.pushes.is_none());
@@ -314,10 +315,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let end = mixed.then(|| script.view().clone());
         let whole = script.finish().map_err(|found| drifted(&found))?;
         let net = end.and_then(|end| shorter(system, &end, &whole));
+        let waiting = parts.iter().filter(|part| part.edits.waits).filter_map(|part| part.edits.push.as_ref());
+        let busy: Vec<FrameId> = held.iter().copied().chain(waiting.map(|frame| frame.id)).collect();
         for id in &pushed {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
             let own = frames.iter().filter(|f| f.requester == frame.requester).count();
-            if own > stack.bound && !squash::possible(&frames, frame.requester, &[]) {
+            if own > stack.bound && !squash::possible(&frames, frame.requester, &busy) {
                 let message = format!("there are {own} frames of `{}`, and none can be squashed", frame.requester);
                 let finding = Finding::error(codes::STACK_FULL, message)
                     .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");

@@ -1,7 +1,7 @@
 //! System, stack and what is broken, as one: all that requests are judged by and that they change.
 
-use super::{FrameId, Requester, Residual, Stack};
-use crate::model::{ComponentName, ConfigId, Snapshot};
+use super::{FrameId, Request, Requester, Residual, Stack};
+use crate::model::{Ask, ComponentName, ConfigId, Snapshot};
 use crate::system::System;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -65,6 +65,22 @@ impl World {
     pub fn avoided(&self) -> BTreeSet<ComponentName> {
         let broken = self.broken.iter().flat_map(|broken| broken.components.iter().copied());
         broken.chain(self.quarantined.iter().copied()).collect()
+    }
+
+    /// The frame of the visit that an undo by leaving a state is about; none: it is no such undo, or there is no frame.
+    pub fn of_visit(&self, undo: &Request) -> Option<FrameId> {
+        let (Ask::UndoOf(id), Some(_)) = (undo.ask, undo.scope) else { return None };
+        let fits = |frame: &&Arc<super::Frame>| {
+            (frame.scope, frame.configuration, frame.requester) == (undo.scope, id, undo.requester)
+        };
+        self.stack.frames().iter().rev().find(fits).map(|frame| frame.id)
+    }
+
+    /// An undo by leaving a state was not carried out: its frame stays, and is one like others.
+    pub fn stays(&mut self, undo: &Request) {
+        if let Some(frame) = self.of_visit(undo) {
+            self.stack.unscope(frame);
+        }
     }
 
     /// Nothing is there any more, and all coordinators are down: what was in force in one life is not in force in the next.

@@ -2,61 +2,15 @@
 //! before the failure is finished.
 
 use super::Transaction;
+use super::heed::Heed;
 use super::run::Run;
-use crate::model::{Cause, ComponentName, OnFailure, Origin, RunState, Step};
+use crate::model::{Cause, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
 use crate::stack::Reason;
-use crate::system::touch::{Slot, components};
+use crate::system::touch::components;
 use crate::system::{Overlay, Reversibility, System, Undo, View as _, diff, step};
 use rustc_hash::FxHashSet;
-use smallvec::SmallVec;
-
-/// What safe configurations touched: the way back of what they interrupted leaves that alone.
-#[derive(Debug, Clone, Default)]
-pub struct Touched {
-    slots: FxHashSet<Slot>,
-    /// Components of which anything was touched.
-    components: FxHashSet<ComponentName>,
-}
-
-fn slot(step: &Step) -> Slot {
-    match step {
-        Step::State { component, .. } => Slot::State(*component),
-        Step::Create { component, .. } | Step::Destroy { component } => Slot::Component(*component),
-        Step::Connect { from, to, .. } | Step::Disconnect { from, to } => Slot::Link(*from, *to),
-        Step::PropertySet { property, .. } => Slot::Property(*property),
-        Step::PortWrite { port, .. } => Slot::Port(*port),
-        Step::Operation(call) => Slot::Operation(call.operation),
-    }
-}
-
-impl Touched {
-    /// `step` was done, or what it leads to was demanded.
-    pub fn add(&mut self, step: &Step) {
-        self.slots.insert(slot(step));
-        self.components.extend(components(step));
-    }
-
-    /// The run state of `component` was demanded.
-    pub fn add_state(&mut self, component: ComponentName) {
-        self.slots.insert(Slot::State(component));
-        self.components.insert(component);
-    }
-
-    /// Takes `other` in.
-    pub fn join(&mut self, other: Self) {
-        self.slots.extend(other.slots);
-        self.components.extend(other.components);
-    }
-
-    /// Whether `step` would change something touched.
-    pub fn has(&self, step: &Step) -> bool {
-        match step {
-            Step::Create { component, .. } | Step::Destroy { component } => self.components.contains(component),
-            other => self.slots.contains(&slot(other)),
-        }
-    }
-}
+use smallvec::{SmallVec, smallvec};
 
 /// A step that stands alone in its wave and before which so many others stand.
 fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> PlannedStep {
@@ -94,6 +48,34 @@ pub(super) struct WayBack {
     pub withheld: Option<Step>,
     /// Steps of the forward list that need no way back: a safe configuration has touched what they did.
     pub superseded: Vec<u32>,
+    /// Something that a safe configuration wrote is brought back first.
+    pub restores: bool,
+    /// Steps of the forward list of whose several steps back some are left out for that reason.
+    pub left_out: Vec<u32>,
+}
+
+impl WayBack {
+    /// Adds a step after all others.
+    fn add_last(&mut self, step: Step, wave: u32, finishes: Option<u32>) {
+        let after = (0..).take(self.list.len()).collect();
+        self.add(step, wave, after, None, finishes);
+    }
+
+    /// Adds a step that begins after those; answers its number.
+    fn add(
+        &mut self,
+        step: Step,
+        wave: u32,
+        after: SmallVec<[StepId; 4]>,
+        takes_back: Option<u32>,
+        finishes: Option<u32>,
+    ) -> StepId {
+        let id = StepId::try_from(self.list.len()).expect("fewer steps than that");
+        self.list.push(item(step, id, wave, after));
+        self.takes_back.push(takes_back);
+        self.finishes.push(finishes);
+        id
+    }
 }
 
 impl Transaction {
@@ -113,9 +95,23 @@ impl Transaction {
                 followers[*before as usize].push(i);
             }
         }
+        let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
         // What a component that is made again does is known only then.
         let mut view = Overlay::new(live);
-        let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
+        let open = forward.done.iter().filter(|i| !self.taken_back.contains(i));
+        let mut heed = Heed::new(&self.touched, open.map(|i| &forward.list[*i as usize].step));
+        // What of a way back came in only when a safe configuration had written the same.
+        for (step, undo, revision) in &self.late_back {
+            let theirs = self.touched.has(step) && !self.touched.knew(step, *revision);
+            if theirs && !self.touched.overwrote(step, *revision) {
+                for back in undo.steps() {
+                    if step::apply(back, &mut view).is_ok() {
+                        way.add(back.clone(), 0, SmallVec::new(), None, None);
+                        way.restores = true;
+                    }
+                }
+            }
+        }
         // A call that was given up and may have happened counts as done: its compensation takes it back. Of one that nobody
         // gave up it is not known, and stays so; where it may have moved, nothing goes back past it.
         let perhaps = self.perhaps_done();
@@ -132,33 +128,40 @@ impl Transaction {
             if held || self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
-            let late = self.late(i).is_some();
+            let late = self.late(i);
             let original = &forward.list[i as usize];
             let mut after: SmallVec<[u32; 4]> =
                 followers[i as usize].iter().flat_map(|f| ends[*f as usize].clone()).collect();
             after.sort_unstable();
             after.dedup();
-            for back in self.steps_back(i, part) {
-                let touched = !late && self.touched.has(back);
-                if !late && !self.may_move(i) && step::moves(back, &view) {
-                    way.withheld = Some(back.clone());
-                    return way;
+            let overwritten = late.is_some_and(|(_, revision)| self.touched.overwrote(&original.step, revision));
+            let before = way.list.len();
+            let mut left_out = overwritten;
+            for back in self.steps_back(i, part).iter().filter(|_| !overwritten) {
+                let goes = if late.is_some() { smallvec![back.clone()] } else { heed.instead_of(back, &view) };
+                left_out |= goes.is_empty();
+                let last = goes.len().saturating_sub(1);
+                for (at, back) in goes.into_iter().enumerate() {
+                    if late.is_none() && !self.may_move(i) && step::moves(&back, &view) {
+                        way.withheld = Some(back);
+                        return way;
+                    }
+                    let _ = step::apply(&back, &mut view);
+                    let id = way.add(back, waves - original.wave, after, (at == last).then_some(i), None);
+                    after = SmallVec::from_iter([id]);
                 }
-                if touched {
-                    way.superseded.push(i);
-                    continue;
-                }
-                let _ = step::apply(back, &mut view);
-                let id = way.list.len() as u32;
-                way.list.push(item(back.clone(), id, waves - original.wave, after));
-                way.takes_back.push(Some(i));
-                way.finishes.push(None);
-                after = SmallVec::from_iter([id]);
+            }
+            // What is left out of several steps back counts with the others.
+            match way.list.len() == before {
+                true if left_out => way.superseded.push(i),
+                _ => way.left_out.extend(left_out.then_some(i)),
             }
             ends[i as usize] = after;
         }
         if part > 0 {
             self.finish_before(part, live, &mut way);
+        } else if let Some(origin) = self.origin.as_ref().filter(|_| self.interrupted) {
+            self.undo_finished(origin, live, &mut way);
         }
         way
     }
@@ -188,15 +191,17 @@ impl Transaction {
         self.planned.part_of(self.planned.place(i as usize))
     }
 
-    /// What takes back a step that came in after the transaction was to stop.
-    fn late(&self, i: u32) -> Option<&Undo> {
+    /// What takes back a step that came in after a safe configuration had begun, and the revision of the model it led to.
+    fn late(&self, i: u32) -> Option<(&Undo, u64)> {
         let forward = self.forward.as_ref().expect("something was carried out");
-        forward.late.iter().find(|(late, _)| *late == i).map(|(_, undo)| undo)
+        let late = forward.late.iter().find(|late| late.step == i)?;
+        let known = self.touched.knew(&forward.list[i as usize].step, late.revision);
+        (!known).then_some((&late.undo, late.revision))
     }
 
     /// The steps that are still to be done to take a step of the forward list back.
     pub(super) fn steps_back(&self, i: u32, part: usize) -> &[Step] {
-        let steps = self.late(i).unwrap_or_else(|| self.undo_of(i, part)).steps();
+        let steps = self.late(i).map_or_else(|| self.undo_of(i, part), |(undo, _)| undo).steps();
         &steps[self.partly.get(&i).map_or(0, |done| *done.min(&steps.len()))..]
     }
 
@@ -225,14 +230,27 @@ impl Transaction {
         for i in &run.done {
             if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
                 *self.partly.entry(*taken).or_default() += 1;
-                if self.steps_back(*taken, self.failed_part()).is_empty() {
+                let of = |i: &u32| way.takes_back[*i as usize] == Some(*taken);
+                let all = || {
+                    way.left_out.contains(taken) && (0..way.list.len() as u32).filter(of).all(|i| run.done.contains(&i))
+                };
+                if all() || self.steps_back(*taken, self.failed_part()).is_empty() {
                     self.taken_back.insert(*taken);
                 }
             }
             if let Some(Some(place)) = way.finishes.get(*i as usize) {
-                self.finished.insert(*place);
+                // Interrupted, it takes back what it had finished.
+                if self.interrupted {
+                    self.finished.remove(place)
+                } else {
+                    self.finished.insert(*place)
+                };
             }
         }
+        self.late_back.extend(run.late.iter().map(|late| {
+            let step = run.list[late.step as usize].step.clone();
+            (step, late.undo.clone(), late.revision)
+        }));
         self.unsettled.extend(run.unsettled.iter().map(|i| run.list[*i as usize].step.clone()));
         self.faulted.extend(run.faulted.iter().copied());
         self.doubted |= !run.failures.is_empty();
@@ -246,6 +264,22 @@ impl Transaction {
     /// done of `part` and later ones, where that is held.
     pub(super) fn led_to(&self, part: usize, live: &System) -> System {
         let forward = self.forward.as_ref().expect("something was carried out");
+        let mut system = self.before_all(live);
+        let before = |place: &u32| self.planned.part_of(Some(*place)) < part;
+        for (_, planned) in (0u32..).zip(self.whole()).take_while(|(place, _)| before(place)) {
+            let _ = step::apply(&planned.step, &mut system);
+        }
+        if self.holds(part) {
+            for i in forward.done.iter().filter(|i| self.part_of(**i) >= part) {
+                let _ = step::apply(&forward.list[*i as usize].step, &mut system);
+            }
+        }
+        system
+    }
+
+    /// The system before all parts, as the model knows it before anything is taken back.
+    pub(super) fn before_all(&self, live: &System) -> System {
+        let forward = self.forward.as_ref().expect("something was carried out");
         let mut system = live.clone();
         for (component, state) in forward.faulted.iter().rev() {
             if system.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
@@ -258,16 +292,61 @@ impl Transaction {
                 let _ = step::apply(back, &mut system);
             }
         }
-        let before = |place: &u32| self.planned.part_of(Some(*place)) < part;
-        for (_, planned) in (0u32..).zip(self.whole()).take_while(|(place, _)| before(place)) {
-            let _ = step::apply(&planned.step, &mut system);
-        }
-        if self.holds(part) {
-            for i in forward.done.iter().filter(|i| self.part_of(**i) >= part) {
-                let _ = step::apply(&forward.list[*i as usize].step, &mut system);
-            }
-        }
         system
+    }
+
+    /// Whether it has done anything that was not taken back.
+    pub fn did_anything(&self) -> bool {
+        self.origin.is_some() || self.done_so_far().next().is_some()
+    }
+
+    /// Takes what it has done out of a picture of the system.
+    pub fn take_out(&self, picture: &mut System) {
+        if let Some(origin) = &self.origin {
+            for step in self.own_difference(picture, origin) {
+                let _ = step::apply(&step, picture);
+            }
+            return;
+        }
+        let done: Vec<&Undo> = self.done_so_far().map(|(_, undo)| undo).collect();
+        for back in done.iter().rev().flat_map(|undo| undo.steps()) {
+            let _ = step::apply(back, picture);
+        }
+    }
+
+    /// The steps from one system to the other that are about its own components.
+    pub(super) fn own_difference(&self, from: &System, to: &System) -> Vec<Step> {
+        let own = self.own();
+        let about = |step: &Step| components(step).iter().all(|component| own.contains(component));
+        diff(from, to).into_iter().filter(about).collect()
+    }
+
+    /// Adds the way from where some parts stood and others were taken back to the system before all of them; nothing of it
+    /// moves.
+    fn undo_finished(&self, origin: &System, live: &System, way: &mut WayBack) {
+        let wave = way.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);
+        let mut view = live.clone();
+        for step in &way.list {
+            let _ = step::apply(&step.step, &mut view);
+        }
+        let mut finished: Vec<u32> = self.finished.iter().copied().collect();
+        finished.sort_unstable();
+        let call = |place: &u32| {
+            let planned = &self.whole()[*place as usize];
+            let undo = matches!(planned.step, Step::Operation(_)).then(|| planned.undo.steps().first()).flatten();
+            undo.map(|back| (Some(*place), back.clone()))
+        };
+        let calls: Vec<(Option<u32>, Step)> = finished.iter().rev().filter_map(call).collect();
+        let rest = self.own_difference(&view, origin);
+        let rest = rest.into_iter().filter(|back| !self.touched.has(back)).map(|back| (None, back));
+        for (place, back) in calls.into_iter().chain(rest) {
+            if step::moves(&back, &view) {
+                way.withheld = Some(back);
+                return;
+            }
+            let _ = step::apply(&back, &mut view);
+            way.add_last(back, wave, place);
+        }
     }
 
     /// Adds what is missing of the parts before `part`: they were to stand whatever comes after them. First their calls, with
@@ -287,11 +366,9 @@ impl Transaction {
         let wave = way.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);
         let first = way.list.len();
         let add = |way: &mut WayBack, step: Step, place: Option<u32>| {
-            let id = StepId::try_from(way.list.len()).expect("fewer steps than that");
-            let after = id.checked_sub(1).filter(|_| way.list.len() > first).into_iter().collect();
-            way.list.push(item(step, id, wave, after));
-            way.takes_back.push(None);
-            way.finishes.push(place);
+            let last = way.list.len().checked_sub(1).filter(|_| way.list.len() > first);
+            let after = last.and_then(|last| StepId::try_from(last).ok()).into_iter().collect();
+            way.add(step, wave, after, None, place);
         };
         // A call needs what stands before it; without one, the difference is the shortest way.
         let last = open.iter().rposition(|(_, planned)| matches!(planned.step, Step::Operation(_)));

@@ -1,5 +1,6 @@
 //! How a transaction ends: what was done is compared with what is there, and what is left is named.
 
+use super::heed::Heed;
 use super::{Can, Phase, Transaction};
 use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
@@ -71,6 +72,11 @@ impl Transaction {
         can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()
     }
 
+    /// That a safe configuration interrupted it, if one did.
+    pub fn interrupted(&self) -> Option<Reason> {
+        self.stopped_by.clone().filter(|_| self.interrupted)
+    }
+
     /// Why it did not simply succeed.
     fn reason(&self) -> Reason {
         let forward = self.forward.as_ref().expect("it was carried out");
@@ -122,11 +128,18 @@ impl Transaction {
         };
         // What may have happened is taken back by the frame.
         let whole = self.mends(part) && self.perhaps.is_empty() && remaining.iter().all(plain);
-        match (&self.between, whole) {
-            (Some(between), true) => wanted = between.as_ref().clone(),
-            (None, true) => self.take_back(&remaining, part, &mut wanted),
+        let origin = self.origin.as_ref().filter(|_| self.interrupted);
+        match (&self.between, origin, whole) {
+            (Some(between), _, true) => wanted = between.as_ref().clone(),
+            // What safe configurations touched is theirs.
+            (None, Some(origin), true) => {
+                for step in self.own_difference(live, origin).iter().filter(|step| !self.touched.has(step)) {
+                    let _ = step::apply(step, &mut wanted);
+                }
+            }
+            (None, None, true) => self.take_back(&remaining, part, &mut wanted),
             // Of what was taken back in part the rest belongs to what should be.
-            (_, false) => {
+            (_, _, false) => {
                 let partly: Vec<u32> = remaining.iter().copied().filter(|i| self.is_partly_back(*i)).collect();
                 self.take_back(&partly, part, &mut wanted);
             }
@@ -136,9 +149,11 @@ impl Transaction {
 
     /// Takes `remaining` back on `system`, latest first, as far as that goes.
     fn take_back(&self, remaining: &[u32], part: usize, system: &mut System) {
-        for i in remaining.iter().rev() {
-            for back in self.steps_back(*i, part) {
-                let _ = step::apply(back, system);
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let mut heed = Heed::new(&self.touched, remaining.iter().map(|i| &forward.list[*i as usize].step));
+        for back in remaining.iter().rev().flat_map(|i| self.steps_back(*i, part)) {
+            for back in heed.instead_of(back, &*system) {
+                let _ = step::apply(&back, system);
             }
         }
     }
@@ -182,7 +197,7 @@ impl Transaction {
     /// Everything is being taken down: nobody is asked, and the model is what is known.
     pub(super) fn compare_blind(&mut self, live: &mut System) {
         let nothing = |_: &Step| crate::model::Execution::Blocking;
-        let can = Can { execution: &nothing, room: false, quarantined: &[] };
+        let can = Can { execution: &nothing, room: false, quarantined: &[], busy: &[] };
         let wanted = live.clone();
         self.judge(0, &wanted, false, true, live, &can);
     }
@@ -225,6 +240,18 @@ impl Transaction {
         self.unsettled = unsettled;
         let clean = residual.is_settled() && remaining.is_empty();
         let missing = self.missing(part, live);
+        // Interrupted, each part is to blame for what is left of it.
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let left: FxHashSet<usize> = remaining.iter().chain(&self.perhaps).map(|i| self.part_of(*i)).collect();
+        let blamed = left.iter().copied().min().unwrap_or(part);
+        let own_left = |at: usize| -> Residual {
+            let own = remaining.iter().filter(|i| self.part_of(**i) == at && !self.is_partly_back(**i));
+            Residual {
+                left: own.map(|i| forward.list[*i as usize].step.clone()).collect(),
+                observed: residual.observed,
+                ..Residual::of(self.reason())
+            }
+        };
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if at < part {
@@ -232,6 +259,12 @@ impl Transaction {
                     self.broken(at, Residual::of(self.reason()), Snapshot::default(), false)
                 } else {
                     PartEnd::Done
+                }
+            } else if !clean && self.interrupted {
+                match at == blamed {
+                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
+                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole),
+                    false => self.taken_back_whole(at),
                 }
             } else if at == part {
                 match clean {
@@ -249,7 +282,8 @@ impl Transaction {
 
     /// The end of a part of which nothing is left.
     fn taken_back_whole(&self, at: usize) -> PartEnd {
-        match self.given_up.contains(&at) && matches!(self.stopped_by, Some(Reason::GivenUp)) {
+        let stopped = matches!(self.stopped_by, Some(Reason::GivenUp | Reason::Interrupted(_)));
+        match self.given_up.contains(&at) && stopped {
             true => PartEnd::Cancelled,
             false => PartEnd::Failed(self.reason()),
         }

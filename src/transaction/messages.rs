@@ -29,6 +29,8 @@ pub struct Can<'a> {
     pub room: bool,
     /// Components whose call has not returned.
     pub quarantined: &'a [ComponentName],
+    /// Components that an earlier safe configuration has steps for: a later one's come after these.
+    pub busy: &'a [ComponentName],
 }
 
 /// What only the values that components show can tell.

@@ -6,21 +6,23 @@
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
-//! was applied stands. `back`: the way back. `end`: what comes of each part. `messages`: what goes in and out.
+//! was applied stands. `back`: the way back; `heed`: what it leaves to safe
+//! configurations. `end`: what comes of each part. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
 
 mod back;
 mod end;
+mod heed;
 mod messages;
 mod order;
 mod run;
 mod settle;
 mod stand;
 
-pub use back::Touched;
 pub use end::{BrokenPart, End, PartEnd};
+pub use heed::Touched;
 pub use messages::{Can, Input, Poll, Question, Spec};
 
 use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
@@ -75,6 +77,8 @@ pub struct Transaction {
     /// Where the net of several parts is carried out: the system that the parts before the failed one lead to, and what a
     /// held part has added to it.
     between: Option<Box<System>>,
+    /// The system before all parts, where a way back has led to the one between them.
+    origin: Option<Box<System>>,
     withheld: Option<Step>,
     /// Calls of which nobody knows, and that the frame takes back.
     perhaps: Vec<u32>,
@@ -83,6 +87,8 @@ pub struct Transaction {
     faulted: Vec<(ComponentName, crate::model::RunState)>,
     doubted: bool,
     touched: Touched,
+    /// Steps of ways back that came in after a safe configuration had begun, with what takes them back and the revision then.
+    late_back: Vec<(Step, crate::system::Undo, u64)>,
     /// Why it ends early, if not because of a step.
     stopped_by: Option<Reason>,
     /// Parts that are given up.
@@ -108,6 +114,7 @@ impl Transaction {
     pub fn new(mut planned: Planned, spec: Spec) -> Self {
         let mut forward = Run::new(std::mem::take(&mut planned.steps), spec.until);
         forward.tries_all = spec.best_effort;
+        forward.notes = spec.best_effort;
         Self {
             planned,
             spec,
@@ -119,12 +126,14 @@ impl Transaction {
             partly: FxHashMap::default(),
             finished: FxHashSet::default(),
             between: None,
+            origin: None,
             withheld: None,
             perhaps: Vec::new(),
             unsettled: Vec::new(),
             faulted: Vec::new(),
             doubted: false,
             touched: Touched::default(),
+            late_back: Vec::new(),
             stopped_by: None,
             given_up: SmallVec::new(),
             asked_back: spec.asked_back,
@@ -261,13 +270,18 @@ impl Transaction {
                 }
             }
             Input::Interrupt(by) => {
-                self.stopped_by.get_or_insert(Reason::Interrupted(by));
+                self.stopped_by = Some(Reason::Interrupted(by));
                 self.interrupted = true;
                 self.asked_back = false;
                 self.held = true;
                 self.cancel();
-                let run = self.in_hand_mut();
-                run.late_from_now = true;
+                self.in_hand_mut().late_from_now = true;
+                // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
+                let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
+                if self.between.take().is_some() || looks {
+                    self.target = None;
+                    self.phase = Phase::Stopping;
+                }
             }
             Input::Release(touched) => {
                 self.held = false;
@@ -311,7 +325,7 @@ impl Transaction {
                     let timeout = self.spec.timeout;
                     let run = self.in_hand_mut();
                     if !stopped && !run.stops() {
-                        let begun = run.begin(live, now, can.execution, can.room, timeout);
+                        let begun = run.begin(live, now, can, timeout);
                         if !begun.is_empty() {
                             return Poll::Begin(begun);
                         }
@@ -339,6 +353,7 @@ impl Transaction {
                     }
                     if !self.reading {
                         self.reading = true;
+                        self.seen = None;
                         return Poll::Read(self.own());
                     }
                     let Some(seen) = self.seen.take() else { return Poll::Wait };
@@ -426,10 +441,13 @@ impl Transaction {
         let part = self.failed_part();
         if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
+            self.origin = Some(Box::new(self.before_all(live)));
         }
         let way = self.way_back(part, live);
         self.withheld.clone_from(&way.withheld);
         self.taken_back.extend(way.superseded.iter().copied());
+        failed |= way.restores;
+        self.late_back.clear();
         let again = self.interrupted || self.attempts < 2;
         if way.list.is_empty() || !(failed && again) || self.attempts > 8 {
             if self.taken_down {

@@ -1,10 +1,12 @@
 //! One list of steps being carried out: which may begin, what came of those that did, what is not known yet.
 
+use super::messages::Can;
 use super::order::Order;
 use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
 use crate::plan::PlannedStep;
 use crate::stack::Reason;
+use crate::system::touch::components;
 use crate::system::{System, Undo, View as _, Violation, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
@@ -42,9 +44,22 @@ pub(super) struct Run {
     pub tries_all: bool,
     /// No step begins later.
     pub until: Time,
-    /// What took back steps that came in after it was to stop, seen when they came in.
-    pub late: Vec<(u32, Undo)>,
+    /// Steps that came in after a safe configuration had begun.
+    pub late: Vec<Late>,
     pub late_from_now: bool,
+    /// Whether it is noted when steps were done, and those, with the revision of the model that they led to.
+    pub notes: bool,
+    pub noted: Vec<(u32, u64)>,
+}
+
+/// A step that came in after a safe configuration had begun.
+#[derive(Debug)]
+pub(super) struct Late {
+    pub step: u32,
+    /// What takes it back to what was there when it came in.
+    pub undo: Undo,
+    /// The revision of the model when it came in.
+    pub revision: u64,
 }
 
 impl Run {
@@ -64,6 +79,8 @@ impl Run {
             until,
             late: Vec::new(),
             late_from_now: false,
+            notes: false,
+            noted: Vec::new(),
         }
     }
 
@@ -78,6 +95,19 @@ impl Run {
             Some(order) => order.is_over(),
             None => self.at >= self.list.len() && self.out == 0,
         }
+    }
+
+    /// The steps that are not over.
+    pub fn open(&self) -> impl Iterator<Item = &PlannedStep> {
+        self.list.iter().zip(&self.state).filter(|(_, state)| **state != State::Over).map(|(step, _)| step)
+    }
+
+    /// Leaves out what has not begun and `out` says so of. Answers whether there was such.
+    pub fn leave_out(&mut self, out: impl Fn(&Step) -> bool) -> bool {
+        let waiting = (0..).zip(&self.state).filter(|(_, state)| **state == State::Waiting).map(|(i, _)| i);
+        let gone: Vec<u32> = waiting.filter(|i: &u32| out(&self.list[*i as usize].step)).collect();
+        gone.iter().for_each(|i| self.finish(*i));
+        !gone.is_empty()
     }
 
     /// The steps that are out.
@@ -98,10 +128,10 @@ impl Run {
         &mut self,
         live: &System,
         now: Time,
-        execution: &dyn Fn(&Step) -> Execution,
-        room: bool,
+        can: &Can<'_>,
         timeout: std::time::Duration,
     ) -> SmallVec<[u32; 1]> {
+        let (execution, room) = (can.execution, can.room);
         let kind = |planned: &PlannedStep| execution(&planned.step);
         while self.order.is_none() && self.at < self.list.len() {
             if self.stops() {
@@ -115,6 +145,9 @@ impl Run {
                 }
                 self.at += 1;
                 continue;
+            }
+            if is_busy(&self.list[at].step, can) {
+                return smallvec![];
             }
             match kind(&self.list[at]) {
                 Execution::Blocking => {
@@ -137,14 +170,14 @@ impl Run {
                     if self.out > 0 || !room {
                         return smallvec![];
                     }
-                    let begun = self.brief(live, now, &kind, timeout);
+                    let begun = self.brief(live, now, &kind, can, timeout);
                     if !begun.is_empty() {
                         return begun;
                     }
                 }
             }
         }
-        if self.order.is_some() { self.side_by_side(live, now, room, timeout) } else { smallvec![] }
+        if self.order.is_some() { self.side_by_side(live, now, can, timeout) } else { smallvec![] }
     }
 
     /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
@@ -153,6 +186,7 @@ impl Run {
         live: &System,
         now: Time,
         kind: &dyn Fn(&PlannedStep) -> Execution,
+        can: &Can<'_>,
         timeout: std::time::Duration,
     ) -> SmallVec<[u32; 1]> {
         let mut items: SmallVec<[u32; 1]> = SmallVec::new();
@@ -165,6 +199,7 @@ impl Run {
             if items.len() == limits::BRIEF_STEPS
                 || kind(&self.list[at]) != Execution::Brief
                 || !about.insert(step.component())
+                || is_busy(step, can)
             {
                 break;
             }
@@ -190,8 +225,25 @@ impl Run {
         &mut self,
         live: &System,
         now: Time,
-        room: bool,
+        can: &Can<'_>,
         timeout: std::time::Duration,
+    ) -> SmallVec<[u32; 1]> {
+        let mut later = SmallVec::<[u32; 1]>::new();
+        let begun = self.free_ones(live, now, can, timeout, &mut later);
+        if let Some(order) = &mut self.order {
+            later.into_iter().for_each(|i| order.again(i));
+        }
+        begun
+    }
+
+    /// Those that may begin; what comes after steps of others goes to `later`.
+    fn free_ones(
+        &mut self,
+        live: &System,
+        now: Time,
+        can: &Can<'_>,
+        timeout: std::time::Duration,
+        later: &mut SmallVec<[u32; 1]>,
     ) -> SmallVec<[u32; 1]> {
         loop {
             if self.stops() {
@@ -201,7 +253,7 @@ impl Run {
             let mut ready = SmallVec::<[u32; 1]>::new();
             if let Some(i) = order.next(Execution::Immediate) {
                 ready.push(i);
-            } else if room {
+            } else if can.room {
                 if let Some(i) = order.next(Execution::Blocking) {
                     ready.push(i);
                 } else {
@@ -211,6 +263,14 @@ impl Run {
             }
             if ready.is_empty() {
                 return ready;
+            }
+            // Left out meanwhile.
+            ready.retain(|i| self.state[*i as usize] == State::Waiting);
+            if !can.busy.is_empty() {
+                let (busy, free): (SmallVec<_>, SmallVec<_>) =
+                    ready.into_iter().partition(|i| is_busy(&self.list[*i as usize].step, can));
+                later.extend::<SmallVec<[u32; 1]>>(busy);
+                ready = free;
             }
             ready.retain(|i| self.gate(*i, live, now, timeout));
             if !ready.is_empty() {
@@ -287,9 +347,13 @@ impl Run {
                 Undo::One(Step::Operation(call)) => Some(call.clone()),
                 _ => None,
             };
-            self.late.push((i, step::inverse(step, call.as_ref(), live)));
+            let undo = step::inverse(step, call.as_ref(), live);
+            self.late.push(Late { step: i, undo, revision: live.revision() });
         }
         step::effect(step, live);
+        if self.notes {
+            self.noted.push((i, live.revision()));
+        }
         self.finish(i);
         self.done.push(i);
     }
@@ -316,6 +380,11 @@ impl Run {
         self.finish(i);
         self.unsettled.push(i);
     }
+}
+
+/// Whether a step comes after what an earlier safe configuration still does.
+fn is_busy(step: &Step, can: &Can<'_>) -> bool {
+    !can.busy.is_empty() && components(step).iter().any(|component| can.busy.contains(component))
 }
 
 /// Why the precondition of a step is false on the model, if it is.

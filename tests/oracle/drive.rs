@@ -3,13 +3,14 @@
 
 use crate::classes::Classes;
 use crate::generate::{CONFIRMS, Chance, EVENTS, Made, event};
+use crate::laws::Laws;
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
 use davit::session::{Happening, Session, Setup};
 use davit::stack::Requester;
 use davit::statechart::{Chart, compile};
-use davit::time::Clock;
+use davit::time::{Clock, Time};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -41,11 +42,14 @@ struct Case<'a> {
     platform: Simulated,
     clock: Clock,
     follower: Follower<'a>,
-    notes: Arc<Mutex<Vec<Note>>>,
+    notes: Arc<Mutex<Vec<(Time, Note)>>>,
+    laws: Laws,
     /// Everything that happened, in words.
     log: Vec<String>,
     classes: &'a mut Classes,
     names: Vec<String>,
+    /// Something ended *broken*, as `check` said it might.
+    broken: bool,
 }
 
 /// What goes wrong. Left out: what leaves a component faulted or in quarantine, and a platform that lies, which `check` takes
@@ -107,7 +111,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     let notes = Arc::new(Mutex::new(Vec::new()));
     session.hub().observe({
         let notes = notes.clone();
-        Arc::new(move |_, what| {
+        Arc::new(move |at, what| {
             let note = match what {
                 Happening::Answered(a) => {
                     let steps = serde_json::to_string(&a.steps).unwrap_or_default();
@@ -120,14 +124,27 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
                 Happening::Forced { note } if note.contains("configurator itself") => Note::Failed(note.clone()),
                 _ => return,
             };
-            notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push((at, note));
         })
     });
     let names = made.deployment.coordinators.iter().map(|c| c.name.to_string()).collect();
-    let mut case = Case { session, platform, clock: clock.clone(), follower, notes, log: vec![said], classes, names };
+    let safes = safe(made).iter().map(ToString::to_string).collect();
+    let laws = Laws::of(safes, made.deployment.limits.stack < 16);
+    let mut case = Case {
+        session,
+        platform,
+        clock: clock.clone(),
+        follower,
+        notes,
+        log: vec![said],
+        classes,
+        names,
+        broken: false,
+        laws,
+    };
     let went = case.go(made, chance);
     let overflowed = case.follower.overflowed();
-    let lost = case.follower.is_lost();
+    let lost = case.broken;
     let log = std::mem::take(&mut case.log);
     drop(case);
     clock.shutdown();
@@ -174,10 +191,7 @@ impl Case<'_> {
                     self.clock.sleep(Duration::from_millis(1));
                     self.rest(0)?;
                 }
-                // Left out: something goes wrong while a safe configuration stops it.
-                if !made.kept {
-                    self.platform.set_faults(faults(chance));
-                }
+                self.platform.set_faults(faults(chance));
             }
             for _ in 0..chance.of(&[0, 0, 1, 1, 2, 3, 8]).to_owned() {
                 self.clock.sleep(Duration::from_millis(1));
@@ -214,10 +228,10 @@ impl Case<'_> {
         if notes.is_empty() && action > 0 {
             return Ok(());
         }
-        for note in &notes {
+        for (_, note) in &notes {
             self.log.push(format!("{} {note:?}", self.clock.now()));
         }
-        for note in &notes {
+        for (_, note) in &notes {
             if let Note::Failed(why) = note {
                 return Err(why.clone());
             }
@@ -228,6 +242,7 @@ impl Case<'_> {
                 };
                 let seen = Seen::Answer { by, event: event(answer) };
                 self.follower.see(seen).map_err(|why| format!("the answer {answer}: {why}"))?;
+                self.broken |= answer.ends_with(".broken");
                 if self.classes.tells {
                     self.log.push(format!("after {answer}: {}", self.follower.may()));
                 }
@@ -235,6 +250,8 @@ impl Case<'_> {
         }
         let shown = self.shown();
         let known: Known = self.follower.rests(&shown).map_err(|why| format!("at rest as {shown:?}\n{why}"))?;
+        self.laws.hold(&notes, &shown).map_err(|why| format!("a law is broken: {why}"))?;
+        let notes: Vec<Note> = notes.into_iter().map(|(_, note)| note).collect();
         self.classes.note(&notes, &shown, known);
         if known.world { Ok(()) } else { Err("broken".to_owned()) }
     }

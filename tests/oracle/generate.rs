@@ -54,6 +54,16 @@ pub const CONFIRMS: &str = "e_conf";
 const TOLD: [&str; 2] = ["x0", "x1"];
 const COMPONENTS: [&str; 3] = ["a", "b", "c"];
 
+/// What safe configurations there are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Safes {
+    None,
+    /// One, about a component of its own, which is created once, before anything else, and kept.
+    Kept,
+    /// About components that come and go.
+    Loose,
+}
+
 /// A deployment and what it is, in words.
 pub struct Made {
     pub deployment: Deployment,
@@ -158,8 +168,7 @@ fn pieces(chance: &mut Chance, on: &str, kept: bool, changes: &mut Vec<String>, 
         5 => changes.push(format!("set {on}.s {number}")),
         6 | 7 => post.push(format!("{on}:{state}")),
         8 | 9 => changes.push(format!("call {on}.open")),
-        // Left out: a safe configuration comes upon a step whose way back moves.
-        10 if !kept => changes.push(format!("call {on}.lift")),
+        10 => changes.push(format!("call {on}.lift")),
         11 => changes.push(format!("call {on}.look")),
         12 => changes.push(format!("connect {on}.y {other}.u")),
         13 => changes.push(format!("write {on}.u {number}")),
@@ -170,7 +179,8 @@ fn pieces(chance: &mut Chance, on: &str, kept: bool, changes: &mut Vec<String>, 
 }
 
 /// The `at`-th configuration.
-fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, text: &mut String) -> Configuration {
+fn configuration(chance: &mut Chance, at: usize, safes: Safes, text: &mut String) -> Configuration {
+    let kept = safes == Safes::Kept;
     let id = ConfigId::new(&format!("c{at}")).expect("a plain name");
     let (mut changes, mut post): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut made = Configuration::new(id);
@@ -193,6 +203,21 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, tex
                 }
             }
         }
+        // About whatever there is, or is not just then; two of them may want the same otherwise.
+        2 | 3 if safes == Safes::Loose && (at == 2 || chance.percent(40)) => {
+            made.safe = true;
+            for on in COMPONENTS {
+                match chance.below(8) {
+                    0 | 1 => post.push(format!("{on}:stopped")),
+                    2 | 3 => changes.push(format!("set {on}.k {}", at - 2)),
+                    4 if chance.percent(30) => post.push(format!("{on}:running")),
+                    _ => {}
+                }
+            }
+            if changes.is_empty() && post.is_empty() {
+                changes.push("set a.k 0".to_owned());
+            }
+        }
         3 if kept => {
             changes.push("create c".to_owned());
             post.push(format!("c:{}", chance.of(&["stopped", "running"])));
@@ -211,7 +236,7 @@ fn configuration(chance: &mut Chance, at: usize, confirms: bool, kept: bool, tex
                 1 | 2 => OnFailure::Rollback,
                 _ => OnFailure::Unset,
             };
-            if confirms && made.on_failure != OnFailure::Hold && chance.percent(25) {
+            if made.on_failure != OnFailure::Hold && chance.percent(25) {
                 made.confirm = Some(Confirm {
                     event: event({
                         let name: &str = [CONFIRMS, "x0"][usize::from(*chance.of(&[false, true]))];
@@ -441,15 +466,11 @@ fn told(state: &State, depth: usize, text: &mut String) {
 pub fn make(chance: &mut Chance) -> Made {
     let mut text = String::new();
     let several = chance.percent(50);
-    // A safe configuration is about a component of its own, which is created once, before anything else, and kept. Left out:
-    // it comes while what it is about is being created, destroyed or brought back.
-    let kept = chance.percent(50);
+    let safes = [Safes::None, Safes::Kept, Safes::Kept, Safes::Loose][chance.below(4)];
+    let kept = safes == Safes::Kept;
     let count = if kept { 6 + chance.below(2) } else { 4 + chance.below(3) };
     let stack = if chance.percent(50) { 2 + chance.below(3) } else { 16 };
-    // Left out: a frame that waits for its confirmation and is squashed meanwhile.
-    let confirms = stack == 16;
-    let configurations: Vec<Configuration> =
-        (0..count).map(|at| configuration(chance, at, confirms, kept, &mut text)).collect();
+    let configurations: Vec<Configuration> = (0..count).map(|at| configuration(chance, at, safes, &mut text)).collect();
     let mut coordinators = vec![coordinator(chance, "one", 0, count, several, kept, &mut text)];
     if several {
         coordinators.push(coordinator(chance, "two", 1, count, several, kept, &mut text));

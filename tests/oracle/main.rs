@@ -12,16 +12,15 @@
 mod classes;
 mod drive;
 mod generate;
+mod laws;
 
 use classes::{CLASSES, Classes};
 use generate::Chance;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// So many cases may disagree: what is known of them, and not mended yet, is listed in `open.md`. The aim is none.
-fn open(cases: u64) -> u64 {
-    cases / 800
-}
+/// With so many cases that disagree it ends: more of them say no more.
+const ENOUGH: usize = 20;
 
 /// The cases of a full run.
 const CASES: u64 = 22_000;
@@ -44,7 +43,7 @@ fn a_running_deployment_does_what_check_follows() {
             scope.spawn(|| {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= first + cases || sums.lock().unwrap().2.len() as u64 > open(cases) {
+                    if seed >= first + cases || sums.lock().unwrap().2.len() >= ENOUGH {
                         return;
                     }
                     let mut chance = Chance::new(seed);
@@ -72,7 +71,7 @@ fn a_running_deployment_does_what_check_follows() {
     wrong.sort();
     let seeds: Vec<u64> = wrong.iter().map(|(seed, _)| *seed).collect();
     println!("disagree: {seeds:?}");
-    assert!(wrong.len() as u64 <= open(cases), "cases {seeds:?} disagree; the first:\n{}", wrong[0].1);
+    assert!(wrong.is_empty(), "cases {seeds:?} disagree; the first:\n{}", wrong[0].1);
     assert!(left_out <= cases / 50, "{left_out} cases are not followed");
     if cases >= CASES {
         let few: Vec<&str> =

@@ -1,0 +1,220 @@
+//! What safe configurations touched, and how the way back of what they interrupted heeds it (design §6): what they wrote is
+//! never overwritten, and what is brought back comes back as they want it.
+
+use super::Transaction;
+use super::run::Run;
+use crate::model::{ComponentName, MemberRef, RunState, Step, Transition, Value, Wanted};
+use crate::system::touch::{Slot, components};
+use crate::system::{View, step};
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::{SmallVec, smallvec};
+
+/// What safe configurations touched: the way back of what they interrupted leaves that alone.
+#[derive(Debug, Clone, Default)]
+pub struct Touched {
+    slots: FxHashSet<Slot>,
+    /// At which revision of the model what touches a slot was planned last.
+    planned: FxHashMap<Slot, u64>,
+    /// At which revision of the model a step of theirs was done last.
+    done: FxHashMap<Slot, u64>,
+    properties: FxHashMap<MemberRef, Value>,
+    ports: FxHashMap<MemberRef, Option<Value>>,
+    states: FxHashMap<ComponentName, RunState>,
+}
+
+fn slot(step: &Step) -> Slot {
+    match step {
+        Step::State { component, .. } => Slot::State(*component),
+        Step::Create { component, .. } | Step::Destroy { component } => Slot::Component(*component),
+        Step::Connect { from, to, .. } | Step::Disconnect { from, to } => Slot::Link(*from, *to),
+        Step::PropertySet { property, .. } => Slot::Property(*property),
+        Step::PortWrite { port, .. } => Slot::Port(*port),
+        Step::Operation(call) => Slot::Operation(call.operation),
+    }
+}
+
+impl Touched {
+    /// `step` is one of theirs, or what it leads to was demanded. Of several the last tells what is wanted.
+    pub fn add(&mut self, step: &Step) {
+        self.slots.insert(slot(step));
+        match step {
+            Step::State { component, transition } => {
+                self.states.insert(*component, transition.target());
+            }
+            Step::PropertySet { property, value } => {
+                self.properties.insert(*property, value.clone());
+            }
+            Step::PortWrite { port, value } => {
+                self.ports.insert(*port, value.clone());
+            }
+            _ => {}
+        }
+    }
+
+    /// The run state of `component` was demanded.
+    pub fn add_state(&mut self, component: ComponentName, wanted: Wanted) {
+        self.slots.insert(Slot::State(component));
+        self.states.insert(component, wanted.into());
+    }
+
+    /// It was all planned on the model of this revision.
+    pub fn planned_at(&mut self, revision: u64) {
+        self.planned = self.slots.iter().map(|slot| (*slot, revision)).collect();
+    }
+
+    /// `step` was done; the model has been at `revision` since.
+    pub fn did(&mut self, step: &Step, revision: u64) {
+        let last = self.done.entry(slot(step)).or_default();
+        *last = revision.max(*last);
+    }
+
+    /// Takes `other` in, which came later.
+    pub fn join(&mut self, other: Self) {
+        self.slots.extend(other.slots);
+        for (mine, theirs) in [(&mut self.done, other.done), (&mut self.planned, other.planned)] {
+            for (slot, revision) in theirs {
+                let last = mine.entry(slot).or_default();
+                *last = revision.max(*last);
+            }
+        }
+        self.properties.extend(other.properties);
+        self.ports.extend(other.ports);
+        self.states.extend(other.states);
+    }
+
+    /// Whether nothing was.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Whether `step` would change something touched.
+    pub fn has(&self, step: &Step) -> bool {
+        let gone = |component: &ComponentName| self.slots.contains(&Slot::Component(*component));
+        self.slots.contains(&slot(step)) || components(step).iter().any(gone)
+    }
+
+    /// Whether what touches the same was planned when `step` had come in at that revision: then it is not late.
+    pub fn knew(&self, step: &Step, revision: u64) -> bool {
+        self.planned.get(&slot(step)).is_some_and(|planned| *planned > revision)
+    }
+
+    /// Whether `step`, which came in late and made the model `revision`, was overwritten by a step of theirs after that.
+    pub fn overwrote(&self, step: &Step, revision: u64) -> bool {
+        self.done.get(&slot(step)).is_some_and(|done| *done > revision)
+    }
+}
+
+impl Transaction {
+    /// Tells of each step of a best effort that was done when that was.
+    pub fn note_done(&self, touched: &mut Touched) {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        forward.noted.iter().for_each(|(i, revision)| touched.did(&forward.list[*i as usize].step, *revision));
+    }
+
+    /// The steps of a best effort that are not over.
+    pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
+        self.forward.iter().flat_map(Run::open).map(|planned| &planned.step)
+    }
+
+    /// A later safe configuration does these steps: what writes the same and has not begun is not issued any more. Answers
+    /// whether there was such.
+    pub fn yield_to<'s>(&mut self, later: impl Iterator<Item = &'s Step>) -> bool {
+        let slots: FxHashSet<Slot> = later.map(slot).collect();
+        self.forward.as_mut().is_some_and(|run| run.leave_out(|step| slots.contains(&slot(step))))
+    }
+}
+
+/// How far a way back has come: which components it will take away again, and which it has brought back.
+pub(super) struct Heed<'t> {
+    touched: &'t Touched,
+    doomed: FxHashSet<ComponentName>,
+    remade: FxHashSet<ComponentName>,
+}
+
+fn height(state: RunState) -> u8 {
+    match state {
+        RunState::Faulted | RunState::Unconfigured => 0,
+        RunState::Stopped => 1,
+        RunState::Running => 2,
+    }
+}
+
+impl<'t> Heed<'t> {
+    /// A way back that begins; it takes away again what `made` has made.
+    pub fn new<'s>(touched: &'t Touched, made: impl Iterator<Item = &'s Step>) -> Self {
+        let created = made.filter_map(|step| match step {
+            Step::Create { component, .. } => Some(*component),
+            _ => None,
+        });
+        let doomed = if touched.is_empty() { FxHashSet::default() } else { created.collect() };
+        Self { touched, doomed, remade: FxHashSet::default() }
+    }
+
+    /// What is done for a step back, the next on the way. Empty: it is superseded.
+    pub fn instead_of(&mut self, back: &Step, view: &impl View) -> SmallVec<[Step; 2]> {
+        if self.touched.is_empty() {
+            return smallvec![back.clone()];
+        }
+        let missing = |component: &ComponentName| view.component(*component).is_none();
+        match back {
+            Step::Create { component, ty, activity, properties } => {
+                if !missing(component) {
+                    return smallvec![];
+                }
+                self.remade.insert(*component);
+                let mut properties = properties.clone();
+                let names = view.types().get(*ty).into_iter().flat_map(|ty| ty.properties.keys());
+                for (name, value) in names.zip(&mut properties) {
+                    if let Some(wanted) = self.touched.properties.get(&component.member(*name)) {
+                        value.clone_from(wanted);
+                    }
+                }
+                let (component, ty, activity) = (*component, *ty, *activity);
+                smallvec![Step::Create { component, ty, activity, properties }]
+            }
+            Step::Destroy { component } if self.doomed.remove(component) => {
+                let Some(node) = view.component(*component) else { return smallvec![] };
+                // It may have been brought up meanwhile.
+                let down = node.state.path_to(Wanted::Unconfigured).iter();
+                let down = down.map(|transition| Step::State { component: *component, transition: *transition });
+                down.chain([back.clone()]).collect()
+            }
+            _ => {
+                let about = components(back);
+                if about.iter().any(missing) {
+                    return smallvec![];
+                }
+                // What goes away again is nobody's to keep; and may have gone a part of the way already.
+                if about.iter().any(|component| self.doomed.contains(component)) {
+                    let goes = step::precondition(back, view).is_empty();
+                    return goes.then(|| back.clone()).into_iter().collect();
+                }
+                if about.iter().any(|component| self.remade.contains(component)) {
+                    return self.as_wanted(back).into_iter().collect();
+                }
+                (!self.touched.has(back)).then(|| back.clone()).into_iter().collect()
+            }
+        }
+    }
+
+    /// A step back about a component that was brought back, as the safe configurations want it; none: not at all.
+    fn as_wanted(&self, back: &Step) -> Option<Step> {
+        match back {
+            Step::PropertySet { property, .. } => {
+                let value = self.touched.properties.get(property).cloned();
+                Some(value.map_or_else(|| back.clone(), |value| Step::PropertySet { property: *property, value }))
+            }
+            Step::PortWrite { port, .. } => {
+                let value = self.touched.ports.get(port).cloned();
+                Some(value.map_or_else(|| back.clone(), |value| Step::PortWrite { port: *port, value }))
+            }
+            Step::State { component, transition } => {
+                let wanted = self.touched.states.get(component);
+                let up = matches!(transition, Transition::Configure | Transition::Start);
+                let further = |wanted: &RunState| up && height(transition.target()) > height(*wanted);
+                (!wanted.is_some_and(further)).then(|| back.clone())
+            }
+            _ => (!self.touched.has(back)).then(|| back.clone()),
+        }
+    }
+}
