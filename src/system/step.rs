@@ -5,7 +5,7 @@
 
 pub use super::touch::{absolute, components, touches};
 use super::violation::brief;
-use super::{Driven, Member, Node, View, ViewMut, Violation};
+use super::{Driven, Member, Node, Slot, View, ViewMut, Violation};
 use crate::model::{
     Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Step,
     Transition, TypeName, Value, ValueType,
@@ -146,14 +146,12 @@ pub fn inverse(step: &Step, undo: Option<&Call>, before: &impl View) -> Undo {
             Some(policy) => Undo::One(Step::Connect { from: *from, to: *to, policy }),
             None => Undo::Nothing,
         },
-        Step::PropertySet { property, .. } => {
-            match before.component(property.component).and_then(|n| n.value(property.member)) {
-                Some(value) => Undo::One(Step::PropertySet { property: *property, value: value.clone() }),
-                None => Undo::Nothing,
-            }
-        }
+        Step::PropertySet { property, .. } => match held(Slot::Property(*property), before) {
+            Some(value) => Undo::One(Step::PropertySet { property: *property, value: value.clone() }),
+            None => Undo::Nothing,
+        },
         Step::PortWrite { port, .. } => match written(*port, before) {
-            Some(value) => Undo::One(Step::PortWrite { port: *port, value }),
+            Some(value) => Undo::One(Step::PortWrite { port: *port, value: value.cloned() }),
             None => Undo::Nothing,
         },
         Step::Operation(call) => {
@@ -225,10 +223,19 @@ pub fn apply(step: &Step, view: &mut impl ViewMut) -> Result<(), Vec<Violation>>
 }
 
 /// What was written to a port: none when there is no such port, `Some(None)` when it was never written.
-pub fn written(port: MemberRef, view: &impl View) -> Option<Option<Value>> {
+pub fn written(port: MemberRef, view: &impl View) -> Option<Option<&Value>> {
     let node = view.component(port.component)?;
     let (at, _) = node.port(port.member)?;
-    Some(node.written(at).cloned())
+    Some(node.written(at))
+}
+
+/// The value that a property or port holds: what an absolute write overwrites. None: never written, or no such slot.
+pub fn held(slot: Slot, view: &impl View) -> Option<&Value> {
+    match slot {
+        Slot::Property(property) => view.component(property.component)?.value(property.member),
+        Slot::Port(port) => written(port, view)?,
+        _ => None,
+    }
 }
 
 fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &impl View, found: &mut Vec<Violation>) {
