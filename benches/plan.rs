@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use davit::model::*;
 use davit::plan::{Context, plan};
-use davit::stack::{Op, Requester, Stack, Switch, transaction};
+use davit::stack::{Op, Requester, Resolved, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::collections::BTreeMap;
@@ -133,10 +133,10 @@ fn switches(c: &mut Criterion) {
         drop(planned);
         let perform = |switch: &Switch, undoing, system: &mut System| {
             let mut done = 0;
-            while let Some((_, what, value)) = switch.step(done, undoing) {
+            while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
                 black_box(value);
-                assert!(step::precondition(what, system).is_empty());
-                step::effect(what, system);
+                assert!(place.precondition(step, system).is_empty());
+                place.effect(step, system);
                 done += 1;
             }
         };

@@ -4,7 +4,7 @@
 use davit::model::*;
 use davit::plan::footprint::Saved;
 use davit::plan::{Context, plan};
-use davit::stack::{Op, Requester, Scope, Stack, Switch, transaction};
+use davit::stack::{Op, Requester, Resolved, Scope, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::alloc::{GlobalAlloc, Layout};
@@ -107,10 +107,10 @@ fn switch(gain: f64) -> Configuration {
 /// Does the steps as the configurator does, and says how many.
 fn perform(switch: &Switch, undoing: bool, system: &mut System) -> usize {
     let mut done = 0;
-    while let Some((_, what, value)) = switch.step(done, undoing) {
+    while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
         std::hint::black_box(value);
-        assert!(step::precondition(what, system).is_empty());
-        step::effect(what, system);
+        assert!(place.precondition(step, system).is_empty());
+        place.effect(step, system);
         done += 1;
     }
     done
@@ -162,7 +162,8 @@ fn a_prepared_switch_allocates_nothing() {
             if wanted == Transition::Stop {
                 let value = Value::floats(&[value; 3]);
                 step::apply(&Step::PropertySet { property, value }, system).unwrap();
-                step::apply(&Step::PortWrite { port: MemberRef::new("arm.mode").unwrap(), value: None }, system).unwrap();
+                step::apply(&Step::PortWrite { port: MemberRef::new("arm.mode").unwrap(), value: None }, system)
+                    .unwrap();
             }
         }
     };

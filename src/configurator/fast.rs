@@ -12,8 +12,7 @@ use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{Ask, Cause, Outcome};
-use crate::stack::{Group, HandOver, Planned, Switch, World};
-use crate::system::step;
+use crate::stack::{Group, HandOver, Planned, Resolved, Switch, World};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -105,12 +104,12 @@ impl Engine {
     ) -> Result<(), (u32, Outcome)> {
         let deadline = *at + self.limits.step_timeout;
         let mut sent = 0u32;
-        while let Some((index, step, value)) = fast.switch.step(sent as usize, undoing) {
+        while let Some(Resolved { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
             let name = StepName::of(step);
             if let Some(progress) = &self.progress {
                 progress(&Progress::Started(name));
             }
-            let outcome = match step::precondition(step, &self.world.system).first() {
+            let outcome = match place.precondition(step, &self.world.system).first() {
                 Some(violation) => Outcome::NotDone(Cause::Refused(violation.to_string())),
                 None => {
                     // After a panic in the middle nobody knows, as after any answer that did not come.
@@ -130,7 +129,7 @@ impl Engine {
             if !matches!(outcome, Outcome::Done(_)) {
                 return Err((sent, outcome));
             }
-            step::effect(step, &mut self.world.system);
+            place.effect(step, &mut self.world.system);
             sent += 1;
         }
         self.changed();

@@ -31,7 +31,7 @@ pub use desk::{Arrival, Desk, Turn, given_up_of};
 pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
-pub use prepared::Switch;
+pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};

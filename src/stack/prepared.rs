@@ -3,14 +3,15 @@
 //! A [`Switch`] is a frame that was planned in the ordinary way, with all that decided its steps: which components there
 //! were and in which run states, that nothing drove the ports, and which demands were true already. While that is so,
 //! planning again could only give the same steps, and all that is new are the values they overwrite. Otherwise the
-//! configuration is planned anew. The steps go through the same gate as any other: [`step::precondition`].
+//! configuration is planned anew. The steps are resolved to handles, and go through the same gate as any other.
 
 use super::share::components;
 use super::{Frame, FrameId, Inverse, Planned, Requester, Scope, Stack};
 use crate::model::{ComponentName, Configuration, RunState, Step, Target, Value};
 use crate::plan::footprint::{Saved, Slot};
+use crate::plan::undo::absolute;
 use crate::plan::{PlannedStep, SavedValue};
-use crate::system::{System, Undo, View, step};
+use crate::system::{Place, System, Undo, View};
 use crate::time::Time;
 use petgraph::stable_graph::NodeIndex;
 use std::collections::BTreeMap;
@@ -32,6 +33,23 @@ pub struct Switch {
     /// as it is, and it is not found there any more.
     frame: Arc<Frame>,
     seen: Vec<Seen>,
+    /// Where its steps are done.
+    places: Vec<Place>,
+    /// Where its saved values are.
+    slots: Vec<Place>,
+}
+
+/// A step that is done next, resolved.
+#[derive(Debug, Clone, Copy)]
+pub struct Resolved<'s> {
+    /// The step.
+    pub step: &'s Step,
+    /// Where it is done.
+    pub place: Place,
+    /// Its number in the [universe](Switch::universe).
+    pub index: usize,
+    /// The value that replaces that step's own.
+    pub value: Option<&'s Value>,
 }
 
 impl Switch {
@@ -63,7 +81,12 @@ impl Switch {
             Some(Seen { at, born: node.born, before: node.state, after })
         };
         let seen = components(&frame.footprint).into_iter().map(see).collect::<Option<_>>()?;
-        Some(Self { frame, seen })
+        let place = |planned: &PlannedStep| {
+            Place::of(absolute(&planned.step).unwrap_or(Slot::State(planned.step.component())), system)
+        };
+        let places = frame.steps().iter().map(place).collect::<Option<_>>()?;
+        let slots = frame.saved.iter().map(|saved| Place::of(saved.slot, system)).collect::<Option<_>>()?;
+        Some(Self { frame, seen, places, slots })
     }
 
     /// The frame that it leads to.
@@ -84,17 +107,13 @@ impl Switch {
         self.frame.steps().iter().flat_map(both).collect()
     }
 
-    /// The step that is done as the `nth` when it is applied or undone, its number in the universe, and the value that
-    /// replaces that step's own.
-    pub fn step(&self, nth: usize, undoing: bool) -> Option<(usize, &Step, Option<&Value>)> {
+    /// The step that is done as the `nth` when it is applied or undone.
+    pub fn step(&self, nth: usize, undoing: bool) -> Option<Resolved<'_>> {
         let steps = self.frame.steps();
-        let (at, step) = if undoing {
-            let at = steps.len().checked_sub(nth + 1)?;
-            (2 * at + 1, steps[at].undo.steps().first()?)
-        } else {
-            (2 * nth, &steps.get(nth)?.step)
-        };
-        Some((at, step, written(step)))
+        let at = if undoing { steps.len().checked_sub(nth + 1)? } else { nth };
+        let planned = steps.get(at)?;
+        let step = if undoing { planned.undo.steps().first()? } else { &planned.step };
+        Some(Resolved { step, place: self.places[at], index: 2 * at + usize::from(undoing), value: written(step) })
     }
 
     /// Whether planning it on `system` would give these steps; `undoing`: whether `system` is as they left it.
@@ -103,8 +122,8 @@ impl Switch {
             let state = if undoing { seen.after } else { seen.before };
             system.node_at(seen.at).is_some_and(|node| node.born == seen.born && node.state == state)
         };
-        let as_saved = |saved: &SavedValue| {
-            let held = step::held(saved.slot, system);
+        let as_saved = |(saved, place): (&SavedValue, &Place)| {
+            let held = place.held(saved.slot, system);
             let there = match &saved.value {
                 _ if saved.step => held == written(&self.frame.steps()[saved.at as usize].step),
                 // A demand that was true: what was there is what is wanted.
@@ -114,7 +133,7 @@ impl Switch {
             let driven = matches!(saved.slot, Slot::Port(port) if system.driven(port).links > 0);
             there == (undoing || !saved.step) && !driven
         };
-        self.seen.iter().all(as_seen) && self.frame.saved.iter().all(as_saved)
+        self.seen.iter().all(as_seen) && self.frame.saved.iter().zip(&self.slots).all(as_saved)
     }
 
     /// Makes its frame ready for another application, with the values that are about to be overwritten. False: it does not
@@ -126,8 +145,8 @@ impl Switch {
         let frame = Arc::make_mut(&mut self.frame);
         (frame.id, frame.requester, frame.at, frame.scope) = (FrameId(u64::MAX), requester, at, scope);
         let Inverse::Steps(steps) = &mut frame.inverse else { return false };
-        for saved in frame.saved.iter_mut().filter(|saved| saved.step) {
-            let held = step::held(saved.slot, system);
+        for (saved, place) in frame.saved.iter_mut().zip(&self.slots).filter(|(saved, _)| saved.step) {
+            let held = place.held(saved.slot, system);
             match (&mut saved.value, &mut steps[saved.at as usize].undo) {
                 (Saved::Property(old), Undo::One(Step::PropertySet { value, .. })) => {
                     let Some(held) = held else { return false };

@@ -291,9 +291,8 @@ fn kept(bench: &Bench, before: &[Op<'_>], configuration: &Configuration) -> bool
 #[test]
 fn only_fixed_switches_of_what_does_not_move_are_prepared() {
     let mut bench = Bench::new(64);
-    let switch = |id| {
-        conf(id, Some("mode"), &[("A", Wanted::Stopped)], vec![set("A.mass", 1.0)], &[("A", Wanted::Running)])
-    };
+    let switch =
+        |id| conf(id, Some("mode"), &[("A", Wanted::Stopped)], vec![set("A.mass", 1.0)], &[("A", Wanted::Running)]);
     assert!(kept(&bench, &[], &switch("s")));
     let mut default = switch("s");
     default.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
@@ -309,7 +308,10 @@ fn only_fixed_switches_of_what_does_not_move_are_prepared() {
     bench.ok(&[Op::UndoTop]);
     assert!(Switch::new(&bench.system, &switch("s"), &planned).is_none(), "it was planned for another system");
     bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
-    assert!(!kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0)], &[])), "a fault is to be undone its own way");
+    assert!(
+        !kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0)], &[])),
+        "a fault is to be undone its own way"
+    );
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 pub use super::touch::{absolute, components, touches};
 use super::violation::brief;
-use super::{Driven, Member, Node, Slot, View, ViewMut, Violation};
+use super::{Driven, Member, Node, View, ViewMut, Violation};
 use crate::model::{
     Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Step,
     Transition, TypeName, Value, ValueType,
@@ -53,10 +53,7 @@ pub fn precondition(step: &Step, view: &impl View) -> Vec<Violation> {
     match step {
         Step::State { component, transition } => match view.component(*component) {
             None => found.push(Violation::UnknownComponent(*component)),
-            Some(node) if !transition.allowed_in(node.state) => {
-                found.push(Violation::Transition { component: *component, transition: *transition, state: node.state })
-            }
-            Some(_) => {}
+            Some(node) => move_allowed(node, *transition, &mut found),
         },
         Step::Create { component, ty, properties, .. } => create_allowed(*component, *ty, properties, view, &mut found),
         Step::Destroy { component } => destroy_allowed(*component, view, &mut found),
@@ -146,10 +143,12 @@ pub fn inverse(step: &Step, undo: Option<&Call>, before: &impl View) -> Undo {
             Some(policy) => Undo::One(Step::Connect { from: *from, to: *to, policy }),
             None => Undo::Nothing,
         },
-        Step::PropertySet { property, .. } => match held(Slot::Property(*property), before) {
-            Some(value) => Undo::One(Step::PropertySet { property: *property, value: value.clone() }),
-            None => Undo::Nothing,
-        },
+        Step::PropertySet { property, .. } => {
+            match before.component(property.component).and_then(|n| n.value(property.member)) {
+                Some(value) => Undo::One(Step::PropertySet { property: *property, value: value.clone() }),
+                None => Undo::Nothing,
+            }
+        }
         Step::PortWrite { port, .. } => match written(*port, before) {
             Some(value) => Undo::One(Step::PortWrite { port: *port, value: value.cloned() }),
             None => Undo::Nothing,
@@ -227,15 +226,6 @@ pub fn written(port: MemberRef, view: &impl View) -> Option<Option<&Value>> {
     let node = view.component(port.component)?;
     let (at, _) = node.port(port.member)?;
     Some(node.written(at))
-}
-
-/// The value that a property or port holds: what an absolute write overwrites. None: never written, or no such slot.
-pub fn held(slot: Slot, view: &impl View) -> Option<&Value> {
-    match slot {
-        Slot::Property(property) => view.component(property.component)?.value(property.member),
-        Slot::Port(port) => written(port, view)?,
-        _ => None,
-    }
 }
 
 fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &impl View, found: &mut Vec<Violation>) {
@@ -379,6 +369,22 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
         found.push(lacks(Member::Property, property, node));
         return;
     };
+    value_allowed(node, property, declared, value, found);
+}
+
+pub(super) fn move_allowed(node: &Node, transition: Transition, found: &mut Vec<Violation>) {
+    if !transition.allowed_in(node.state) {
+        found.push(Violation::Transition { component: node.name, transition, state: node.state });
+    }
+}
+
+pub(super) fn value_allowed(
+    node: &Node,
+    property: MemberRef,
+    declared: &PropertyType,
+    value: &Value,
+    found: &mut Vec<Violation>,
+) {
     if !declared.tunable.allows(node.state) {
         let (tunable, state, declared) = (declared.tunable, node.state, declared.origin);
         found.push(Violation::NotTunable { property, tunable, state, declared });
@@ -387,7 +393,18 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
 }
 
 fn write_allowed(port: MemberRef, value: Option<&Value>, view: &impl View, found: &mut Vec<Violation>) {
-    let Some(declared) = port_of(port, view, found) else { return };
+    if let Some(declared) = port_of(port, view, found) {
+        sample_allowed(port, declared, value, view, found);
+    }
+}
+
+pub(super) fn sample_allowed(
+    port: MemberRef,
+    declared: &PortType,
+    value: Option<&Value>,
+    view: &impl View,
+    found: &mut Vec<Violation>,
+) {
     if declared.direction != Direction::In {
         found.push(Violation::WritesOut { port, declared: declared.origin });
         return;

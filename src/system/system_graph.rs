@@ -246,11 +246,15 @@ impl System {
         self.graph.node_weight(index)
     }
 
-    fn touch(&mut self, name: ComponentName) -> &mut Node {
+    pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
         self.revision += 1;
-        let node = &mut self.graph[self.names[&name]];
+        let node = self.graph.node_weight_mut(index)?;
         node.generation = self.revision;
-        node
+        Some(node)
+    }
+
+    fn touch(&mut self, name: ComponentName) -> &mut Node {
+        self.touch_at(self.names[&name]).expect("names and nodes agree")
     }
 }
 

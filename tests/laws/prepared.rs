@@ -6,7 +6,7 @@ use crate::settings;
 use crate::stacks::Both;
 use davit::model::{ChangeKind, Configuration, MemberRef, Policy, RunState, StateList, Step, Target};
 use davit::plan::PlannedStep;
-use davit::stack::{Op, Planned, Requester, Scope, Switch};
+use davit::stack::{Op, Planned, Requester, Resolved, Scope, Switch};
 use davit::system::{System, View, step};
 use davit::time::Time;
 use proptest::prelude::*;
@@ -49,7 +49,8 @@ impl Twins {
             let mut conf = read(gene, &plain.system);
             // One in four stays as it is and is most often no fixed switch.
             if gene.id % 4 != 0 {
-                conf.changes.retain(|c| matches!(c.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. }));
+                conf.changes
+                    .retain(|c| matches!(c.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. }));
                 for list in [&mut conf.pre, &mut conf.post] {
                     *list = StateList::of(list.iter().filter(|e| e.target != Target::Default)).unwrap();
                 }
@@ -129,10 +130,10 @@ impl Twins {
         let steps = |list: &[PlannedStep]| list.iter().map(|s| (s.step.clone(), s.undo.clone())).collect::<Vec<_>>();
         prop_assert_eq!(steps(&list), steps(&planned.steps));
         for (nth, listed) in list.iter().enumerate() {
-            let (at, step, value) = switch.step(nth, undoing).expect("as many as planned");
+            let Resolved { step, place, index, value } = switch.step(nth, undoing).expect("as many as planned");
             prop_assert_eq!(step, &listed.step);
             // What goes to the platform is a step of the universe, with the value replaced.
-            let mut sent = universe[at].clone();
+            let mut sent = universe[index].clone();
             match (&mut sent, value) {
                 (Step::PropertySet { value, .. }, Some(v)) => value.clone_from(v),
                 (Step::PortWrite { value, .. }, Some(v)) => *value = Some(v.clone()),
@@ -140,8 +141,16 @@ impl Twins {
                 (step, Some(_)) => prop_assert!(false, "a value for {}", step),
             }
             prop_assert_eq!(&sent, step);
-            let found = step::apply(step, &mut self.fast.system);
-            prop_assert!(found.is_ok(), "{} {:?}", step, found);
+            let found = step::precondition(step, &self.fast.system);
+            prop_assert_eq!(place.precondition(step, &self.fast.system), found.clone(), "{}", step);
+            prop_assert!(found.is_empty(), "{} {:?}", step, found);
+            let mut named = self.fast.system.clone();
+            step::effect(step, &mut named);
+            place.effect(step, &mut self.fast.system);
+            prop_assert_eq!(self.fast.system.snapshot(), named.snapshot());
+            // Done once more it may be refused: by the same words.
+            let again = step::precondition(step, &self.fast.system);
+            prop_assert_eq!(place.precondition(step, &self.fast.system), again, "{}", step);
         }
         prop_assert!(switch.step(list.len(), undoing).is_none());
         Ok(())
