@@ -4,9 +4,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use davit::model::*;
-use davit::plan::prepare::Switch;
 use davit::plan::{Context, plan};
-use davit::stack::{Op, Requester, Stack, transaction};
+use davit::stack::{Op, Requester, Resolved, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::collections::BTreeMap;
@@ -126,23 +125,28 @@ fn switches(c: &mut Criterion) {
     for n in [10, 10_000] {
         let mut system = deployed(n);
         let mut stack = Stack::new(64);
-        let mut prepared = Switch::new(&mut system, &switch("switch", 2.0)).expect("a fixed switch");
+        let configuration = switch("switch", 2.0);
+        let (requester, at) = (Requester::Operator, Time(0));
+        let push = Op::Push { configuration: &configuration, requester, at, scope: None };
+        let planned = transaction(&system, &stack, &[push], &Context::default()).expect("accepted");
+        let mut prepared = Switch::new(&system, &configuration, &planned).expect("a fixed switch");
+        drop(planned);
+        let perform = |switch: &Switch, undoing, system: &mut System| {
+            let mut done = 0;
+            while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
+                black_box(value);
+                assert!(place.precondition(step, system).is_empty());
+                place.effect(step, system);
+                done += 1;
+            }
+        };
         group.bench_with_input(BenchmarkId::new("prepared, apply and undo", n), &n, |b, _| {
             b.iter(|| {
-                assert!(stack.takes(&prepared) && prepared.ready(&system));
-                for i in 0..prepared.acts().len() {
-                    let act = prepared.acts()[i];
-                    black_box(prepared.sends(act));
-                    prepared.done(act, &mut system);
-                }
-                stack.push_switch(&prepared, Requester::Operator, Time(0), None);
-                let top = stack.top_of(&prepared).expect("just pushed");
-                assert!(prepared.ready_undo(&system, &top.acts, &top.saved));
-                for i in 0..prepared.acts().len() {
-                    let act = prepared.acts()[i];
-                    black_box(prepared.sends(act));
-                    prepared.done(act, &mut system);
-                }
+                assert!(stack.takes(&prepared) && prepared.ready(&system, requester, at, None));
+                perform(&prepared, false, &mut system);
+                stack.push_switch(&mut prepared);
+                assert!(stack.is_top(&prepared) && prepared.fits(&system, true));
+                perform(&prepared, true, &mut system);
                 stack.pop_switch();
             });
         });

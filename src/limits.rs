@@ -6,6 +6,10 @@ use std::time::Duration;
 /// small enough that selective undo, which looks at the frames above, stays instant.
 pub const STACK: usize = 64;
 
+/// Plans of one configuration that are kept to be carried out again: for each set of demands that may be true already when
+/// it is applied, of which few occur in turn.
+pub const PREPARED: usize = 4;
+
 /// How long one step may take where the deployment does not say: longer than any software-only change, short enough that
 /// an operator does not think the program hangs.
 pub const STEP_TIMEOUT: Duration = Duration::from_secs(1);

@@ -1,10 +1,10 @@
-//! What a prepared switch costs in allocations: nothing, from its second application on (the first one makes the frame
-//! that is used again afterwards).
+//! What a prepared switch costs in allocations: nothing, from its second application on (the first one is planned, and
+//! makes the frame that is used again afterwards).
 
 use davit::model::*;
-use davit::plan::prepare::{Act, Switch};
+use davit::plan::footprint::Saved;
 use davit::plan::{Context, plan};
-use davit::stack::{Requester, Scope, Stack};
+use davit::stack::{Op, Requester, Resolved, Scope, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::alloc::{GlobalAlloc, Layout};
@@ -104,42 +104,76 @@ fn switch(gain: f64) -> Configuration {
     conf
 }
 
-fn perform(switch: &Switch, system: &mut System) {
-    for i in 0..switch.acts().len() {
-        let act: Act = switch.acts()[i];
-        std::hint::black_box(switch.sends(act));
-        switch.done(act, system);
+/// Does the steps as the configurator does, and says how many.
+fn perform(switch: &Switch, undoing: bool, system: &mut System) -> usize {
+    let mut done = 0;
+    while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
+        std::hint::black_box(value);
+        assert!(place.precondition(step, system).is_empty());
+        place.effect(step, system);
+        done += 1;
     }
+    done
 }
 
 #[test]
 fn a_prepared_switch_allocates_nothing() {
     let mut system = arm();
     let mut stack = Stack::new(8);
+    let configuration = switch(2.0);
+    let (requester, at, scope) = (Requester::Operator, Time(1), Some(Scope(1)));
+    let push = Op::Push { configuration: &configuration, requester, at, scope };
+    let plan = |system: &mut System, stack: &mut Stack| {
+        let planned = transaction(system, stack, &[push], &Context::default()).unwrap();
+        let switch = Switch::new(system, &configuration, &planned).expect("a fixed switch");
+        for planned in &planned.steps {
+            step::apply(&planned.step, system).unwrap();
+        }
+        stack.commit(planned);
+        switch
+    };
     let before = system.snapshot();
-    let mut switch = Switch::new(&mut system, &switch(2.0)).unwrap();
+    let mut first = None;
+    assert!(count(|| first = Some(plan(&mut system, &mut stack))) > 0, "the counter counts");
+    let mut switch = first.unwrap();
+    let undo = transaction(&system, &stack, &[Op::UndoTop], &Context::default()).unwrap();
+    for planned in &undo.steps {
+        step::apply(&planned.step, &mut system).unwrap();
+    }
+    stack.commit(undo);
+    assert_eq!(system.snapshot(), before);
     let cycle = |switch: &mut Switch, system: &mut System, stack: &mut Stack| {
         assert!(stack.takes(switch));
-        assert!(switch.ready(system));
-        perform(switch, system);
-        stack.push_switch(switch, Requester::Operator, Time(1), Some(Scope(1)));
-        let top = stack.top_of(switch).expect("it was just pushed");
-        assert!(switch.ready_undo(system, &top.acts, &top.saved));
-        perform(switch, system);
+        assert!(switch.ready(system, requester, at, scope));
+        assert_eq!(perform(switch, false, system), 4);
+        stack.push_switch(switch);
+        assert!(stack.is_top(switch) && switch.fits(system, true));
+        assert_eq!(perform(switch, true, system), 4);
         stack.pop_switch();
     };
-    let first = count(|| cycle(&mut switch, &mut system, &mut stack));
-    assert!(first > 0, "the counter counts");
     assert_eq!(count(|| (0..100).for_each(|_| cycle(&mut switch, &mut system, &mut stack))), 0);
     assert_eq!(system.snapshot(), before);
-    // Planning and capturing alone allocate nothing at the first time either.
-    let mut fresh = Switch::new(&mut system, &self::switch(3.0)).unwrap();
-    assert_eq!(
-        count(|| {
-            assert!(fresh.ready(&system));
-            perform(&fresh, &mut system);
-        }),
-        0
-    );
-    assert_ne!(system.snapshot(), before);
+    // In force twice, it has two frames.
+    let gain = |value: f64, system: &mut System| {
+        let property = MemberRef::new("arm.gain").unwrap();
+        for wanted in [Transition::Stop, Transition::Start] {
+            let component = property.component;
+            step::apply(&Step::State { component, transition: wanted }, system).unwrap();
+            if wanted == Transition::Stop {
+                let value = Value::floats(&[value; 3]);
+                step::apply(&Step::PropertySet { property, value }, system).unwrap();
+                step::apply(&Step::PortWrite { port: MemberRef::new("arm.mode").unwrap(), value: None }, system)
+                    .unwrap();
+            }
+        }
+    };
+    for old in [1.0, 3.0] {
+        gain(old, &mut system);
+        assert!(switch.ready(&system, requester, at, scope));
+        perform(&switch, false, &mut system);
+        stack.push_switch(&mut switch);
+    }
+    let saved = |at: usize| stack.frames()[at].saved.iter().map(|s| s.value.clone()).collect::<Vec<_>>();
+    assert_eq!(saved(0)[0], Saved::Property(Value::floats(&[1.0; 3])));
+    assert_eq!(saved(1)[0], Saved::Property(Value::floats(&[3.0; 3])));
 }

@@ -185,10 +185,12 @@ fn follow(
     let mut found = ways::ways(&mut product);
     let mut asked = product.worlds.asked().clone();
     for numbers in beside::groups(deployment, charts) {
+        // Where all have to do with each other, what was planned for the ways is known already.
+        let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
+        let product = apart.as_mut().unwrap_or(&mut product);
         for most_waiting in limits::CHECK_WAITING..=limits::CHECK_WAITING_MOST {
-            let mut product = Product::new(deployment, views, charts, &numbers, catalogue);
-            product.most_waiting = most_waiting;
-            let mut graph = explore::explore(&mut product);
+            product.follow_anew(most_waiting);
+            let mut graph = explore::explore(product);
             // Anew with more of them where they are few: often there never are more at once.
             let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
             if easy && graph.bounds.contains_key(&Bound::Waiting) {

@@ -98,6 +98,13 @@ impl<'a> Product<'a> {
         product
     }
 
+    /// Nothing was followed in it yet, with so many batches of one coordinator that may wait; what was planned in its worlds
+    /// stays known.
+    pub fn follow_anew(&mut self, most_waiting: usize) {
+        (self.overflow, self.forked, self.entangled) = (false, false, false);
+        self.most_waiting = most_waiting;
+    }
+
     /// The state after the first entries; none when one of them cannot be entered.
     pub fn start(&mut self) -> Option<State> {
         let entered: Option<Vec<_>> = self.members.iter_mut().map(Member::enter).collect();

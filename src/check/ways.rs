@@ -16,26 +16,26 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     let ways = drive::ways(product);
     product.operator = operator;
     let Some((rise, fall)) = ways else { return Traced::new() };
-    let mut found = Traced::new();
-    let up = trace(product, &[&rise]);
-    let down = fall.as_ref().map(|fall| trace(product, &[&rise, fall]));
-    let (rises, falls) = (rise.reached, fall.as_ref().is_some_and(|fall| fall.reached));
-    let ways = [Some((&rise, &up)), fall.as_ref().zip(down.as_ref())];
     // The reasons of a refusal are findings of their own, each at its place.
-    for (way, trace) in ways.into_iter().flatten() {
-        if let Some((_, reasons)) = &way.refused {
-            found.extend(reasons.iter().map(|reason| (reason.clone(), trace.clone())));
-        }
+    let reasons = |way: &Way| way.refused.iter().flat_map(|(_, reasons)| reasons.clone()).collect::<Vec<_>>();
+    let mut up = reasons(&rise);
+    if !rise.reached {
+        up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"));
     }
-    if !rises {
-        found.push((stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"), up));
-    }
-    if let (Some(fall), Some(down)) = (fall, down) {
-        if !falls {
-            found.push((stops(product, &fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"), down));
+    let mut down = fall.as_ref().map(reasons).unwrap_or_default();
+    if let Some(fall) = &fall {
+        if !fall.reached {
+            down.push(stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"));
         } else if let Some(finding) = leftovers(product, fall.end()) {
-            found.push((finding, down));
+            down.push(finding);
         }
+    }
+    let both: Vec<&Way> = std::iter::once(&rise).chain(&fall).collect();
+    let mut found = Traced::new();
+    for (findings, ways) in [(up, &both[..1]), (down, &both[..])] {
+        // A trace costs as much as going the way again: only where something is wrong.
+        let trace = if findings.is_empty() { Vec::new() } else { trace(product, ways) };
+        found.extend(findings.into_iter().map(|finding| (finding, trace.clone())));
     }
     for (finding, _) in &mut found {
         // What functions decide is not known here.

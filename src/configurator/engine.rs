@@ -95,8 +95,8 @@ pub(super) struct Engine {
     pub returned: bool,
     /// What partial frames are left of.
     pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
-    /// Prepared switches.
-    pub switches: FxHashMap<ConfigId, Box<Fast>>,
+    /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
+    pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirming: Vec<Confirming>,
     /// Confirming events that came while something was under way.
     pub heard: Vec<(EventName, Time)>,

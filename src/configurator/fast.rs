@@ -1,8 +1,8 @@
-//! Prepared switches: the way of a request that resolves no name and allocates nothing (design §6).
+//! Prepared switches: the way of a request that plans nothing and allocates nothing (design §6).
 //!
-//! A fixed configuration is prepared when it was applied for the first time in the ordinary way, on the platform as well.
-//! From then on a lone request for it, or for its undo while its frame is the top, goes this way: the switch looks at
-//! every precondition on the live system, and declines when anything is not as it was prepared for.
+//! What was planned for a fixed configuration is kept, with its steps prepared on the platform as well. A lone request for
+//! it while all is as when it was planned, or for its undo while its frame is the top, goes this way: step by step, through
+//! the same gate as ever. Anything else is planned.
 
 use super::engine::Engine;
 use super::progress::{Progress, StepEnd, StepName};
@@ -10,28 +10,29 @@ use super::request::Request;
 use super::running::{Purpose, Running};
 use super::switches::Fast;
 use super::teardown::own_plan;
-use crate::model::{Ask, Cause, ConfigId, Outcome};
-use crate::plan::prepare::Switch;
-use crate::stack::{Edits, Frame, Group};
+use crate::limits;
+use crate::model::{Ask, Cause, Outcome};
+use crate::stack::{Group, HandOver, Planned, Resolved, Switch, World};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 impl Engine {
-    /// Prepares a configuration that has just been applied, if it is a fixed switch.
-    pub(super) fn prepare(&mut self, id: ConfigId) {
-        if self.switches.contains_key(&id) {
-            return;
-        }
-        let configurations = self.configurations.clone();
-        if let Some(configuration) = configurations.get(&id)
-            // What it stands for is to be waited for.
-            && configuration.holds.is_none()
-            && let Some(switch) = Switch::new(&mut self.world.system, configuration)
-            && let Some(platform) = self.platform.prepare(switch.universe())
+    /// Keeps what was planned for a fixed configuration.
+    pub(super) fn prepare(&mut self, planned: &Planned) {
+        let configuration = planned.parts.first().and_then(|part| self.configurations.get(&part.pushes?));
+        let Some(configuration) = configuration else { return };
+        let kept = self.switches.entry(configuration.id).or_default();
+        // It was planned for another reason (a batch, the bound of the stack).
+        if !kept.iter().any(|fast| fast.switch.fits(&self.world.system, false))
+            && let Some(switch) = Switch::new(&self.world.system, configuration, planned)
+            && let Some(platform) = self.platform.prepare(&switch.universe())
         {
-            self.switches.insert(id, Box::new(Fast { switch, platform }));
+            if kept.len() >= limits::PREPARED {
+                kept.remove(0);
+            }
+            kept.push(Fast { switch, platform });
         }
     }
 
@@ -50,40 +51,33 @@ impl Engine {
             Ask::UndoOf(id) => (id, true),
             _ => return Fared::Not,
         };
-        let Some(mut fast) = self.switches.remove(&id) else { return Fared::Not };
-        let ready = if undoing {
-            let own = |top: &&Frame| {
+        let begun = self.current.last().map_or_else(|| self.clock.now(), |(_, begun)| *begun);
+        let World { system, stack, .. } = &self.world;
+        let own = || {
+            let top = stack.top();
+            top.is_some_and(|top| {
                 (request.force || top.requester == request.requester)
                     && (request.scope.is_none() || request.scope == top.scope)
-            };
-            match self.world.stack.top_of(&fast.switch).filter(own) {
-                Some(top) => fast.switch.ready_undo(&self.world.system, &top.acts, &top.saved),
-                None => {
-                    self.switches.insert(id, fast);
-                    return Fared::Not;
-                }
-            }
-        } else if self.world.stack.takes(&fast.switch) {
-            fast.switch.ready(&self.world.system)
-        } else {
-            self.switches.insert(id, fast);
-            return Fared::Not;
+            })
         };
-        if !ready {
-            // It was prepared for another system: let go, and prepared anew when it has been applied.
-            return Fared::Not;
-        }
-        let mut at = self.current.last().map_or_else(|| self.clock.now(), |(_, begun)| *begun);
+        let fits = |Fast { switch, .. }: &mut Fast| match undoing {
+            true => stack.is_top(switch) && own() && switch.fits(system, true),
+            false => stack.takes(switch) && switch.ready(system, request.requester, begun, request.scope),
+        };
+        let Some(kept) = self.switches.get_mut(&id) else { return Fared::Not };
+        let Some(place) = kept.iter_mut().position(fits) else { return Fared::Not };
+        let mut fast = kept.remove(place);
+        let mut at = begun;
         if let Err((sent, outcome)) = self.switch_over(&mut fast, request, undoing, &mut at) {
             self.go_on_from(number, &fast.switch, request, undoing, (sent, outcome));
-            self.switches.insert(id, fast);
+            self.switches.entry(id).or_default().push(fast);
             return Fared::GoesOn;
         }
         if undoing {
             self.world.stack.pop_switch();
             self.forget_confirmations();
         } else {
-            let frame = self.world.stack.push_switch(&fast.switch, request.requester, at, request.scope);
+            let frame = self.world.stack.push_switch(&mut fast.switch);
             self.await_confirmation(request, frame);
             self.applied(id, None);
         }
@@ -92,15 +86,15 @@ impl Engine {
         {
             conditions.nudge();
         }
-        self.switches.insert(id, fast);
+        self.switches.entry(id).or_default().push(fast);
         self.desk.over(number);
         self.answer(request, request.ask.done(), None);
         Fared::Done
     }
 
-    /// Carries out the acts that are ready, from `at` on, which becomes the time of the last look at the clock: a look costs
-    /// as much as an act, so only those that may take time are measured. The error is the number of the step that was not
-    /// done, and what came of it.
+    /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a
+    /// step, so only those that may take time are measured. The error is the number of the step that was not done, and what
+    /// came of it.
     fn switch_over(
         &mut self,
         fast: &mut Fast,
@@ -110,32 +104,33 @@ impl Engine {
     ) -> Result<(), (u32, Outcome)> {
         let deadline = *at + self.limits.step_timeout;
         let mut sent = 0u32;
-        for nth in 0..fast.switch.acts().len() {
-            let act = fast.switch.acts()[nth];
-            if let Some((index, value)) = fast.switch.sends(act) {
-                let step = StepName::of(&fast.switch.universe()[index]);
-                if let Some(progress) = &self.progress {
-                    progress(&Progress::Started(step));
-                }
-                // After a panic in the middle nobody knows, as after any answer that did not come.
-                let call = AssertUnwindSafe(|| fast.platform.execute(index, value, *at, deadline));
-                let outcome =
-                    catch_unwind(call).unwrap_or_else(|_| Outcome::Unknown(Cause::Lost("a panic".to_owned())));
-                // Who stops may have to wait, for its update to end.
-                let took = fast.platform.waited().then(|| {
-                    let begun = std::mem::replace(at, self.clock.now());
-                    at.since(begun)
-                });
-                if let Some(progress) = &self.progress {
-                    let end = StepEnd::from(&outcome);
-                    progress(&Progress::Ended { request: request.id, step, end, took, undoing });
-                }
-                if !matches!(outcome, Outcome::Done(_)) {
-                    return Err((sent, outcome));
-                }
-                sent += 1;
+        while let Some(Resolved { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
+            let name = StepName::of(step);
+            if let Some(progress) = &self.progress {
+                progress(&Progress::Started(name));
             }
-            fast.switch.done(act, &mut self.world.system);
+            let outcome = match place.precondition(step, &self.world.system).first() {
+                Some(violation) => Outcome::NotDone(Cause::Refused(violation.to_string())),
+                None => {
+                    // After a panic in the middle nobody knows, as after any answer that did not come.
+                    let call = AssertUnwindSafe(|| fast.platform.execute(index, value, *at, deadline));
+                    catch_unwind(call).unwrap_or_else(|_| Outcome::Unknown(Cause::Lost("a panic".to_owned())))
+                }
+            };
+            // Who stops may have to wait, for its update to end.
+            let took = fast.platform.waited().then(|| {
+                let begun = std::mem::replace(at, self.clock.now());
+                at.since(begun)
+            });
+            if let Some(progress) = &self.progress {
+                let end = StepEnd::from(&outcome);
+                progress(&Progress::Ended { request: request.id, step: name, end, took, undoing });
+            }
+            if !matches!(outcome, Outcome::Done(_)) {
+                return Err((sent, outcome));
+            }
+            place.effect(step, &mut self.world.system);
+            sent += 1;
         }
         self.changed();
         Ok(())
@@ -144,28 +139,16 @@ impl Engine {
     /// What goes wrong in the middle of a switch is taken over by an ordinary transaction.
     fn go_on_from(&mut self, number: u32, switch: &Switch, request: Request, undoing: bool, ended: (u32, Outcome)) {
         let (sent, outcome) = ended;
-        let mut steps = switch.steps(switch.acts());
-        for step in &mut steps {
-            // Their order is that of the acts; the stages of an undo run the other way.
-            step.wave = 0;
-            step.after = step.id.checked_sub(1).into_iter().collect();
-        }
-        let (edits, frame) = if undoing {
-            let top = self.world.stack.top().cloned();
-            let pops = top.iter().map(|top| (top.id, crate::stack::HandOver::default())).collect();
-            (Edits { pops, ..Edits::default() }, top)
+        let mut planned = own_plan(switch.list(undoing), &self.world.system);
+        let part = &mut planned.parts[0];
+        part.frame = Some(switch.frame().clone());
+        if undoing {
+            part.edits.pops = vec![(switch.frame().id, HandOver::default())];
         } else {
-            let frame = crate::stack::switch_frame(switch, request.requester, self.clock.now(), request.scope);
-            let frame = Some(std::sync::Arc::new(frame));
-            (Edits { push: frame.clone(), ..Edits::default() }, frame)
-        };
-        let mut planned = own_plan(steps, &self.world.system);
-        planned.parts[0].edits = edits;
-        planned.parts[0].frame = frame;
-        if !undoing {
-            planned.parts[0].pushes = Some(switch.configuration());
-            let on_failure = self.configurations.get(&switch.configuration()).map(|c| c.on_failure);
-            planned.parts[0].on_failure = on_failure.unwrap_or_default();
+            part.edits.push = part.frame.clone();
+            part.pushes = Some(switch.frame().configuration);
+            let configuration = self.configurations.get(&switch.frame().configuration);
+            part.on_failure = configuration.map(|c| c.on_failure).unwrap_or_default();
         }
         let spec = self.spec(&planned, false);
         let mut machine = Transaction::new(planned, spec);

@@ -10,7 +10,7 @@
 //!
 //! * [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
-//!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: prepared switches. `teardown`: to nothing. `recovery`: the way out of what is broken.
+//!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: plans that are carried out again. `teardown`: to nothing. `recovery`: the way out of what is broken.
 //!   `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 

@@ -96,6 +96,7 @@ impl Engine {
                     progress(&Progress::Begun { request: requests[*place], steps: planned.steps.len() });
                 }
             }
+            self.prepare(&planned);
             let spec = self.spec(&planned, false);
             let machine = Transaction::new(planned, spec);
             let running = Running::new(self.number(), machine, Purpose::Requests(number, group), serves);
@@ -218,9 +219,6 @@ impl Engine {
         self.changed();
         for (request, frame) in confirm {
             self.await_confirmation(request, frame);
-            if let Ask::Apply(id) = request.ask {
-                self.prepare(id);
-            }
         }
         // From the last on, so that places stay.
         for (place, ..) in answers.iter().rev() {

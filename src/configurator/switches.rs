@@ -1,9 +1,9 @@
-//! A switch that was prepared on both sides.
+//! A plan that is carried out again, prepared on both sides.
 
-use crate::plan::prepare::Switch;
 use crate::platform::Prepared;
+use crate::stack::Switch;
 
-/// A switch, prepared on both sides.
+/// A plan that is carried out again, prepared on both sides.
 pub(super) struct Fast {
     pub switch: Switch,
     pub platform: Box<dyn Prepared>,

@@ -201,7 +201,7 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, ch
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
     let present = step::written(port, b.view).flatten();
-    let fulfilled = matches!(&what, Step::PortWrite { value, .. } if present.is_some() && *value == present);
+    let fulfilled = matches!(&what, Step::PortWrite { value, .. } if present.is_some() && value.as_ref() == present);
     if let Some(first) = rival(b, usage) {
         let found = step::precondition(&what, b.view);
         if !found.is_empty() {

@@ -10,7 +10,6 @@ pub mod footprint;
 mod lists;
 pub mod meant;
 mod order;
-pub mod prepare;
 #[cfg(test)]
 mod tests;
 pub mod undo;

@@ -378,18 +378,6 @@ fn what_moves_is_known_beforehand() {
 }
 
 #[test]
-fn what_moves_is_not_prepared() {
-    let mut system = base();
-    let new = conf("c", &[], vec![create("C", "t.Motor", &[("id", Value::Int(1))])], &["C:running"]);
-    for s in attempt(&system, &new).unwrap().steps {
-        step::apply(&s.step, &mut system).unwrap();
-    }
-    let switch = |name: &str| conf("s", &[&format!("{name}:stopped")], vec![], &[&format!("{name}:running")]);
-    assert!(super::prepare::Switch::new(&mut system, &switch("A")).is_some());
-    assert!(super::prepare::Switch::new(&mut system, &switch("C")).is_none());
-}
-
-#[test]
 fn a_stale_plan_is_refused() {
     let mut system = base();
     let plan = attempt(&system, &conf("c", &[], vec![write("A.u", 1)], &[])).unwrap();

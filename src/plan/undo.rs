@@ -98,7 +98,7 @@ impl<'o, 's> Script<'o, 's> {
                 }
             }
             Step::PortWrite { port, value } => {
-                if step::written(*port, self.view).as_ref() == Some(value) {
+                if step::written(*port, self.view) == Some(value.as_ref()) {
                     return Ok(None);
                 }
             }

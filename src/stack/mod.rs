@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one.
+//!   batch come to. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -31,7 +31,7 @@ pub use desk::{Arrival, Desk, Turn, given_up_of};
 pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
-pub use prepared::switch_frame;
+pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};
@@ -39,7 +39,6 @@ pub use world::{Broken, World};
 
 use crate::model::{ConfigId, Finding, Ident, codes};
 use crate::plan::footprint::Footprint;
-use crate::plan::prepare::Act;
 use crate::plan::undo::Item;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
@@ -91,8 +90,6 @@ pub struct Frame {
     pub floor: Option<String>,
     /// What was squashed into it; empty for a frame of its own.
     pub parts: BTreeSet<Buried>,
-    /// Of a frame that a prepared switch pushed: the switch's acts.
-    pub acts: Vec<Act>,
     /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
     pub scope: Option<Scope>,
     /// It is what was done and not taken back of something that ended *broken*.
@@ -138,8 +135,6 @@ pub struct Stack {
     frames: Vec<Arc<Frame>>,
     /// What was committed: below the first frame.
     committed: BTreeSet<Buried>,
-    /// Popped frames of prepared switches, to be used again.
-    spares: Vec<Arc<Frame>>,
     bound: usize,
     next: u64,
 }
@@ -161,7 +156,6 @@ impl Stack {
         Self {
             frames: Vec::with_capacity(bound.clamp(2, 4096) + 1),
             committed: BTreeSet::new(),
-            spares: Vec::with_capacity(prepared::SPARES),
             bound: bound.max(2),
             next: 1,
         }

@@ -63,7 +63,7 @@ fn holds(step: &Step, view: &impl View) -> bool {
         Step::PropertySet { property, value } => {
             view.component(property.component).and_then(|n| n.value(property.member)) == Some(value)
         }
-        Step::PortWrite { port, value } => step::written(*port, view).as_ref() == Some(value),
+        Step::PortWrite { port, value } => step::written(*port, view) == Some(value.as_ref()),
         _ => false,
     }
 }

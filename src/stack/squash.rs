@@ -113,7 +113,6 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         saved,
         floor,
         parts,
-        acts: Vec::new(),
         scope: None,
         partial: false,
         safe: lower.safe || upper.safe,

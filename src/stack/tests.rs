@@ -1,6 +1,6 @@
 //! What the laws leave to examples: groups, floors, hand-over, the bound, failed components.
 
-use super::{FrameId, Op, Planned, Requester, Scope, Stack, transaction};
+use super::{FrameId, Op, Planned, Requester, Scope, Stack, Switch, transaction};
 use crate::model::*;
 use crate::plan::{Context, Refusal};
 use crate::system::{System, View, step};
@@ -82,7 +82,10 @@ fn push(configuration: &Configuration) -> Op<'_> {
 impl Bench {
     /// `A` and `B` exist, running, and the stack is empty.
     fn new(bound: usize) -> Self {
-        let mut bench = Self { system: System::new(types()), stack: Stack::new(bound) };
+        Self { system: System::new(types()), stack: Stack::new(bound) }.up()
+    }
+
+    fn up(mut self) -> Self {
         let create = |name: &str| ChangeKind::Create {
             component: ComponentName::new(name).unwrap(),
             ty: TypeName::new("t.Arm").unwrap(),
@@ -91,9 +94,9 @@ impl Bench {
         };
         let running = [("A", Wanted::Running), ("B", Wanted::Running)];
         let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
-        bench.ok(&[push(&up)]);
-        bench.stack.make_permanent(Requester::Operator);
-        bench
+        self.ok(&[push(&up)]);
+        self.stack.make_permanent(Requester::Operator);
+        self
     }
 
     fn ask(&self, requests: &[Op<'_>]) -> Result<Planned, Refusal> {
@@ -276,4 +279,50 @@ fn a_failed_component_is_taken_down_without_being_started() {
     bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
     let (steps, _) = bench.ok(&[Op::UndoTop]);
     assert_eq!(steps, ["cleanup A", "property_set A.mass = 0.0", "configure A", "start A"]);
+}
+
+/// Whether what is planned for `configuration`, behind `before`, is kept to be carried out again.
+fn kept(bench: &Bench, before: &[Op<'_>], configuration: &Configuration) -> bool {
+    let ops: Vec<Op<'_>> = before.iter().copied().chain([push(configuration)]).collect();
+    let planned = bench.ask(&ops).unwrap_or_else(|r| panic!("{r:?}"));
+    Switch::new(&bench.system, configuration, &planned).is_some()
+}
+
+#[test]
+fn only_fixed_switches_of_what_does_not_move_are_prepared() {
+    let mut bench = Bench::new(64);
+    let switch =
+        |id| conf(id, Some("mode"), &[("A", Wanted::Stopped)], vec![set("A.mass", 1.0)], &[("A", Wanted::Running)]);
+    assert!(kept(&bench, &[], &switch("s")));
+    let mut default = switch("s");
+    default.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
+    assert!(!kept(&bench, &[], &default), "what `_default` means depends on every component");
+    for act in [call("A.close"), ChangeKind::Destroy { component: ComponentName::new("B").unwrap() }] {
+        assert!(!kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0), act], &[])));
+    }
+    assert!(!kept(&bench, &[push(&switch("r"))], &switch("s")), "what another request did was not there");
+    bench.ok(&[push(&switch("r"))]);
+    assert!(!kept(&bench, &[], &switch("s")), "the frame of its group goes for it");
+    assert!(kept(&bench, &[], &Configuration { group: None, ..switch("s") }));
+    let planned = bench.ask(&[push(&switch("s"))]).unwrap();
+    bench.ok(&[Op::UndoTop]);
+    assert!(Switch::new(&bench.system, &switch("s"), &planned).is_none(), "it was planned for another system");
+    bench.system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
+    assert!(
+        !kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0)], &[])),
+        "a fault is to be undone its own way"
+    );
+}
+
+#[test]
+fn what_moves_is_not_prepared() {
+    let mut ty = types().get(TypeName::new("t.Arm").unwrap()).unwrap().as_ref().clone();
+    ty.moves = Moves { start: true, stop: false };
+    let mut catalogue = Catalogue::new();
+    catalogue.insert(ty);
+    let bench = Bench { system: System::new(Arc::new(catalogue)), stack: Stack::new(64) }.up();
+    let entry = |state| [("A", state)];
+    assert!(!kept(&bench, &[], &conf("s", None, &entry(Wanted::Stopped), vec![], &entry(Wanted::Running))));
+    assert!(!kept(&bench, &[], &conf("s", None, &entry(Wanted::Stopped), vec![], &[])), "its undo starts it");
+    assert!(kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0)], &entry(Wanted::Running))));
 }

@@ -257,7 +257,6 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             saved,
             floor,
             parts: std::collections::BTreeSet::new(),
-            acts: Vec::new(),
             scope,
             partial: false,
             safe: configuration.safe,

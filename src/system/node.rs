@@ -126,16 +126,6 @@ impl Node {
         self.ports[index].put(value);
     }
 
-    /// Takes memory for a written value, without writing it.
-    pub(super) fn reserve_port(&mut self, index: usize, value: &Value) {
-        if self.ports.is_empty() {
-            self.ports.resize(self.ty.ports.len(), Written::NEVER);
-        }
-        if !self.ports[index].written {
-            self.ports[index].value = value.clone();
-        }
-    }
-
     /// As it is observed.
     pub fn snapshot(&self) -> ComponentSnapshot {
         ComponentSnapshot {

@@ -53,10 +53,7 @@ pub fn precondition(step: &Step, view: &impl View) -> Vec<Violation> {
     match step {
         Step::State { component, transition } => match view.component(*component) {
             None => found.push(Violation::UnknownComponent(*component)),
-            Some(node) if !transition.allowed_in(node.state) => {
-                found.push(Violation::Transition { component: *component, transition: *transition, state: node.state })
-            }
-            Some(_) => {}
+            Some(node) => move_allowed(node, *transition, &mut found),
         },
         Step::Create { component, ty, properties, .. } => create_allowed(*component, *ty, properties, view, &mut found),
         Step::Destroy { component } => destroy_allowed(*component, view, &mut found),
@@ -153,7 +150,7 @@ pub fn inverse(step: &Step, undo: Option<&Call>, before: &impl View) -> Undo {
             }
         }
         Step::PortWrite { port, .. } => match written(*port, before) {
-            Some(value) => Undo::One(Step::PortWrite { port: *port, value }),
+            Some(value) => Undo::One(Step::PortWrite { port: *port, value: value.cloned() }),
             None => Undo::Nothing,
         },
         Step::Operation(call) => {
@@ -225,10 +222,10 @@ pub fn apply(step: &Step, view: &mut impl ViewMut) -> Result<(), Vec<Violation>>
 }
 
 /// What was written to a port: none when there is no such port, `Some(None)` when it was never written.
-pub fn written(port: MemberRef, view: &impl View) -> Option<Option<Value>> {
+pub fn written(port: MemberRef, view: &impl View) -> Option<Option<&Value>> {
     let node = view.component(port.component)?;
     let (at, _) = node.port(port.member)?;
-    Some(node.written(at).cloned())
+    Some(node.written(at))
 }
 
 fn create_allowed(name: ComponentName, ty: TypeName, values: &[Value], view: &impl View, found: &mut Vec<Violation>) {
@@ -372,6 +369,22 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
         found.push(lacks(Member::Property, property, node));
         return;
     };
+    value_allowed(node, property, declared, value, found);
+}
+
+pub(super) fn move_allowed(node: &Node, transition: Transition, found: &mut Vec<Violation>) {
+    if !transition.allowed_in(node.state) {
+        found.push(Violation::Transition { component: node.name, transition, state: node.state });
+    }
+}
+
+pub(super) fn value_allowed(
+    node: &Node,
+    property: MemberRef,
+    declared: &PropertyType,
+    value: &Value,
+    found: &mut Vec<Violation>,
+) {
     if !declared.tunable.allows(node.state) {
         let (tunable, state, declared) = (declared.tunable, node.state, declared.origin);
         found.push(Violation::NotTunable { property, tunable, state, declared });
@@ -380,7 +393,18 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
 }
 
 fn write_allowed(port: MemberRef, value: Option<&Value>, view: &impl View, found: &mut Vec<Violation>) {
-    let Some(declared) = port_of(port, view, found) else { return };
+    if let Some(declared) = port_of(port, view, found) {
+        sample_allowed(port, declared, value, view, found);
+    }
+}
+
+pub(super) fn sample_allowed(
+    port: MemberRef,
+    declared: &PortType,
+    value: Option<&Value>,
+    view: &impl View,
+    found: &mut Vec<Violation>,
+) {
     if declared.direction != Direction::In {
         found.push(Violation::WritesOut { port, declared: declared.origin });
         return;

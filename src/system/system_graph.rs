@@ -246,45 +246,15 @@ impl System {
         self.graph.node_weight(index)
     }
 
-    fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
+    pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
         self.revision += 1;
-        let revision = self.revision;
         let node = self.graph.node_weight_mut(index)?;
-        node.generation = revision;
+        node.generation = self.revision;
         Some(node)
     }
 
-    /// Takes memory for a written value of the port at `at` of the type's order, without writing it.
-    pub(crate) fn reserve_port_at(&mut self, index: NodeIndex, at: usize, value: &Value) {
-        if let Some(node) = self.graph.node_weight_mut(index) {
-            node.reserve_port(at, value);
-        }
-    }
-
-    /// The effect of a prepared state step.
-    pub(crate) fn set_state_at(&mut self, index: NodeIndex, state: RunState) {
-        if let Some(node) = self.touch_at(index) {
-            node.state = state;
-        }
-    }
-
-    /// The effect of a prepared property_set.
-    pub(crate) fn set_property_at(&mut self, index: NodeIndex, at: usize, value: &Value) {
-        if let Some(node) = self.touch_at(index) {
-            node.properties[at].clone_from(value);
-        }
-    }
-
-    /// The effect of a prepared port_write.
-    pub(crate) fn set_port_at(&mut self, index: NodeIndex, at: usize, value: Option<&Value>) {
-        if let Some(node) = self.touch_at(index) {
-            node.put_port(at, value);
-        }
-    }
-
     fn touch(&mut self, name: ComponentName) -> &mut Node {
-        let index = self.names[&name];
-        self.touch_at(index).expect("names and nodes agree")
+        self.touch_at(self.names[&name]).expect("names and nodes agree")
     }
 }
 

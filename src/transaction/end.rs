@@ -358,7 +358,6 @@ impl Transaction {
                 footprint: Footprint { touches },
                 saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
                 floor: irreversible.map(|step| format!("`{step}` cannot be undone")),
-                acts: Vec::new(),
                 partial: true,
                 ..frame.clone()
             }
