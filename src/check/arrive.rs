@@ -276,13 +276,13 @@ impl Product<'_> {
             if let Some(number) = self.member(first.requester) {
                 state.down |= 1 << number.min(63);
             }
-            if self.all_down(state) && !self.others {
-                let world = self.worlds.settle_down(state.world);
-                if world != state.world {
-                    state.world = world;
-                    state.unconfirmed.clear();
-                    state.lost.clear();
-                }
+            if self.all_down(state)
+                && !self.others
+                && let Some(world) = self.worlds.settle_down(state.world)
+            {
+                state.world = world;
+                state.unconfirmed.clear();
+                state.lost.clear();
             }
         }
     }

@@ -45,17 +45,26 @@ impl Product<'_> {
         let deep = (comes.done.deep, comes.done.left);
         nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
         for (k, part) in comes.parts.iter().enumerate() {
-            let Some(went) = &part.failed else { continue };
-            let ask = requests[part.place].ask;
-            let mut failed = Self::done_before(&requests, &comes, k, part.place);
-            let mut broken = failed.clone();
-            failed.push((part.place, Some(ask.failed())));
-            let class = if part.undo { Failed::Undo } else { Failed::Apply };
-            self.ended(state, number, &requests, failed, went, class, nexts);
-            broken.push((part.place, Some(ask.broken())));
-            self.broke(state, number, &requests, broken, nexts);
-            self.missing(state, number, &requests, &comes, k, &[ask.failed(), ask.broken()], nexts);
+            if part.failed.is_some() {
+                let ask = requests[part.place].ask;
+                self.fails(state, number, &requests, &comes, k, nexts);
+                self.missing(state, number, &requests, &comes, k, &[ask.failed(), ask.broken()], nexts);
+            }
         }
+    }
+
+    /// A part fails, or is left broken; those before it are done.
+    fn fails(&mut self, state: &State, number: u32, requests: &[Request], comes: &Comes, k: usize, nexts: &mut Nexts) {
+        let part = &comes.parts[k];
+        let Some(went) = &part.failed else { return };
+        let ask = requests[part.place].ask;
+        let mut failed = Self::done_before(requests, comes, k, part.place);
+        let mut broken = failed.clone();
+        failed.push((part.place, Some(ask.failed())));
+        let class = if part.undo { Failed::Undo } else { Failed::Apply };
+        self.ended(state, number, requests, failed, went, class, nexts);
+        broken.push((part.place, Some(ask.broken())));
+        self.broke(state, number, requests, broken, nexts);
     }
 
     /// What stands before a part that ends so was to stand, and cannot be finished: it is broken too.
@@ -254,6 +263,10 @@ impl Product<'_> {
         k: usize,
         nexts: &mut Nexts,
     ) {
+        // One before it may fail meanwhile.
+        for before in 0..if self.tells_all { 0 } else { k } {
+            self.fails(state, number, requests, comes, before, nexts);
+        }
         let part = &comes.parts[k];
         let mut cancelled = Self::done_before(requests, comes, k, part.place);
         let mut broken = cancelled.clone();

@@ -36,14 +36,16 @@ impl Product<'_> {
         }
         self.notices(state, nexts);
         self.operators(state, nexts);
-        if self.others && state.is_at_rest() && self.all_down(state) {
-            let world = self.worlds.settle_down(state.world);
-            if world != state.world {
-                let mut next = state.clone();
-                next.world = world;
-                next.unconfirmed.clear();
-                nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
-            }
+        if self.others
+            && state.is_at_rest()
+            && self.all_down(state)
+            && let Some(world) = self.worlds.settle_down(state.world)
+            && world != state.world
+        {
+            let mut next = state.clone();
+            next.world = world;
+            next.unconfirmed.clear();
+            nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
     }
 

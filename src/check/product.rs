@@ -101,7 +101,7 @@ impl<'a> Product<'a> {
     /// Nothing was followed in it yet, with so many batches of one coordinator that may wait; what was planned in its worlds
     /// stays known.
     pub fn follow_anew(&mut self, most_waiting: usize) {
-        (self.overflow, self.forked, self.entangled) = (false, false, false);
+        (self.overflow, self.forked) = (false, false);
         self.most_waiting = most_waiting;
     }
 

@@ -422,15 +422,9 @@ impl<'a> Worlds<'a> {
     }
 
     /// The world after a coordinator has come to its *down* state, and all are down.
-    pub fn settle_down(&mut self, id: WorldId) -> WorldId {
-        match self.get(id) {
-            Some(world) if world.system.is_empty() && !world.stack.is_empty() => {
-                let mut world = world.clone();
-                world.settle_down();
-                self.intern(world)
-            }
-            _ => id,
-        }
+    pub fn settle_down(&mut self, id: WorldId) -> Option<WorldId> {
+        let mut world = self.get(id)?.clone();
+        world.settle_down().then(|| self.intern(world))
     }
 
     /// The number of the frame that counts at that place.

@@ -109,6 +109,8 @@ pub(super) struct Engine {
     /// Kept for the next view, with what it is a picture of.
     snapshot: Option<((u64, u64), Arc<Snapshot>)>,
     pub stopping: bool,
+    /// Everything is being taken down.
+    pub taking_down: bool,
 }
 
 impl Engine {
@@ -154,6 +156,7 @@ impl Engine {
             revision: 0,
             snapshot: None,
             stopping: false,
+            taking_down: false,
         }
     }
 

@@ -34,7 +34,8 @@ impl Engine {
 
     /// The rest of a batch under way is taken up.
     fn take_up(&mut self, number: u32) {
-        loop {
+        // Once it is taken down nothing begins that had not begun: the rest is answered by that.
+        while !self.taking_down {
             let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
             let requests = turn.batch.requests.clone();
             // Given up together with one before it, of which it was to be taken up anew.
@@ -66,8 +67,7 @@ impl Engine {
             }
             if group.down {
                 self.down.insert(requests[0].requester);
-                if self.all_down() && self.world.broken.is_empty() {
-                    self.world.settle_down();
+                if self.all_down() && self.world.settle_down() {
                     self.confirming.clear();
                     self.changed();
                 }

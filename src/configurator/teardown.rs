@@ -45,6 +45,7 @@ impl Engine {
 
     fn take_down(&mut self, forced: bool, deadline: Time) -> TakenDown {
         let mut down = TakenDown::default();
+        self.taking_down = true;
         self.glance();
         self.confirming.clear();
         self.forget_standings();
@@ -81,6 +82,7 @@ impl Engine {
             });
         }
         down.in_time = self.clock.now() <= deadline;
+        self.taking_down = false;
         self.changed();
         down
     }

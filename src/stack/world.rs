@@ -83,10 +83,13 @@ impl World {
         }
     }
 
-    /// Nothing is there any more, and all coordinators are down: what was in force in one life is not in force in the next.
-    pub fn settle_down(&mut self) {
-        if self.system.is_empty() {
+    /// All coordinators are down. True: nothing is there any more, and what was in force in one life is not in force in the
+    /// next, nor waited for.
+    pub fn settle_down(&mut self) -> bool {
+        let over = self.system.is_empty() && self.broken.is_empty();
+        if over {
             self.stack.discard();
         }
+        over
     }
 }

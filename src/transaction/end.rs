@@ -83,7 +83,8 @@ impl Transaction {
         let part = self.failed_part();
         let first = forward.failures.iter().find(|(i, _)| self.part_of(*i) == part).or(forward.failures.first());
         match (first, forward.unsettled.first(), &self.stopped_by) {
-            (_, _, Some(reason @ (Reason::GivenUp | Reason::Interrupted(_)))) => reason.clone(),
+            (_, _, Some(reason @ Reason::Interrupted(_))) => reason.clone(),
+            (_, _, Some(reason @ Reason::GivenUp)) if self.given_up.contains(&part) => reason.clone(),
             (Some((_, reason)), ..) => reason.clone(),
             (None, Some(i), _) => Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout },
             (None, None, Some(reason)) => reason.clone(),

@@ -469,12 +469,10 @@ impl Transaction {
         if self.interrupted || self.taken_down {
             return 0;
         }
-        if let Some(part) = self.given_up.iter().min() {
-            return *part;
-        }
         let forward = self.forward.as_ref().expect("it was carried out");
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());
-        failures.map(|i| self.part_of(i)).chain(self.fallen).min().unwrap_or(0)
+        // One that was given up is not to blame for one before it that failed.
+        failures.map(|i| self.part_of(i)).chain(self.fallen).chain(self.given_up.iter().copied()).min().unwrap_or(0)
     }
 
     /// The components it is about.

@@ -54,6 +54,24 @@ fn a_safe_configuration_is_no_part_of_its_batch() {
     );
 }
 
+/// Coming to *down* with something left ends nothing: what waits for its confirmation still does.
+#[test]
+fn down_with_something_left_is_no_end() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },
+        tryout = Configuration { group = \"g\", confirm = { event = \"e_good\", within = 0.5 }, create(\"b\", \"Drive\") },
+        bad = Configuration { property_set(\"b.gain\", 2.0) },";
+    let states = "idle = state {}, up = state { entry = \"base\" }, odd = state { entry = \"bad\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"idle\", events = { \"e_shutdown\" }, effect = \"base.undo\" },
+        trans { src = \"up\", tgt = \"idle\", events = { \"e_try\" }, effect = { \"base.undo\", \"tryout\" } },
+        trans { src = \"idle\", tgt = \"odd\", events = { \"tryout.reverted\" } },
+        trans { src = \"odd\", tgt = \"idle\", events = { \"e_shutdown\" } },";
+    // Its script is gone, too: there the frame is reverted.
+    let said = Small::new(configurations, states, "").check();
+    assert!(!said.refused("bad").is_empty(), "{:#}", said.0);
+}
+
 /// Answers of one batch come undos first, whatever the order in which they were raised.
 #[test]
 fn answers_come_undos_first() {

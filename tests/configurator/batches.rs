@@ -59,6 +59,22 @@ fn a_push_that_is_given_up_leaves_the_undo_of_its_batch_in_force() {
     }
 }
 
+/// One before it fails: what was given up is not to blame, and is cancelled.
+#[test]
+fn what_is_given_up_is_not_blamed_for_what_failed_before_it() {
+    let rig = made();
+    rig.inject("cleanup A", Fault::Fail);
+    rig.submit("on.undo off");
+    rig.wait(0.5);
+    let answers = rig.ask("off.undo");
+    assert_eq!(answers, ["on.undo.failed", "off.cancelled", "off.undone"]);
+    let failed = rig.answers.lock().unwrap().iter().find(|a| a.event().as_str() == "on.undo.failed").cloned().unwrap();
+    let reason = failed.reason.unwrap().to_string();
+    assert!(reason.contains("a failure was injected"), "{reason}");
+    assert_eq!(rig.frames(), ["on"]);
+    rig.in_step();
+}
+
 /// Two configurations of one group in one batch: the later takes the place of the earlier.
 #[test]
 fn a_batch_leaves_one_frame_of_a_group() {

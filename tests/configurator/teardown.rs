@@ -3,7 +3,7 @@
 use crate::rig::*;
 use davit::configurator::TakenDown;
 use davit::model::{RunState, Step};
-use davit::platform::simulated::{Fault, FaultRule, Faults};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, StepPattern};
 use std::time::Duration;
 
 fn up() -> Rig {
@@ -66,6 +66,25 @@ fn what_is_under_way_gives_way_and_everything_is_answered() {
     assert!(told.is_clean(), "{told:?}");
     assert_eq!(rig.events()[4..], ["eight.broken", "rewire.failed"]);
     rig.each_answered_once();
+}
+
+/// What stands behind in a batch and has not begun is not begun by taking down.
+#[test]
+fn what_had_not_begun_does_not_begin() {
+    for forced in [false, true] {
+        let rig = up();
+        rig.platform.set_delays(Delays {
+            of: vec![(StepPattern::new("property_set"), Duration::from_secs(1))],
+            ..Delays::default()
+        });
+        rig.platform.record();
+        rig.submit("eight rewire");
+        rig.wait(0.1);
+        down(&rig, forced);
+        let steps: Vec<String> = rig.platform.record().iter().map(ToString::to_string).collect();
+        assert!(!steps.iter().any(|step| step.starts_with("connect A.y -> C.u")), "{steps:?}");
+        rig.each_answered_once();
+    }
 }
 
 #[test]

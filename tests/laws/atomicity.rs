@@ -52,7 +52,7 @@ impl Bench {
         let blocking = |_: &Step| Execution::Blocking;
         for turn in 0usize.. {
             assert!(turn < 10_000, "it ends");
-            let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[] };
+            let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[], busy: &[] };
             match machine.poll(&mut self.model, Time::default(), &can) {
                 Poll::Begin(steps) => out.extend(steps),
                 Poll::Cancel(_) => {}
