@@ -124,6 +124,7 @@ impl Switched {
         let (sink, answers) = clock.channel::<Answer>(16);
         let handle = Configurator::start(Setup {
             configurations: configurations(others),
+            rest: Vec::new(),
             catalogue: libraries().catalogue(),
             activities: BTreeSet::from([loop_]),
             coordinators: BTreeSet::new(),

@@ -108,6 +108,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (answered, answers) = clock.channel(16);
     let configurator = Configurator::start(Setup {
         configurations: loaded.configurations,
+        rest: Vec::new(),
         catalogue,
         activities: BTreeSet::new(),
         coordinators: BTreeSet::new(),

@@ -81,6 +81,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
     let told = steps.clone();
     let handle = Configurator::start(Setup {
         configurations: configurations(),
+        rest: Vec::new(),
         catalogue: libraries.catalogue(),
         activities: BTreeSet::from([name]),
         coordinators: BTreeSet::new(),

@@ -97,7 +97,7 @@ impl Engine {
         let started = *at;
         self.tell_started(step);
         let deadline = running.machine.deadline(started);
-        let outcome = pool::execute(&*self.platform, step, deadline, running.is_safe());
+        let outcome = pool::execute(&*self.platform, step, deadline, running.enters_quarantine);
         *at = self.clock.now();
         self.tell(running, number, StepEnd::from(&outcome), Some(at.since(started)));
         running.machine.on(Input::Ended { step: number, outcome }, &mut self.world.system);
@@ -113,7 +113,7 @@ impl Engine {
         let deadline = running.machine.deadline(started);
         let patience = running.machine.spec().patience;
         let (call, deadline) = match *steps {
-            [i] => (Call::Execute(step(&i).clone(), running.is_safe()), deadline),
+            [i] => (Call::Execute(step(&i).clone(), running.enters_quarantine), deadline),
             // The last of them begins within the turn.
             _ => {
                 let several = steps.iter().map(|i| step(i).clone()).collect();

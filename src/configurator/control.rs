@@ -65,8 +65,12 @@ pub struct View {
 pub struct TakenDown {
     /// Configurations whose frames were popped, in that order.
     pub popped: Vec<ConfigId>,
-    /// Safe configurations that were applied first.
+    /// Safe configurations that were applied first, in that order.
     pub safe: Vec<ConfigId>,
+    /// Configurations that were applied then, for the system to come to rest.
+    pub rest: Vec<ConfigId>,
+    /// Those of both of which something failed.
+    pub partly: Vec<ConfigId>,
     /// What had to be forced: steps that belong to no frame's undo, done.
     pub forced: Vec<Step>,
     /// What went wrong on the way.

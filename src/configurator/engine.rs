@@ -36,11 +36,19 @@ pub(super) struct Confirming {
 }
 
 /// What a configurator is made of.
+/// What is applied when everything is taken down by force, in order: what is safe, and what brings the system to rest.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Force {
+    pub safe: Vec<ConfigId>,
+    pub rest: Vec<ConfigId>,
+}
+
 pub(super) struct Parts {
     pub clock: Clock,
     pub platform: Arc<dyn Platform>,
     pub limits: DeploymentLimits,
     pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
+    pub force: Force,
     pub context: Context,
     pub coordinators: BTreeSet<Requester>,
     pub pool: Pool,
@@ -56,6 +64,7 @@ pub(super) struct Engine {
     pub platform: Arc<dyn Platform>,
     pub limits: DeploymentLimits,
     pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
+    pub force: Force,
     pub context: Context,
     pub claims: Claims,
     pub pool: Pool,
@@ -121,6 +130,7 @@ impl Engine {
             platform: parts.platform,
             limits: parts.limits,
             configurations: parts.configurations,
+            force: parts.force,
             context: parts.context,
             claims,
             pool: parts.pool,

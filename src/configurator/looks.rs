@@ -30,6 +30,8 @@ pub(super) struct Observing {
     /// What is left of this round.
     pub rest: Vec<ComponentName>,
     pub out: Option<Look>,
+    /// Something was there since the last round began: one is owed also when nothing is any more.
+    pub owed: bool,
 }
 
 impl Observing {

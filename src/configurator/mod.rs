@@ -49,7 +49,7 @@ use crate::stack::World;
 use crate::system::System;
 use crate::time::{Clock, Join, Receiver, Time};
 use control::Command;
-use engine::{Engine, Parts};
+use engine::{Engine, Force, Parts};
 use inbox::{Mail, Post};
 use pool::Pool;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -61,6 +61,8 @@ use std::time::Duration;
 pub struct Setup {
     /// The configurations that may be asked for.
     pub configurations: Vec<Configuration>,
+    /// Those of them that bring the system to rest when it is taken down by force, in this order.
+    pub rest: Vec<ConfigId>,
     /// The component types.
     pub catalogue: Catalogue,
     /// The deployment's activities.
@@ -91,8 +93,10 @@ impl Configurator {
     /// Starts a configurator on a thread of its own, for a platform on which nothing of the deployment is yet.
     pub fn start(setup: Setup) -> ConfiguratorHandle {
         let (post, inbox) = inbox::new(&setup.clock);
+        let safe_in_order = setup.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
         let configurations: FxHashMap<ConfigId, Configuration> =
             setup.configurations.into_iter().map(|c| (c.id, c)).collect();
+        let force = Force { safe: safe_in_order, rest: setup.rest };
         let safe = configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
         let awaited = configurations.values().filter_map(|c| c.confirm.map(|confirm| confirm.event)).collect();
         let parts = Parts {
@@ -100,6 +104,7 @@ impl Configurator {
             platform: setup.platform.clone(),
             limits: setup.limits,
             configurations: Arc::new(configurations),
+            force,
             context: Context { activities: setup.activities, avoid: BTreeSet::new() },
             coordinators: setup.coordinators,
             pool: Pool::new(setup.clock.clone(), setup.platform, post.clone(), setup.workers.min(limits::WORKERS_MOST)),

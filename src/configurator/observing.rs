@@ -38,7 +38,8 @@ impl Engine {
                 self.observing.later(now);
             }
         }
-        if self.world.system.is_empty() {
+        self.observing.owed |= !self.world.system.is_empty();
+        if !self.observing.owed {
             self.observing.next = None;
             self.observing.rest.clear();
             return false;
@@ -57,15 +58,20 @@ impl Engine {
     fn look_on(&mut self) {
         let now = self.clock.now();
         if self.observing.rest.is_empty() {
-            self.observing.rest = self.world.system.graph().node_weights().map(|node| node.name).collect();
+            // Also what should not be there: of what some configuration destroys, that it is gone.
+            let there = self.world.system.graph().node_weights().map(|node| node.name);
+            let mut rest: Vec<ComponentName> = there.chain(self.claims.components()).collect();
+            rest.sort_unstable();
+            rest.dedup();
+            self.observing.rest = rest;
+            self.observing.owed = !self.world.system.is_empty();
         }
         let busy = self.not_to_be_judged();
         let mut components = Vec::new();
         while components.len() < limits::OBSERVED_AT_ONCE
             && let Some(name) = self.observing.rest.pop()
         {
-            let known = self.world.system.component(name).is_some();
-            if known && !busy.contains(&name) {
+            if !busy.contains(&name) {
                 components.push((name, self.generation(name)));
             }
         }

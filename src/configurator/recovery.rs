@@ -10,7 +10,7 @@ use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Broken, Op, Residual, transaction};
+use crate::stack::{Broken, Edits, FrameId, HandOver, Inverse, Op, Residual, transaction};
 use crate::system::{self, System, View as _, step};
 use crate::transaction::{PartEnd, Spec, Transaction};
 use std::sync::Arc;
@@ -55,17 +55,12 @@ impl Engine {
         Ok(())
     }
 
-    /// The system as it should be: the model, with what is broken as it was meant, and without what is partial.
+    /// The system as it should be: the model, with what is broken as it was meant. What partial frames hold is in force.
     fn wanted(&self) -> System {
         let mut wanted = self.world.system.clone();
         for broken in &self.world.broken {
             let components: Vec<ComponentName> = broken.components.iter().copied().collect();
             let _ = wanted.adopt(&components, &broken.expected);
-        }
-        for frame in self.world.stack.frames().iter().rev().filter(|frame| frame.partial) {
-            if let crate::stack::Inverse::List(items) = &frame.inverse {
-                items.iter().for_each(|item| drop(step::apply(&item.step, &mut wanted)));
-            }
         }
         wanted
     }
@@ -192,7 +187,13 @@ impl Engine {
                 observed = self.read(&components);
             }
         }
-        if observed && system::diff::reached(&self.world.system, &wanted) {
+        // A call that is out still may happen yet.
+        let out = || {
+            let out = |step: &Step| self.world.quarantined.contains(&step.component());
+            broken.residual.unsettled.iter().any(out)
+        };
+        if observed && system::diff::reached(&self.world.system, &wanted) && !out() {
+            self.drop_empty(broken.frame);
             self.changed();
             return Ok(());
         }
@@ -214,6 +215,16 @@ impl Engine {
         self.world.broken.insert(at.min(self.world.broken.len()), Broken { residual: residual.clone(), ..broken });
         self.changed();
         Err(residual)
+    }
+
+    /// A partial frame that holds nothing to take back is gone with what was broken.
+    fn drop_empty(&mut self, frame: Option<FrameId>) {
+        let Some(frame) = frame.and_then(|frame| self.world.stack.frame(frame)) else { return };
+        if frame.partial && frame.floor.is_none() && matches!(&frame.inverse, Inverse::List(items) if items.is_empty())
+        {
+            let edits = Edits { pops: vec![(frame.id, HandOver::default())], ..Edits::default() };
+            self.world.stack.apply([&edits], &[]);
+        }
     }
 
     /// Reads some components back into the model. False: nobody answered.

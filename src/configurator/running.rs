@@ -53,6 +53,8 @@ pub(super) struct Running {
     pub stood: Vec<(usize, u64)>,
     /// Safe configurations that came before and do something about the same components: its end comes after theirs.
     pub after: SmallVec<[u64; 1]>,
+    /// Quarantine does not keep its steps out.
+    pub enters_quarantine: bool,
     pub over: bool,
 }
 
@@ -61,6 +63,7 @@ impl Running {
         Self {
             number,
             machine,
+            enters_quarantine: matches!(purpose, Purpose::Safe(_)),
             purpose,
             serves,
             flights: Vec::new(),

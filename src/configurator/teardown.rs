@@ -1,7 +1,7 @@
 //! Taking everything down.
 
 use super::control::{Command, TakenDown};
-use super::engine::Engine;
+use super::engine::{Engine, Force};
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::limits;
@@ -52,7 +52,15 @@ impl Engine {
         if forced {
             // Not after what is out has come in: now.
             self.break_off();
-            self.apply_all_safe(&mut down);
+            let Force { safe, rest } = self.force.clone();
+            // What a safe configuration holds still is not moved any more.
+            let held = self.world.stack.frames().iter().any(|frame| frame.safe);
+            self.apply_all(&safe, true, &mut down);
+            if !held {
+                self.apply_all(&rest, false, &mut down);
+                down.rest = rest;
+            }
+            down.safe = safe;
         }
         self.end_running(forced);
         self.refuse_waiting();
@@ -152,29 +160,37 @@ impl Engine {
         }
     }
 
-    /// Applies every safe configuration, in the order of their names.
-    fn apply_all_safe(&mut self, down: &mut TakenDown) {
-        let mut safe: Vec<ConfigId> = self.configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
-        safe.sort_unstable();
+    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out.
+    fn apply_all(&mut self, ids: &[ConfigId], safe: bool, down: &mut TakenDown) {
         let configurations = self.configurations.clone();
-        for id in &safe {
+        for id in ids {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
             let at = self.clock.now();
             let Effort { planned, troubles, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.context);
-            down.troubles.extend(troubles);
             let machine = Transaction::new(planned, self.effort(Time::NEVER));
-            let done = self.carry_out(machine);
-            down.troubles.extend(troubles_of(done));
+            let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
+            let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
+            if !troubles.is_empty() {
+                down.partly.push(*id);
+            }
+            down.troubles.extend(troubles);
         }
-        down.safe = safe;
     }
 
     /// Carries something of one's own out, while everything else goes on.
     pub(super) fn carry_out(&mut self, machine: Transaction) -> Transaction {
         let number = self.number();
         self.running.push(Running::new(number, machine, Purpose::Own, SmallVec::new()));
+        self.complete(number).machine
+    }
+
+    /// The same with what quarantine does not keep out.
+    fn carry_out_safe(&mut self, machine: Transaction) -> Transaction {
+        let number = self.number();
+        let running = Running::new(number, machine, Purpose::Own, SmallVec::new());
+        self.running.push(Running { enters_quarantine: true, ..running });
         self.complete(number).machine
     }
 

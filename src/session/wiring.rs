@@ -68,6 +68,7 @@ impl Session {
             super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
+            rest: deployment.shutdown.rest.iter().map(|(id, _)| *id).collect(),
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
             coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
@@ -342,7 +343,10 @@ impl Session {
 
     fn taken_down(&self, taken: Option<TakenDown>) -> Vec<String> {
         let Some(taken) = taken else { return vec!["the configurator did not answer".to_owned()] };
-        let mut notes: Vec<String> = taken.safe.iter().map(|id| format!("safe configuration `{id}` applied")).collect();
+        let applied = taken.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
+        let applied = applied.chain(taken.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
+        let done = |id: &ConfigId| if taken.partly.contains(id) { "applied as far as it went" } else { "applied" };
+        let mut notes: Vec<String> = applied.map(|(what, id)| format!("{what} {}", done(id))).collect();
         notes.extend(forced(&taken.forced));
         notes.extend(taken.troubles.iter().map(ToString::to_string));
         for note in &notes {

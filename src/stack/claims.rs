@@ -52,6 +52,7 @@ impl Claim {
 #[derive(Debug, Clone, Default)]
 pub struct Claims {
     of: FxHashMap<ConfigId, Claim>,
+    components: Vec<ComponentName>,
 }
 
 impl Claims {
@@ -84,7 +85,12 @@ impl Claims {
                 claim.join(&groups[&group]);
             }
         }
-        Self { of }
+        Self { of, components: numbers.into_keys().collect() }
+    }
+
+    /// Every component that a configuration names.
+    pub fn components(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        self.components.iter().copied()
     }
 
     /// What requests claim together. A configuration that is not there claims nothing.

@@ -8,6 +8,7 @@ mod declared;
 mod demo;
 mod explored;
 mod faults;
+mod force;
 mod hot_swap;
 mod lost;
 mod monitor;

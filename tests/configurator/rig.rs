@@ -196,6 +196,7 @@ impl Rig {
         let told = progress.clone();
         let handle = Configurator::start(Setup {
             configurations,
+            rest: Vec::new(),
             catalogue,
             activities,
             coordinators: BTreeSet::new(),
