@@ -58,7 +58,7 @@ pub struct Claims {
 impl Claims {
     /// What each configuration claims: the components that it and those of its group name; with `_default` all of its file.
     pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone) -> Self {
-        let mut numbers: BTreeMap<ComponentName, usize> = BTreeMap::new();
+        let mut numbers: FxHashMap<ComponentName, usize> = FxHashMap::default();
         for configuration in configurations.clone() {
             for component in named(configuration) {
                 let next = numbers.len();
