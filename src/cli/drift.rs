@@ -45,13 +45,16 @@ impl Args {
             return Ok(exit);
         }
         let name = out.paint(Style::Bold, client.name());
-        if differences.is_empty() {
-            out.line(format!("{name}: as it should be"));
-            return Ok(exit);
+        let broken = client.call("status", &json!({}), ASK).is_ok_and(|status| status["phase"] == "broken");
+        match (differences.is_empty(), broken) {
+            (true, false) => out.line(format!("{name}: as it should be")),
+            (true, true) => out.line(format!("{name}: nothing differs from what is known of it")),
+            (false, _) => {
+                out.line(format!("{name}: what leads from the system as it should be to the system as it is"));
+                context.out.text(listed(differences));
+            }
         }
-        out.line(format!("{name}: what leads from the system as it should be to the system as it is"));
-        context.out.text(listed(differences));
-        if client.call("status", &json!({}), ASK).is_ok_and(|status| status["phase"] == "broken") {
+        if broken {
             out.error(format!("note: it is broken; {WAY_OUT}\n"));
         }
         Ok(exit)
