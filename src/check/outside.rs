@@ -24,6 +24,7 @@ impl Product<'_> {
                 }
             }
         }
+        self.unheard_shutdown(state, &heard, nexts);
         for at in heard {
             let name = self.outside[at];
             let takes =
@@ -47,6 +48,18 @@ impl Product<'_> {
             next.unconfirmed.clear();
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
+    }
+
+    /// The event that ends the deployment comes where nobody waits for it: it is raised once, and gone.
+    fn unheard_shutdown(&mut self, state: &State, heard: &BTreeSet<usize>, nexts: &mut Nexts) {
+        let shutdown = self.deployment.shutdown.event;
+        let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
+        if heard.contains(&at) || state.stopping || !self.minds_stopping() || self.all_in(state, |member| member.down) {
+            return;
+        }
+        let next = State { stopping: true, ..state.clone() };
+        let by = Move::Event(u16::try_from(at).unwrap_or(u16::MAX));
+        nexts.all.push(Next::plain(by, next, Failed::Nothing));
     }
 
     /// An event comes to all that wait for it.
