@@ -280,8 +280,8 @@ impl Product<'_> {
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
             self.broke(state, number, requests, broken, nexts);
-            self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
         }
+        self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
     }
 
     /// How a batch may end that a safe configuration has interrupted: it is taken back, as far as it was planned in the world

@@ -13,6 +13,7 @@ mod drive;
 mod ends;
 mod explore;
 mod follow;
+mod held;
 mod judge;
 mod members;
 mod monitors;
