@@ -112,9 +112,9 @@ fn it_is_applied_when_the_system_is_broken() {
 /// `A` with a gain, and safe configurations about it.
 fn about_a() -> Rig {
     let mut all = vec![
-        configuration("make", "", "create A; set A.k 3", "A:running"),
+        configuration("make", "", "create A; create B; set A.k 3", "A:running"),
         configuration("gain", "", "set A.k 7", ""),
-        configuration("drop", "", "destroy A", ""),
+        configuration("drop", "", "destroy A; call B.open", ""),
         configuration("low", "A:stopped", "set A.k 1", ""),
         configuration("lower", "", "set A.k 2", ""),
     ];
@@ -153,13 +153,14 @@ fn what_it_finds_gone_comes_back_as_it_wants_it() {
     let rig = about_a();
     let before = rig.see();
     // `A` is gone, and the rest of the batch still out, when it comes.
-    rig.platform.set_delays(slow("destroy", 0.5));
+    rig.platform.set_delays(slow("operation_call", 0.5));
     rig.submit("drop");
     rig.wait(0.2);
+    assert!(!rig.see().components.contains_key(&name("A")));
     rig.submit("low");
     rig.wait(50.0);
     rig.platform.set_delays(Delays::default());
-    assert_eq!(*rig.events().last().unwrap(), "drop.failed");
+    assert_eq!(rig.events()[1..], ["low.ok", "drop.failed"]);
     assert_eq!(rig.frames(), ["make", "low"]);
     let a = &rig.see().components[&name("A")];
     assert_eq!((a.state, &a.properties[&ident("k")]), (RunState::Stopped, &Value::Float(1.0)));
