@@ -135,8 +135,9 @@ impl Product<'_> {
                 // Any of them, but no more than a few at once.
                 for some in 1..1u32 << stops.len().min(3) {
                     // Where others wait, it may have come before or after them.
-                    for last in
-                        [false, true].into_iter().take(if self.tells_all && state.desk.len() > 0 { 2 } else { 1 })
+                    for last in [false, true]
+                        .into_iter()
+                        .take(if self.tells_all && state.desk.waiting().next().is_some() { 2 } else { 1 })
                     {
                         let mut waits = state.clone();
                         let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);

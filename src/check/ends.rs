@@ -114,13 +114,27 @@ impl Product<'_> {
             let given = Given::from_iter([(0, Some(verdict))]);
             self.ended(state, number, requests, given, &went, Failed::Nothing, nexts);
         }
+        if matches!(requests[0].why, Why::Unconfirmed(..)) {
+            // Nobody is told where the frame is gone.
+            self.ended(
+                state,
+                number,
+                requests,
+                Given::from_iter([(0, None)]),
+                &Went::to(state.world),
+                Failed::Nothing,
+                nexts,
+            );
+        }
     }
 
     /// Something of a batch under way is left in between.
     fn broke(&mut self, state: &State, number: u32, requests: &[Request], given: Given, nexts: &mut Nexts) {
         let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
         let mut state = state.clone();
-        state.unconfirmed.clear();
+        if !self.tells_all {
+            state.unconfirmed.clear();
+        }
         self.ended(&state, number, requests, given, &Went::to(world), Failed::Broken, nexts);
     }
 
@@ -192,8 +206,9 @@ impl Product<'_> {
         // One batch may push several of them.
         let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
         let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
-        if let (true, Some((_, place))) = (waits, pushed.next()) {
-            state.unconfirmed.push(Unconfirmed { place: *place, request: Request { why: Why::Asked, ..*request } });
+        let unknown = (self.tells_all && self.worlds.top(state.world).is_some()).then_some(u8::MAX);
+        if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
+            state.unconfirmed.push(Unconfirmed { place, request: Request { why: Why::Asked, ..*request } });
         }
     }
 
@@ -278,8 +293,8 @@ impl Product<'_> {
         if part.failed.is_some() {
             broken.push((part.place, Some(Verdict::Broken)));
             self.broke(state, number, requests, broken, nexts);
-            self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
         }
+        self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
     }
 
     /// How a batch may end that a safe configuration has interrupted: it is taken back, as far as it was planned in the world
@@ -365,7 +380,9 @@ impl Product<'_> {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
-            next.unconfirmed.clear();
+            if !self.tells_all {
+                next.unconfirmed.clear();
+            }
             self.safe_told(next, request, Verdict::Broken, Failed::Broken, nexts);
         }
     }

@@ -160,11 +160,6 @@ impl<'a> Follower<'a> {
         Ok(known)
     }
 
-    /// Whether something may have ended *broken*: what `check` knows of system and stack from then on is nothing.
-    pub fn is_lost(&self) -> bool {
-        self.may.iter().any(|may| self.product.worlds.get(may.state.world).is_none())
-    }
-
     /// The states in which it may be, in words.
     pub fn may(&mut self) -> String {
         let may = self.may.clone();

@@ -14,6 +14,7 @@ mod drive;
 mod ends;
 mod explore;
 mod follow;
+mod held;
 mod judge;
 mod members;
 mod monitors;

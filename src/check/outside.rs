@@ -4,7 +4,7 @@ use super::members::Member;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
-use crate::stack::{Batch, Request, Requester, Why};
+use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
@@ -128,7 +128,10 @@ impl Product<'_> {
     fn unconfirmed(&mut self, state: &State, at: usize, id: ConfigId, nexts: &mut Nexts) {
         let waits = state.unconfirmed[at];
         let confirm = self.worlds.configuration(id).and_then(|c| c.confirm);
-        let (Some(confirm), Some(frame)) = (confirm, self.worlds.frame(state.world, waits.place)) else { return };
+        // In a world that is not known it may be any frame, or none any more.
+        let unknown = self.worlds.top(state.world).filter(|_| self.tells_all).map(|_| FrameId(0));
+        let frame = self.worlds.frame(state.world, waits.place).or(unknown);
+        let (Some(confirm), Some(frame)) = (confirm, frame) else { return };
         let why = Why::Unconfirmed(frame, confirm.event, confirm.within);
         let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
         let mut left = state.clone();

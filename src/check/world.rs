@@ -14,7 +14,7 @@ use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Fi
 use crate::plan::{Context, PlannedStep, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
-    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, held, take_up,
+    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, take_up,
 };
 use crate::system::{System, View, step};
 use crate::time::Time;
@@ -132,7 +132,7 @@ pub struct Worlds<'a> {
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
-    helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
+    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
     asked: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
@@ -140,7 +140,7 @@ pub struct Worlds<'a> {
 }
 
 /// Requests without what means nothing to what they come to.
-fn plain(requests: &[Request]) -> SmallVec<[Request; 2]> {
+pub(super) fn plain(requests: &[Request]) -> SmallVec<[Request; 2]> {
     requests.iter().map(|request| Request { tag: (0, 0), ..*request }).collect()
 }
 
@@ -196,6 +196,14 @@ impl<'a> Worlds<'a> {
         id
     }
 
+    /// The numbers of the frames that count, in their order.
+    pub(super) fn ids(&self, id: WorldId) -> &[FrameId] {
+        match &self.worlds[id as usize] {
+            Known::Exact(exact) => &exact.ids,
+            Known::Top(_) => &[],
+        }
+    }
+
     /// What is known of a world that is not known.
     pub fn top(&self, id: WorldId) -> Option<Top> {
         match &self.worlds[id as usize] {
@@ -222,20 +230,6 @@ impl<'a> Worlds<'a> {
             }
             Known::Top(top) => top.actuator,
         }
-    }
-
-    /// Whether a frame of this configuration is in force, in whatever shape.
-    pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
-        self.get(id).is_some_and(|world| {
-            let stack = &world.stack;
-            stack.is_buried(configuration, None) || stack.frames().iter().any(|f| f.configuration == configuration)
-        })
-    }
-
-    /// Whether an operator has a frame in force, and of what.
-    pub fn of_operator(&self, id: WorldId) -> Option<ConfigId> {
-        let frames = self.get(id)?.stack.frames();
-        frames.iter().find(|frame| frame.requester == Requester::Operator).map(|frame| frame.configuration)
     }
 
     /// The configuration of that name.
@@ -269,34 +263,6 @@ impl<'a> Worlds<'a> {
             held: &[],
             joined: false,
         }
-    }
-
-    /// The frames that a batch under way pops or hands over to.
-    pub fn held_by(&mut self, id: WorldId, requests: &[Request], joined: bool) -> Held {
-        let key = (id, plain(requests), joined);
-        if let Some(known) = self.helds.get(&key) {
-            return known.clone();
-        }
-        let group = self.group(id, &key.1, &Beside { joined, ..Beside::default() });
-        let planned = group.and_then(|group| group.planned);
-        let held: Held = planned.iter().flat_map(held).collect();
-        self.helds.insert(key, held.clone());
-        held
-    }
-
-    /// A frame of the world `from` in the world `to`, in which it lies below others.
-    pub fn below(&self, from: WorldId, to: WorldId, frame: FrameId) -> Option<FrameId> {
-        let (from, to) = (self.get(from)?, self.get(to)?);
-        let of = |frame: &Frame| (frame.configuration, frame.requester);
-        let like = of(from.stack.frame(frame)?);
-        if to.stack.frame(frame).is_some_and(|frame| of(frame) == like) {
-            return Some(frame);
-        }
-        let alike = |stack: &Stack| -> Vec<FrameId> {
-            stack.frames().iter().filter(|frame| of(frame) == like).map(|frame| frame.id).collect()
-        };
-        let place = alike(&from.stack).iter().position(|id| *id == frame)?;
-        alike(&to.stack).get(place).copied()
     }
 
     fn work_out(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Comes {
@@ -372,31 +338,6 @@ impl<'a> Worlds<'a> {
         self.went(id, world, &pushed)
     }
 
-    /// The world in which these undos were taken back, planned in `planned`: frames that were to be undone with the states
-    /// they belonged to stay without these.
-    pub fn stay(&mut self, id: WorldId, planned: WorldId, undos: impl Iterator<Item = Request>) -> Went {
-        let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
-        let mut stay: SmallVec<[FrameId; 2]> = SmallVec::new();
-        for undo in undos.filter(|undo| undo.scope.is_some()) {
-            let fits = |frame: &&Arc<Frame>| {
-                let by = frame.requester == undo.requester;
-                by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
-            };
-            // That which was the newest then: others may have come since, above it.
-            let count = planned.stack.frames().iter().filter(fits).count();
-            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
-        }
-        self.unscoped(id, &stay)
-    }
-
-    /// The world in which these frames no longer belong to a state.
-    fn unscoped(&mut self, id: WorldId, stay: &[FrameId]) -> Went {
-        let Some(before) = self.get(id).filter(|_| !stay.is_empty()) else { return Went::to(id) };
-        let mut world = before.clone();
-        stay.iter().for_each(|frame| world.stack.unscope(*frame));
-        self.went(id, world, &[])
-    }
-
     /// What a safe configuration comes to in a world that is known.
     pub fn safe(&mut self, id: WorldId, request: &Request, held: &Held) -> Rc<SafeComes> {
         let key = (id, Request { tag: (0, 0), ..*request }, held.clone());
@@ -425,22 +366,6 @@ impl<'a> Worlds<'a> {
     pub fn settle_down(&mut self, id: WorldId) -> Option<WorldId> {
         let mut world = self.get(id)?.clone();
         world.settle_down().then(|| self.intern(world))
-    }
-
-    /// The number of the frame that counts at that place.
-    pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
-        match &self.worlds[id as usize] {
-            Known::Exact(exact) => exact.ids.get(usize::from(place)).copied(),
-            Known::Top(_) => None,
-        }
-    }
-
-    /// The place of a frame that counts.
-    pub fn place(&self, id: WorldId, frame: FrameId) -> Option<usize> {
-        match &self.worlds[id as usize] {
-            Known::Exact(exact) => exact.ids.iter().position(|id| *id == frame),
-            Known::Top(_) => None,
-        }
     }
 
     /// Whether a frame of this configuration by this requester counts.
@@ -515,17 +440,14 @@ impl<'a> Worlds<'a> {
         WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX)
     }
 
-    fn went(&mut self, from: WorldId, world: World, pushed: &[FrameId]) -> Went {
+    pub(super) fn went(&mut self, from: WorldId, world: World, pushed: &[FrameId]) -> Went {
         let (deep, left) = (self.more_than(limits::CHECK_FRAMES, &world), self.more_than(limits::CHECK_LEFT, &world));
         if !self.confirms {
             return Went { world: self.intern(world), places: None, pushed: SmallVec::new(), deep, left };
         }
         let (counted, ids) = self.shapes.of(&world.stack);
         let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
-        let before = match &self.worlds[from as usize] {
-            Known::Exact(exact) => exact.ids.clone(),
-            Known::Top(_) => Vec::new(),
-        };
+        let before = self.ids(from).to_vec();
         let places = before.iter().map(place).collect();
         let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
         let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();

@@ -54,7 +54,7 @@ fn conf(
     changes: Vec<ChangeKind>,
     post: &[(&str, Wanted)],
 ) -> Configuration {
-    let mut conf = Configuration::new(ConfigId::new(id).unwrap());
+    let mut conf = Configuration::new(ConfigId::new(if id.is_empty() { "_" } else { id }).unwrap());
     conf.group = group.map(ident);
     let entry = |(name, state): &(&str, Wanted)| StateEntry {
         target: Target::Component(ComponentName::new(name).unwrap()),
@@ -325,4 +325,52 @@ fn what_moves_is_not_prepared() {
     assert!(!kept(&bench, &[], &conf("s", None, &entry(Wanted::Stopped), vec![], &entry(Wanted::Running))));
     assert!(!kept(&bench, &[], &conf("s", None, &entry(Wanted::Stopped), vec![], &[])), "its undo starts it");
     assert!(kept(&bench, &[], &conf("s", None, &[], vec![set("A.gain", 1.0)], &entry(Wanted::Running))));
+}
+
+#[test]
+fn a_frame_that_waits_for_its_confirmation_is_not_squashed() {
+    let mut bench = Bench::new(2);
+    let mut waits = conf("waits", None, &[], vec![set("A.gain", 1.0)], &[]);
+    let event = EventName::new("e_fine").unwrap();
+    waits.confirm = Some(Confirm { event, within: std::time::Duration::from_secs(1) });
+    let plain = conf("plain", None, &[], vec![set("B.gain", 1.0)], &[]);
+    let more = conf("more", None, &[], vec![set("B.mass", 1.0)], &[("B", Wanted::Stopped)]);
+    let more = Configuration { pre: more.post.clone(), ..more };
+    assert!(bench.ask(&[push(&waits)]).unwrap().parts[0].edits.waits);
+    let held = bench.ok(&[push(&waits)]).1;
+    let second = bench.ask(&[push(&plain)]).unwrap();
+    bench.stack.apply(second.parts.iter().map(|part| &part.edits), &held);
+    let third = bench.ask(&[push(&more)]).unwrap();
+    bench.stack.apply(third.parts.iter().map(|part| &part.edits), &held);
+    let parts: Vec<usize> = bench.stack.frames().iter().map(|frame| frame.parts.len()).collect();
+    assert_eq!(parts, [0, 2], "it stays by itself");
+}
+
+#[test]
+fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
+    let mut bench = Bench::new(64);
+    let (low, high) = (conf("low", None, &[], vec![set("A.mass", 1.0)], &[]), conf("high", None, &[], vec![], &[]));
+    let low = Configuration { pre: conf("", None, &[("A", Wanted::Stopped)], vec![], &[]).pre, ..low };
+    let high =
+        Configuration { changes: vec![], post: conf("", None, &[], vec![], &[("A", Wanted::Running)]).post, ..high };
+    let scope = Some(Scope(7));
+    bench.ok(&[Op::Push { configuration: &low, requester: Requester::Operator, at: Time(0), scope }]);
+    bench.ok(&[push(&high)]);
+    let configurations = [low, high].into_iter().map(|c| (c.id, c)).collect();
+    let context = Context::default();
+    let rules = super::Rules {
+        configurations: &configurations,
+        context: &context,
+        at: Time(0),
+        busy: false,
+        held: &[],
+        joined: false,
+    };
+    let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
+    let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
+    let world = super::World::new(bench.system.clone(), bench.stack.clone());
+    let group = super::take_up(&world, &[undo], &rules);
+    assert_eq!(group.told[0].verdict, Some(Verdict::UndoFailed), "`high` needs it stopped");
+    let frame = bench.stack.frames()[0].id;
+    assert_eq!(group.stay[..], [(0, frame)]);
 }

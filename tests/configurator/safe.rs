@@ -108,3 +108,84 @@ fn it_is_applied_when_the_system_is_broken() {
     assert_eq!(rig.last().verdict, Verdict::Broken);
     rig.each_answered_once();
 }
+
+/// `A` with a gain, and safe configurations about it.
+fn about_a() -> Rig {
+    let mut all = vec![
+        configuration("make", "", "create A; create B; set A.k 3", "A:running"),
+        configuration("gain", "", "set A.k 7", ""),
+        configuration("drop", "", "destroy A; call B.open", ""),
+        configuration("low", "A:stopped", "set A.k 1", ""),
+        configuration("lower", "", "set A.k 2", ""),
+    ];
+    for configuration in &mut all {
+        configuration.safe = configuration.id.as_str().starts_with("low");
+    }
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    rig
+}
+
+fn gain(rig: &Rig) -> Value {
+    rig.see().components[&name("A")].properties[&ident("k")].clone()
+}
+
+#[test]
+fn what_lands_before_its_own_step_is_not_taken_back_over_it() {
+    let rig = about_a();
+    // Both are out at once: that of what is interrupted ends first.
+    rig.platform.set_delays(slow("property_set A.k", 0.5));
+    rig.submit("gain");
+    rig.wait(0.2);
+    rig.submit("lower");
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[1..], ["lower.ok", "gain.failed"]);
+    assert_eq!(gain(&rig), Value::Float(2.0), "what is safe stays");
+    assert_eq!(rig.ask("lower.undo"), ["lower.undone"]);
+    assert_eq!(gain(&rig), Value::Float(3.0), "and goes back to before both");
+    rig.in_step();
+    rig.each_answered_once();
+}
+
+#[test]
+fn what_it_finds_gone_comes_back_as_it_wants_it() {
+    let rig = about_a();
+    let before = rig.see();
+    // `A` is gone, and the rest of the batch still out, when it comes.
+    rig.platform.set_delays(slow("operation_call", 0.5));
+    rig.submit("drop");
+    rig.wait(0.2);
+    assert!(!rig.see().components.contains_key(&name("A")));
+    rig.submit("low");
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[1..], ["low.ok", "drop.failed"]);
+    assert_eq!(rig.frames(), ["make", "low"]);
+    let a = &rig.see().components[&name("A")];
+    assert_eq!((a.state, &a.properties[&ident("k")]), (RunState::Stopped, &Value::Float(1.0)));
+    assert_eq!(rig.ask("low.undo"), ["low.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
+
+#[test]
+fn of_two_at_once_the_later_wins_and_the_earlier_does_not_write_it() {
+    let rig = about_a();
+    rig.platform.set_delays(slow("stop", 0.5));
+    rig.platform.record();
+    rig.submit_as("low", coordinator("c1")).unwrap();
+    rig.submit_as("lower", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    let steps: Vec<String> = rig.platform.record().iter().map(ToString::to_string).collect();
+    assert_eq!(steps.iter().filter(|step| step.contains("A.k")).count(), 1, "{steps:?}");
+    assert_eq!(rig.events()[1..], ["low.ok", "lower.ok"], "neither is broken");
+    assert_eq!(gain(&rig), Value::Float(2.0));
+    assert_eq!(rig.frames(), ["make", "low", "lower"]);
+    assert_eq!(rig.ask_as("lower.undo", coordinator("c2")), ["lower.undone"]);
+    assert_eq!(gain(&rig), Value::Float(1.0), "as after the earlier one");
+    assert_eq!(rig.ask_as("low.undo", coordinator("c1")), ["low.undone"]);
+    assert_eq!(gain(&rig), Value::Float(3.0));
+    rig.in_step();
+}

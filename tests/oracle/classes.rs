@@ -5,13 +5,14 @@ use davit::check::{Known, Shown};
 use std::collections::BTreeMap;
 
 /// The classes, and of how many cases each was part of.
-pub const CLASSES: [&str; 13] = [
+pub const CLASSES: [&str; 14] = [
     "an undo and a push of which one fails",
     "safe in a batch",
     "e_done",
     "second life",
     "past limits.stack",
     "broken",
+    "after broken",
     "cancelled",
     "reverted",
     "operator",
@@ -101,6 +102,9 @@ impl Classes {
         let bad = answer.ends_with(".failed") || answer.ends_with(".broken");
         if bad && self.mixed.get(&request).is_some_and(|mixed| *mixed) {
             self.meets("an undo and a push of which one fails");
+        }
+        if self.met[CLASSES.iter().position(|name| *name == "broken").expect("a class")] {
+            self.meets("after broken");
         }
         if answer.ends_with(".broken") {
             self.meets("broken");

@@ -13,6 +13,7 @@ mod classes;
 mod drive;
 mod generate;
 mod laws;
+mod mutations;
 
 use classes::{CLASSES, Classes};
 use generate::Chance;
@@ -20,7 +21,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// With so many cases that disagree it ends: more of them say no more.
-const ENOUGH: usize = 20;
+const ENOUGH: u64 = 20;
 
 /// The cases of a full run.
 const CASES: u64 = 22_000;
@@ -43,7 +44,9 @@ fn a_running_deployment_does_what_check_follows() {
             scope.spawn(|| {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= first + cases || sums.lock().unwrap().2.len() >= ENOUGH {
+                    if seed >= first + cases
+                        || sums.lock().unwrap().2.len() as u64 >= number("DAVIT_ORACLE_ENOUGH", ENOUGH)
+                    {
                         return;
                     }
                     let mut chance = Chance::new(seed);

@@ -1,0 +1,87 @@
+//! Frames of a world: which are held by what is under way, which stay though the state they belonged to was left, and how one
+//! is found again in the world that follows.
+
+use super::world::{Beside, Held, Went, WorldId, Worlds, plain};
+use crate::model::{Ask, ConfigId};
+use crate::stack::{Frame, FrameId, Request, Requester, Stack, held};
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+impl Worlds<'_> {
+    /// The frames that a batch under way pops or hands over to.
+    pub fn held_by(&mut self, id: WorldId, requests: &[Request], joined: bool) -> Held {
+        let key = (id, plain(requests), joined);
+        if let Some(known) = self.helds.get(&key) {
+            return known.clone();
+        }
+        let group = self.group(id, &key.1, &Beside { joined, ..Beside::default() });
+        let planned = group.and_then(|group| group.planned);
+        let held: Held = planned.iter().flat_map(held).collect();
+        self.helds.insert(key, held.clone());
+        held
+    }
+
+    /// A frame of the world `from` in the world `to`, in which it lies below others.
+    pub fn below(&self, from: WorldId, to: WorldId, frame: FrameId) -> Option<FrameId> {
+        let (from, to) = (self.get(from)?, self.get(to)?);
+        let of = |frame: &Frame| (frame.configuration, frame.requester);
+        let like = of(from.stack.frame(frame)?);
+        if to.stack.frame(frame).is_some_and(|frame| of(frame) == like) {
+            return Some(frame);
+        }
+        let alike = |stack: &Stack| -> Vec<FrameId> {
+            stack.frames().iter().filter(|frame| of(frame) == like).map(|frame| frame.id).collect()
+        };
+        let place = alike(&from.stack).iter().position(|id| *id == frame)?;
+        alike(&to.stack).get(place).copied()
+    }
+
+    /// The world in which these undos were taken back, planned in `planned`: frames that were to be undone with the states
+    /// they belonged to stay without these.
+    pub fn stay(&mut self, id: WorldId, planned: WorldId, undos: impl Iterator<Item = Request>) -> Went {
+        let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
+        let mut stay: SmallVec<[FrameId; 2]> = SmallVec::new();
+        for undo in undos.filter(|undo| undo.scope.is_some()) {
+            let fits = |frame: &&Arc<Frame>| {
+                let by = frame.requester == undo.requester;
+                by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
+            };
+            // That which was the newest then: others may have come since, above it.
+            let count = planned.stack.frames().iter().filter(fits).count();
+            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
+        }
+        self.unscoped(id, &stay)
+    }
+
+    /// The world in which these frames no longer belong to a state.
+    pub(super) fn unscoped(&mut self, id: WorldId, stay: &[FrameId]) -> Went {
+        let Some(before) = self.get(id).filter(|_| !stay.is_empty()) else { return Went::to(id) };
+        let mut world = before.clone();
+        stay.iter().for_each(|frame| world.stack.unscope(*frame));
+        self.went(id, world, &[])
+    }
+
+    /// The place of a frame that counts.
+    pub fn place(&self, id: WorldId, frame: FrameId) -> Option<usize> {
+        self.ids(id).iter().position(|id| *id == frame)
+    }
+
+    /// The number of the frame that counts at that place.
+    pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
+        self.ids(id).get(usize::from(place)).copied()
+    }
+
+    /// Whether a frame of this configuration is in force, in whatever shape.
+    pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
+        self.get(id).is_some_and(|world| {
+            let stack = &world.stack;
+            stack.is_buried(configuration, None) || stack.frames().iter().any(|f| f.configuration == configuration)
+        })
+    }
+
+    /// Whether an operator has a frame in force, and of what.
+    pub fn of_operator(&self, id: WorldId) -> Option<ConfigId> {
+        let frames = self.get(id)?.stack.frames();
+        frames.iter().find(|frame| frame.requester == Requester::Operator).map(|frame| frame.configuration)
+    }
+}
