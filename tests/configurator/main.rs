@@ -3,6 +3,7 @@
 mod atomicity;
 mod batches;
 mod brief;
+mod claims;
 mod observing;
 mod prepared;
 mod rig;
