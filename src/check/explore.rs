@@ -33,6 +33,8 @@ pub struct Edge {
     pub quiet: bool,
     /// The event that ends the deployment comes once more.
     pub again: bool,
+    /// It comes, and nobody hears it.
+    pub dropped: bool,
 }
 
 /// A bound that cut something off.
@@ -234,11 +236,12 @@ impl Graph<'_, '_> {
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let again = state.stopping && self.product.is_shutdown(next.by);
+            let dropped = matches!(next.by, Move::Dropped(_));
             let (mut next, class) = self.abstracted(next);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
-            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again });
+            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again, dropped });
         }
     }
 
@@ -344,7 +347,15 @@ impl Graph<'_, '_> {
         state.unconfirmed.clear();
         let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
-        self.edges.push(Edge { from: at, to, place: None, failed: Failed::Nothing, quiet: false, again: false });
+        self.edges.push(Edge {
+            from: at,
+            to,
+            place: None,
+            failed: Failed::Nothing,
+            quiet: false,
+            again: false,
+            dropped: false,
+        });
     }
 
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
@@ -471,7 +482,7 @@ impl Product<'_> {
         let name = |number: u8| self.members[usize::from(number)].name.to_string();
         let event = |number: u8, event| self.members[usize::from(number)].chart.event_text(event);
         match next.by {
-            Move::Event(at) => Happened::Event { event: self.outside[usize::from(at)].to_string() },
+            Move::Event(at) | Move::Dropped(at) => Happened::Event { event: self.outside[usize::from(at)].to_string() },
             Move::Time(number, at) => Happened::Time { coordinator: name(number), event: event(number, at) },
             Move::Taken(number, at) => Happened::Heard { coordinator: name(number), event: event(number, at) },
             Move::Answer => Happened::Answer {

@@ -307,7 +307,7 @@ impl Graph<'_, '_> {
     /// Where nothing leads on.
     fn stuck(&mut self, found: &mut Traced) -> FxHashSet<u32> {
         let mut leads_on = vec![false; self.states.len()];
-        self.edges.iter().for_each(|edge| leads_on[edge.from as usize] = true);
+        self.edges.iter().filter(|edge| !edge.dropped).for_each(|edge| leads_on[edge.from as usize] = true);
         let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
         let mut stuck = FxHashSet::default();
         let mut told: FxHashSet<Vec<NodeId>> = FxHashSet::default();

@@ -58,7 +58,7 @@ impl Product<'_> {
             return;
         }
         let next = State { stopping: true, ..state.clone() };
-        let by = Move::Event(u16::try_from(at).unwrap_or(u16::MAX));
+        let by = Move::Dropped(u16::try_from(at).unwrap_or(u16::MAX));
         nexts.all.push(Next::plain(by, next, Failed::Nothing));
     }
 

@@ -198,7 +198,7 @@ impl Product<'_> {
             return Does::Cannot("an answer comes while what would stop it is on its way");
         }
         match next.by {
-            Move::Event(at) => Does::Raise(self.outside[usize::from(at)]),
+            Move::Event(at) | Move::Dropped(at) => Does::Raise(self.outside[usize::from(at)]),
             Move::Confirmed(id) => match self.worlds.configuration(id).and_then(|c| c.confirm) {
                 Some(confirm) => Does::Raise(confirm.event),
                 None => Does::Nothing,

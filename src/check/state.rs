@@ -117,6 +117,8 @@ impl State {
 pub enum Move {
     /// An event comes from outside, by its place among them.
     Event(u16),
+    /// An event comes from outside, by its place among them, and nobody hears it.
+    Dropped(u16),
     /// Time passes for a coordinator.
     Time(u8, EventId),
     /// A coordinator takes what lies in its inbox.

@@ -501,7 +501,10 @@ codes! {
          every way there. Else add a transition, at least on the shutdown event.";
     COORD_NO_WAY_DOWN = "coord::no_way_down", "the state that means down cannot be reached from here",
         "`check` followed every order of events from the state shown, and none leads to `shutdown.down`, even if every \
-         request succeeds from there on. A shutdown would have to be forced. Add the transitions that lead down from there.";
+         request succeeds from there on. A shutdown would have to be forced. Add the transitions that lead down from there. The event that begins the shutdown \
+         is raised once: where nobody hears it in some state, or where a state on the way down waits for it again, what is \
+         there is taken down without the coordinator. Hear it in a state around all of those, or let an answer or a time lead \
+         on.";
     COORD_LEFTOVERS = "coord::leftovers", "a way down leaves components behind",
         "On the way shown the coordinator reaches the state that means down with components still there. The shutdown \
          would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \

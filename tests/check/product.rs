@@ -67,9 +67,15 @@ fn down_with_something_left_is_no_end() {
         trans { src = \"up\", tgt = \"idle\", events = { \"e_try\" }, effect = { \"base.undo\", \"tryout\" } },
         trans { src = \"idle\", tgt = \"odd\", events = { \"tryout.reverted\" } },
         trans { src = \"odd\", tgt = \"idle\", events = { \"e_shutdown\" } },";
-    // Its script is gone, too: there the frame is reverted.
-    let said = Small::new(configurations, states, "").check();
+    let small = Small::new(configurations, states, "");
+    let said = Said(small.demo.run(&["check", "small.yaml", "--json"]).json());
     assert!(!said.refused("bad").is_empty(), "{:#}", said.0);
+    // And so it goes.
+    let story = "deploy('small.yaml', {replay = true}) raise('e_start') wait_answer('base.ok', 1) raise('e_try')
+        wait_answer('tryout.ok', 1) wait_answer('tryout.reverted', 1) wait_answer('bad.failed', 1)";
+    small.demo.write("story.lua", story);
+    let ran = small.demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
 }
 
 /// Answers of one batch come undos first, whatever the order in which they were raised.
