@@ -311,8 +311,6 @@ codes! {
         "Once this step is done, neither a failure of a later step nor an undo can take it back: its frame becomes a floor of the stack. If that is meant, say so with `irreversible = true`; else name the call that undoes it, operation_call(...):undo(...), or declare the operation's `effect:`.";
     ACTUATOR_BY_DEFAULT = "conf::actuator_by_default", "an actuator is started or stopped only through `_default`",
         "The component's type is declared `actuator: true`: starting or stopping it moves something. Here that happens only because `_default` covers it, which is easily overlooked. Name the component in the list if it is meant.";
-    STALE_PLAN = "conf::stale_plan", "the system has changed since the plan was made",
-        "A plan holds every decision and is valid for the system it was made from, no other. The system has changed since: make the plan anew.";
     // ---- SCXML -------------------------------------------------------------------------------------------------------
     SCXML_NO_COUNTERPART = "scxml::no_counterpart", "something of SCXML has no counterpart here",
         "A coordinator holds no data, runs no code, and is in one state at a time. What of an SCXML document needs more (parallel regions, history, a data model, conditions, scripts, invocations, events that the chart raises to itself, transitions without a target) is refused, each at its place, with what to do instead.";

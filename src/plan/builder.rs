@@ -23,7 +23,6 @@ pub(super) struct Builder<'o, 's, 'c> {
 }
 
 pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
-    let revision = view.base().revision();
     let mut b = Builder {
         view,
         configuration,
@@ -54,7 +53,6 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
     Ok(Plan {
         configuration: configuration.id,
         group: configuration.group,
-        revision,
         steps: b.steps,
         footprint: b.footprint,
         saved: b.saved,

@@ -14,7 +14,6 @@ mod order;
 mod tests;
 pub mod undo;
 
-use crate::model::codes;
 use crate::model::{ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
 use footprint::{Footprint, Saved, Slot};
@@ -99,8 +98,6 @@ pub struct Plan {
     pub configuration: ConfigId,
     /// The group it belongs to.
     pub group: Option<Ident>,
-    /// The revision of the system it was made from; it is valid for no other.
-    pub revision: u64,
     /// What is done.
     pub steps: Vec<PlannedStep>,
     /// What it touches.
@@ -120,18 +117,6 @@ impl Plan {
     /// The steps that undo the plan on the system it leads to, in order.
     pub fn undo_steps(&self) -> impl Iterator<Item = &Step> {
         self.steps.iter().rev().flat_map(|s| s.undo.steps())
-    }
-
-    /// Refuses a plan that was made from another system than this.
-    ///
-    /// # Errors
-    /// A refusal with the code `conf::stale_plan`.
-    pub fn fresh(&self, system: &System) -> Result<(), Refusal> {
-        if self.revision == system.revision() {
-            return Ok(());
-        }
-        let message = format!("the plan of `{}` was made from an earlier system", self.configuration);
-        Err(Refusal::one(Finding::error(codes::STALE_PLAN, message).help("plan the configuration again")))
     }
 }
 

@@ -378,15 +378,6 @@ fn what_moves_is_known_beforehand() {
 }
 
 #[test]
-fn a_stale_plan_is_refused() {
-    let mut system = base();
-    let plan = attempt(&system, &conf("c", &[], vec![write("A.u", 1)], &[])).unwrap();
-    assert!(plan.fresh(&system).is_ok());
-    system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted);
-    assert_eq!(plan.fresh(&system).unwrap_err().findings[0].code, codes::STALE_PLAN);
-}
-
-#[test]
 fn chains_of_a_hundred_thousand_are_ordinary() {
     let n = 100_000;
     let name = |i: usize| format!("c{i}");

@@ -332,24 +332,6 @@ pub fn restoring(saved: &SavedValue) -> Option<Step> {
     }
 }
 
-/// The steps that take back `done` steps of an interrupted transaction on the live system, last done first, each at most
-/// as irreversible as it is: what cannot be undone is left out.
-///
-/// # Errors
-/// The false preconditions, where the system is not as the steps left it.
-pub fn rollback(system: &System, done: &[PlannedStep]) -> Result<Vec<PlannedStep>, Vec<Violation>> {
-    let mut view = Overlay::new(system);
-    let mut script = Script::new(&mut view);
-    for step in done.iter().rev() {
-        for undo in step.undo.steps() {
-            let item = Item::undoing(undo, step);
-            let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-            script.add(item, 0, &after)?;
-        }
-    }
-    script.finish()
-}
-
 /// A list of steps in that order, simulated: what executes a `system::diff`.
 ///
 /// # Errors

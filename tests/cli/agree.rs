@@ -151,3 +151,13 @@ fn check_plan_graph_and_run_agree_on_every_shipped_file() {
         }
     }
 }
+
+/// What README shows of `check` is what it says.
+#[test]
+fn readme_shows_what_check_says() {
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let ran = at_home(&["check", "deployments/hello.yaml"]);
+    for line in ran.out.lines() {
+        assert!(readme.contains(line.trim_end()), "README does not show: {line}");
+    }
+}
