@@ -4,7 +4,7 @@ use super::product::Product;
 use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
 use super::world::{Beside, Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
-use crate::stack::{Request, Requester, Why, given_up_of};
+use crate::stack::{Request, Requester, Why, gave_up, given_up_of};
 use smallvec::SmallVec;
 
 /// A request as it is answered: what takes back what was not confirmed tells of that.
@@ -175,11 +175,9 @@ impl Product<'_> {
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
                 let undo = given_up.remove(at);
-                match verdict {
-                    // It was through before it could be given up: the undo is a request like others.
-                    Verdict::Ok => late.push(undo),
-                    Verdict::Broken => answers.push((undo, Verdict::UndoBroken)),
-                    _ => answers.push((undo, Verdict::Undone)),
+                match gave_up(verdict) {
+                    None => late.push(undo),
+                    Some(answer) => answers.push((undo, answer)),
                 }
             }
         }

@@ -73,10 +73,7 @@ impl Worlds<'_> {
 
     /// Whether a frame of this configuration is in force, in whatever shape.
     pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
-        self.get(id).is_some_and(|world| {
-            let stack = &world.stack;
-            stack.is_buried(configuration, None) || stack.frames().iter().any(|f| f.configuration == configuration)
-        })
+        self.get(id).is_some_and(|world| world.stack.is_in_force(configuration))
     }
 
     /// Whether an operator has a frame in force, and of what.

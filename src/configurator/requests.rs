@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
-use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, given_up_of, take_up};
+use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, gave_up, given_up_of, take_up};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
@@ -226,8 +226,8 @@ impl Engine {
         }
         for (place, verdict, reason) in answers {
             let request = requests[place];
-            self.finish(request, verdict, reason);
-            self.answer_giving_up(&request, verdict);
+            self.finish(request, verdict, reason.clone());
+            self.answer_giving_up(&request, verdict, reason.as_ref());
         }
     }
 
@@ -328,7 +328,7 @@ impl Engine {
         self.desk.answered(number, place);
         self.shift_places(number, place);
         self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
-        self.answer_giving_up(&request, Some(Verdict::Cancelled));
+        self.answer_giving_up(&request, Some(Verdict::Cancelled), None);
     }
 
     /// A request was taken out of a batch under way: those behind it have moved up.
@@ -348,22 +348,21 @@ impl Engine {
     }
 
     /// Answers the undos that gave `request` up.
-    fn answer_giving_up(&mut self, request: &Request, verdict: Option<Verdict>) {
+    fn answer_giving_up(&mut self, request: &Request, verdict: Option<Verdict>, reason: Option<&Reason>) {
+        let verdict = verdict.unwrap_or(Verdict::Cancelled);
         let fits = |(of, _): &(RequestId, Request)| *of == request.id && !request.ask.is_undo();
         while let Some(at) = self.giving_up.iter().position(fits) {
             let (_, undo) = self.giving_up.remove(at);
-            match verdict {
-                // It was through before it could be given up: the undo is a request like others.
-                Some(Verdict::Ok) => {
+            match gave_up(verdict) {
+                None => {
                     self.forget(undo);
                     self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
                     self.desk.comes_next(undo);
                 }
-                Some(Verdict::Broken) => {
-                    let reason = self.world.broken.last().map(|broken| Reason::Broken(broken.residual.clone()));
-                    self.answer(undo, Verdict::UndoBroken, reason);
+                Some(answer) => {
+                    let reason = reason.cloned().filter(|_| answer == Verdict::UndoBroken);
+                    self.answer(undo, answer, reason);
                 }
-                _ => self.answer(undo, Verdict::Undone, None),
             }
         }
     }

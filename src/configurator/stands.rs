@@ -153,7 +153,7 @@ impl Engine {
         }
         let ids: Vec<ConfigId> = self.standings.of.keys().copied().collect();
         for id in ids {
-            if !self.in_force(id) {
+            if !self.world.stack.is_in_force(id) {
                 self.forget_standing(id);
                 continue;
             }
@@ -219,12 +219,6 @@ impl Engine {
         if let Some(progress) = &self.progress {
             progress(&Progress::Lost { configuration: id, reason: Arc::new(reason) });
         }
-    }
-
-    /// Whether a frame of a configuration is in force, squashed and committed ones included.
-    fn in_force(&self, id: ConfigId) -> bool {
-        let stack = &self.world.stack;
-        stack.is_buried(id, None) || stack.frames().iter().any(|frame| frame.configuration == id && !frame.partial)
     }
 
     /// Whether a transaction applies, undoes or replaces a configuration, or stops or destroys what it looks at.

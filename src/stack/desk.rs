@@ -215,6 +215,16 @@ pub fn given_up_of(undo: &Request, requests: &[Request]) -> Option<usize> {
     requests.iter().rposition(|request| takes_back(undo, request, id))
 }
 
+/// What an undo is answered that gave up a request which ended so. None: that was through before it could be given up, and
+/// the undo is a request like others, the next to begin.
+pub fn gave_up(verdict: Verdict) -> Option<Verdict> {
+    match verdict {
+        Verdict::Ok => None,
+        Verdict::Broken => Some(Verdict::UndoBroken),
+        _ => Some(Verdict::Undone),
+    }
+}
+
 /// Whether `undo` (of `id`) takes back what `request` asks.
 fn takes_back(undo: &Request, request: &Request, id: ConfigId) -> bool {
     request.ask == Ask::Apply(id)

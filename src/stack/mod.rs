@@ -27,7 +27,7 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, take_up};
-pub use desk::{Arrival, Desk, Turn, given_up_of};
+pub use desk::{Arrival, Desk, Turn, gave_up, given_up_of};
 pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
@@ -195,6 +195,11 @@ impl Stack {
     pub fn is_buried(&self, configuration: ConfigId, by: Option<Requester>) -> bool {
         let fits = |p: &Buried| p.configuration == configuration && by.is_none_or(|by| p.requester == by);
         self.committed.iter().any(fits) || self.frames.iter().any(|f| f.parts.iter().any(fits))
+    }
+
+    /// Whether a configuration stands, for what it stands for: in a frame that is whole, squashed and committed ones included.
+    pub fn is_in_force(&self, id: ConfigId) -> bool {
+        self.is_buried(id, None) || self.frames.iter().any(|frame| frame.configuration == id && !frame.partial)
     }
 
     /// The safe configurations in force.

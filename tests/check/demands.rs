@@ -146,7 +146,11 @@ fn one_shutdown_event_leads_down() {
     let deaf = STATES.replace("trans { src = \"building\", tgt = \"leaving\", events = { \"e_shutdown\" } },", "");
     let deaf = Small::new(configurations, &deaf, "").check();
     let found = deaf.of("coord::no_way_down");
-    assert!(found.len() == 1 && found[0]["message"].as_str().unwrap().contains("only a second `e_shutdown`"), "{:#}", deaf.0);
+    assert!(
+        found.len() == 1 && found[0]["message"].as_str().unwrap().contains("only a second `e_shutdown`"),
+        "{:#}",
+        deaf.0
+    );
     for leads in ["\"park.ok\", \"park.failed\", \"park.broken\"", "\"e_shutdown\", \"e_after(1.0)\""] {
         let once = said(leads);
         assert!(once.of("coord::no_way_down").iter().all(|found| found["severity"] == "info"), "{leads}: {:#}", once.0);
