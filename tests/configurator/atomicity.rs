@@ -78,6 +78,8 @@ fn judge(rig: &Rig, catalogue: &Catalogue, word: &str, faults: Faults, say: &str
             }
             assert_eq!(there.snapshot(), seen, "{say}: the residual is exact: {residual}: {:#?}", told());
             assert!(!residual.is_empty(), "{say}: broken for a reason: {residual}");
+            let partial = rig.view().stack.iter().any(|frame| frame.partial);
+            assert!(partial || residual.left.is_empty(), "{say}: what was left has a frame: {residual}");
             rig.in_step();
             if !rig.platform_quarantined().is_empty() {
                 // A call that returns late makes it whole by itself.
