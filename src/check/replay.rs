@@ -6,7 +6,7 @@
 //! when something else happens is gone in another order, and a script that replays it fails there.
 
 use super::product::Product;
-use super::state::{Move, Next, State};
+use super::state::{Move, Next, State, Stop};
 use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
@@ -26,6 +26,8 @@ pub struct Replay {
     pub does: Does,
     /// At the end of a way: an answer that comes there at once, without being part of it.
     pub then: Option<EventName>,
+    /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
+    pub passes: bool,
 }
 
 /// What is to be done for a move.
@@ -59,13 +61,23 @@ impl Product<'_> {
         let begun = self.begun(way);
         let times = self.times(way, &begun);
         let mut all: Vec<Replay> = (way.iter().zip(&times))
-            .map(|((_, next), at)| Replay { at: *at, arms: Vec::new(), does: self.does(next), then: None })
+            .map(|((_, next), at)| Replay {
+                at: *at,
+                arms: Vec::new(),
+                does: self.does(next),
+                then: None,
+                passes: false,
+            })
             .collect();
         // What comes at the instant of something else is armed before that.
         let own_time = |k: usize| k == 0 || times[k] > times[k - 1];
         for (k, (before, next)) in way.iter().enumerate() {
             if too_late(before) || races(before, next) {
                 all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
+            }
+            let interrupted = |(_, stop): &(u32, Stop)| matches!(stop, Stop::Interrupted(_));
+            if before.safe.is_empty() && before.stopped.iter().any(interrupted) && next.by != Move::Answer {
+                all[k].does = Does::Cannot("what was interrupted goes back at once");
             }
             if let Move::Time(number, event) = next.by
                 && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
@@ -78,6 +90,9 @@ impl Product<'_> {
         }
         for k in (0..way.len()).filter(|k| own_time(*k) && !way[*k].0.inbox.is_empty()) {
             all[k].does = Does::Cannot("coordinators hear at different times of one event");
+        }
+        if let Some(end) = all.last_mut() {
+            end.passes = begun.iter().any(|batch| batch.idle && batch.over.is_none());
         }
         for batch in &begun {
             let last = times.last().copied().unwrap_or_default() + limits::REPLAY_STEP;

@@ -66,7 +66,10 @@ pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<Str
                 Some(name) => format!("{name}:{}", place.state),
                 None => place.state.clone(),
             };
-            _ = writeln!(out.text, "wait_state({}, 0)", quoted(&state));
+            _ = match last.replay.passes {
+                false => writeln!(out.text, "wait_state({}, 0)", quoted(&state)),
+                true => writeln!(out.text, "-- It has been in {state}, and goes on from there at once."),
+            };
         }
     }
     Ok(out.text)
