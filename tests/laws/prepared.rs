@@ -48,7 +48,7 @@ impl Twins {
         let read = |gene: &ConfigGene| {
             let mut conf = read(gene, &plain.system);
             // One in four stays as it is and is most often no fixed switch.
-            if gene.id % 4 != 0 {
+            if !gene.id.is_multiple_of(4) {
                 conf.changes
                     .retain(|c| matches!(c.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. }));
                 for list in [&mut conf.pre, &mut conf.post] {
