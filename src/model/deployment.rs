@@ -162,6 +162,9 @@ impl FaultKind {
     }
 }
 
+/// By this name an operator is told as the one who asked for something.
+pub const OPERATOR: &str = "operator";
+
 /// Something that an operator may do without being told that it is outside of what was checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum OperatorMay {
@@ -230,6 +233,14 @@ impl Default for DeploymentLimits {
 }
 
 impl Deployment {
+    /// The configurations that an operator may apply, beside those that are safe.
+    pub fn operator_applies(&self) -> impl Iterator<Item = ConfigId> + '_ {
+        self.operator.iter().filter_map(|(may, _)| match may {
+            OperatorMay::Apply(id) => Some(*id),
+            OperatorMay::Set(_) => None,
+        })
+    }
+
     /// The configuration of that name.
     pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
         self.configurations.iter().find(|c| c.id == id)

@@ -69,6 +69,7 @@ impl Session {
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
             rest: deployment.shutdown.rest.iter().map(|(id, _)| *id).collect(),
+            operator: deployment.operator_applies().collect(),
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
             coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
@@ -162,8 +163,8 @@ impl Session {
         }
     }
 
-    /// Makes a request in the name of an operator. `force`: also one that undoes a coordinator's frame, or moves while a safe
-    /// configuration is in force.
+    /// Makes a request in the name of an operator. `force`: also one that applies what is not listed, undoes a coordinator's
+    /// frame, or moves while a safe configuration is in force.
     pub fn request(&self, ask: Ask, by: &str, force: bool) -> RequestId {
         self.request_on(0, ask, by, force)
     }

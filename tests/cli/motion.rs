@@ -16,6 +16,7 @@ types:
       close: { effect: { undo: open } }
 configurations: [conf.lua]
 coordinator: coordinator.lua
+operator: [first, other, lift, open, tried, meant]
 deploy:   { event: e_start, up: up, within_s: 5 }
 shutdown: { event: e_stop, down: idle, within_s: 5 }
 ";

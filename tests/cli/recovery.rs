@@ -12,6 +12,7 @@ activities:
   slow: { period_ms: 10.0 }
 configurations: [configurations.lua]
 coordinator: coordinator.lua
+operator: [thick, swap]
 deploy:   { event: e_start,    up: up,   within_s: 5 }
 shutdown: { event: e_shutdown, down: idle, within_s: 5 }
 ";

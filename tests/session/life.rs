@@ -4,8 +4,12 @@ use davit::app::script::{self, Options};
 use davit::app::{self, Checked};
 use davit::lang::LoadOptions;
 use davit::libraries;
+use davit::session::rpc;
+use davit::session::service::SessionService;
+use davit::session::socket::Service;
 use davit::session::{Command, Happening, Phase, Session};
 use davit::time::Clock;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -220,10 +224,11 @@ fn an_operator_meddles_with_a_coordinator_only_by_force() {
         "deploy('@generic_arm.yaml') wait_answer('five_DOF.ok', 1) raise('e_aligned') wait_answer('eight_DOF.ok', 1)
          undo('eight_DOF') wait_answer('eight_DOF.undo.failed', 1) assert(property('follower.cart_share') == 0.5)
          undo('eight_DOF', {force = true}) wait_answer('eight_DOF.undone', 1) assert(property('follower.cart_share') ~= 0.5)
-         -- Nothing moves while a safe configuration is in force.
+         -- What is safe may be applied, what `operator:` does not list only by force.
          apply('safe_hold') wait_answer('safe_hold.ok', 1)
          apply('unfold') wait_answer('unfold.failed', 1)
          apply('unfold', {force = true}) wait_answer('unfold.ok', 20)
+         -- Nothing moves while a safe configuration is in force.
          undo() wait_answer('undo.failed', 1)
          undo('unfold', {force = true}) wait_answer('unfold.undone', 20)
          undo() wait_answer('undo.done', 1)
@@ -318,4 +323,32 @@ fn a_command_during_bring_up_rolls_back() {
     assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
     interrupter.join(clock.now() + Duration::from_secs(1)).unwrap();
     clock.shutdown();
+}
+
+#[test]
+fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
+    session.bring_up().unwrap();
+    let service = SessionService::new(Arc::downgrade(&session));
+    service.call(1, "apply", &json!({"configuration": "profile_soft"})).unwrap();
+    clock.sleep(Duration::from_secs(1));
+    let frames = session.status().stack.len();
+    for (method, params, near) in [
+        ("apply", json!({"configuration": "profile_soft", "wiat": true}), "did you mean `wait`?"),
+        ("undo", json!({"configuraton": "profile_soft"}), "did you mean `configuration`?"),
+        ("undo", json!(["profile_soft"]), ""),
+        ("shutdown", json!({"forced": true}), "did you mean `force`?"),
+        ("status", json!({"all": true}), "there are no parameters here"),
+    ] {
+        let error = service.call(1, method, &params).expect_err(method);
+        assert_eq!(error.code, rpc::INVALID_PARAMS, "{method}: {error}");
+        assert!(error.data["help"].as_str().unwrap_or_default().contains(near), "{method}: {error:?}");
+    }
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(session.status().stack.len(), frames);
+    service.call(1, "undo", &json!({"configuration": "profile_soft", "force": null})).unwrap();
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(session.status().stack.len(), frames - 1);
 }
