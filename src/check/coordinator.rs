@@ -84,7 +84,7 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
         .events()
         .iter()
         .copied()
-        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !looks_like_answer(deployment, e.as_str()))
+        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !deployment.looks_like_answer(e.as_str()))
         .collect()
 }
 
@@ -92,26 +92,6 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
 /// Whether the statechart makes events of that name itself.
 pub fn is_internal(event: &str) -> bool {
     event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
-}
-
-/// The configuration that an event seems to be an answer about (or `undo`), with how it ends.
-fn split_answer(event: &str) -> Option<(&str, &'static str)> {
-    let told = |ending: &&'static str| event.strip_suffix(*ending).map(|subject| (subject, *ending));
-    Verdict::ENDINGS.iter().find_map(told).filter(|(subject, ending)| {
-        // Only a bare undo is answered so: `grasp.done` is somebody else's word.
-        *ending != Verdict::Undone.ending(true) || *subject == Ask::Undo.subject()
-    })
-}
-
-/// Whether an event is spelt like an answer of the configurator.
-pub fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
-    match split_answer(event) {
-        Some((id, _)) => ConfigId::new(id).is_ok(),
-        None => event.rsplit_once('.').is_some_and(|(id, _)| {
-            let id = id.strip_suffix(".undo").unwrap_or(id);
-            ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some())
-        }),
-    }
 }
 
 /// All answers to what the chart asks for, and what it is told about that later.
@@ -191,7 +171,7 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 continue;
             }
             let at = chart.edge_origin(edge);
-            if !looks_like_answer(deployment, &text) {
+            if !deployment.looks_like_answer(&text) {
                 // In a short name two letters make another word; and nobody slips twice in the same way.
                 let slips = if text.chars().count() < 8 { 1 } else { 2 };
                 if !declared.contains(&event)
@@ -212,7 +192,7 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 }
                 continue;
             }
-            let (id, suffix) = split_answer(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));
+            let (id, suffix) = Verdict::split(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));
             let id = id.strip_suffix(".undo").unwrap_or(id);
             let bare = id == Ask::Undo.subject();
             let exists = bare || ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some());

@@ -1,7 +1,6 @@
 //! What the deployment declares about itself: what configurations stand for, what settles an operation, what an operator may
 //! do, what brings the system to rest. Do the things exist that these name.
 
-use super::coordinator::looks_like_answer;
 use super::monitors;
 use super::universe::Universe;
 use crate::model::codes::{
@@ -27,7 +26,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         findings.extend(wrong.map(|finding| finding.path(format!("operator[{i}]"))));
     }
     for (i, (event, at)) in deployment.safety.iter().enumerate() {
-        if looks_like_answer(deployment, event.as_str()) {
+        if deployment.looks_like_answer(event.as_str()) {
             let message = format!("`{event}` is an answer of the configurator, which nobody else raises");
             findings.push(
                 Finding::error(DEPLOY_SAFETY_ANSWER, message)

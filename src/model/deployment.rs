@@ -2,13 +2,14 @@
 
 use super::component_type::ComponentType;
 use super::configuration::Configuration;
+use super::event::{Ask, Verdict};
 use super::finding::Origin;
 use super::monitor::Monitor;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::program::Program;
 use super::statechart::Statechart;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -233,6 +234,24 @@ impl Default for DeploymentLimits {
 }
 
 impl Deployment {
+    /// Whether an event is spelt like an answer of the configurator: it ends like one, or it is about a configuration.
+    pub fn looks_like_answer(&self, event: &str) -> bool {
+        match Verdict::split(event) {
+            Some((subject, _)) => ConfigId::new(subject).is_ok(),
+            None => event.rsplit_once('.').is_some_and(|(subject, _)| {
+                let subject = subject.strip_suffix(".undo").unwrap_or(subject);
+                ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
+            }),
+        }
+    }
+
+    /// Every answer that anybody may get.
+    pub fn answers(&self) -> BTreeSet<EventName> {
+        let about = self.configurations.iter().flat_map(|c| [Ask::Apply(c.id), Ask::UndoOf(c.id)]);
+        let asks = about.chain([Ask::Undo, Ask::Commit { force: false }]);
+        asks.flat_map(|ask| ask.verdicts().iter().map(move |verdict| verdict.event(ask))).collect()
+    }
+
     /// The configurations that an operator may apply, beside those that are safe.
     pub fn operator_applies(&self) -> impl Iterator<Item = ConfigId> + '_ {
         self.operator.iter().filter_map(|(may, _)| match may {

@@ -172,6 +172,15 @@ impl Verdict {
         }
     }
 
+    /// What an event tells about that is spelt like an answer (a configuration, `undo`), with how it ends.
+    pub fn split(event: &str) -> Option<(&str, &'static str)> {
+        let told = |ending: &&'static str| event.strip_suffix(*ending).map(|subject| (subject, *ending));
+        Self::ENDINGS.iter().find_map(told).filter(|(subject, ending)| {
+            // Only a bare undo is answered so: `grasp.done` is somebody else's word.
+            *ending != Self::Undone.ending(true) || *subject == Ask::Undo.subject()
+        })
+    }
+
     /// The status event that tells the verdict on `ask`.
     ///
     /// # Panics
@@ -194,6 +203,7 @@ mod tests {
                 let event = verdict.event(ask).to_string();
                 let subject = Verdict::ENDINGS.iter().find_map(|ending| event.strip_suffix(ending));
                 assert_eq!(subject, Some(ask.subject()), "{event}");
+                assert_eq!(Verdict::split(&event).map(|(subject, _)| subject), subject, "{event}");
             }
         }
     }

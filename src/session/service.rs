@@ -141,6 +141,9 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
     if !listed {
         answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
     }
+    if let Some(why) = wait_for.as_ref().and_then(|name| session.never_heard(name)) {
+        return Err(refused(why, "wait for an answer that may come, or for an event".to_owned()));
+    }
     let since = session.hub().heard();
     session.raise(event, "operator");
     let Some(wait_for) = wait_for else { return Ok(answer) };

@@ -19,7 +19,7 @@ use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, S
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::{Clock, Time};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
@@ -148,6 +148,15 @@ impl Session {
     /// Whether a coordinator has functions, which see every event, also one that no transition lists.
     pub fn sees_all_events(&self) -> bool {
         self.parts.iter().any(|part| part.sees_all)
+    }
+
+    /// The states of its coordinators, by name.
+    pub fn states(&self) -> BTreeSet<String> {
+        let of = |part: &Part| -> Vec<String> {
+            let chart = &part.chart;
+            chart.nodes().filter(|node| chart.is_state(*node)).map(|node| chart.name(node).to_string()).collect()
+        };
+        self.parts.iter().flat_map(of).collect()
     }
 
     /// Gives an event to all coordinators, in the name of `from`.

@@ -27,7 +27,6 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   open = Configuration { operation_call("a.open") },
   home = Configuration { operation_call("a.home") },
   held = Configuration { on_failure = "hold", property_set("a.k", 7.0), property_set("b.g", 2.0) },
-  mean = Configuration { property_set("b.k", 6.0) },
   kick = Configuration { property_set("a.k", 5.0), property_set("a.g", 5.0) },
 }
 "#;
@@ -121,22 +120,4 @@ fn what_should_be_gone_is_looked_for() {
     let told =
         run("fault('destroy a', 'lie') raise('e_stop') wait_state('idle', 1) wait(12) assert(drifts('create a'))").out;
     assert!(told.contains("lost") || told.contains("differs") || told.contains("seen"), "{told}");
-}
-
-/// An operator applies what the deployment lists and what is safe, and the rest by force, however often it was applied before:
-/// a plan that is kept is no way around.
-#[test]
-fn an_operator_applies_what_is_listed() {
-    let ran = run("apply('kick') wait_answer('kick.ok', 1) undo() wait_answer('undo.done', 1)
-        for _ = 1, 3 do
-          apply('mean') wait_answer('mean.failed', 1) assert(property('b.k') == 1.0)
-          apply('mean', {force = true}) wait_answer('mean.ok', 1) assert(property('b.k') == 6.0)
-          undo() wait_answer('undo.done', 1) assert(property('b.k') == 1.0)
-        end
-        apply('calm') wait_answer('calm.ok', 1)
-        apply('home') wait_answer('home.failed', 1) apply('home', {force = true}) wait_answer('home.ok', 1)");
-    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
-    let told = ran.out + &ran.err;
-    assert!(told.contains("`operator:` does not list `mean`") && told.contains("{force = true}"), "{told}");
-    assert!(told.contains("moves, and a safe configuration is in force"), "{told}");
 }
