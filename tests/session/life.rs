@@ -158,11 +158,18 @@ fn a_script_that_fails_leaves_nothing_behind() {
     for (script, message) in [
         ("deploy('@generic_arm.yaml') assert(false, 'no luck')", "no luck"),
         ("deploy('@generic_arm.yaml') wait_state('idle', 0.5)", "not in `idle` after 0.5 s"),
-        ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`"),
+        ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`: did you mean `idle`?"),
         ("deploy('@generic_arm.yaml') raise('e_5dofs')", "did you mean `e_5dof`?"),
         ("deploy('@generic_arm.yaml') apply('eight_DOFF')", "did you mean `eight_DOF`?"),
         ("deploy('@generic_arm.yaml') asert_running('x')", "did you mean `assert_running`?"),
-        ("deploy('@generic_arm.yaml') wait_answer('never.ok', 1)", "`never.ok` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') wait_answer('e_never', 1)", "`e_never` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "is never heard"),
+        ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "did you mean `eight_DOF.ok`?"),
+        ("deploy('@generic_arm.yaml') wait_answer('eigth_DOF.ok', 1)", "did you mean `eight_DOF.ok`?"),
+        ("deploy('@generic_arm.yaml') wait_answer('undo.dome', 1)", "did you mean `undo.done`?"),
+        ("deploy('@generic_arm.yaml') port('follower.folow')", "did you mean `follow`?"),
+        ("deploy('@generic_arm.yaml') port('folower.follow')", "did you mean `follower`?"),
+        ("deploy('@generic_arm.yaml') undo('eight_DOF', {force = 1})", "`force` is true or false"),
         ("deploy('@generic_arm.yaml') local t = {} while true do t[1] = 1 end", "endless loop"),
         ("deploy('@generic_arm.yaml') while true do pcall(function() while true do end end) end", "endless loop"),
         (
@@ -291,7 +298,7 @@ fn an_operator_pushes_and_undoes() {
         }
         session.hub().answer(request).unwrap()
     };
-    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", false)).answer, "profile_soft.ok");
+    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", true)).answer, "profile_soft.ok");
     assert_ne!(session.system(), before);
     assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator", false)).answer, "undo.done");
     assert_eq!(session.system(), before);
@@ -332,7 +339,7 @@ fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
     let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
     session.bring_up().unwrap();
     let service = SessionService::new(Arc::downgrade(&session));
-    service.call(1, "apply", &json!({"configuration": "profile_soft"})).unwrap();
+    service.call(1, "apply", &json!({"configuration": "profile_soft", "force": true})).unwrap();
     clock.sleep(Duration::from_secs(1));
     let frames = session.status().stack.len();
     for (method, params, near) in [
