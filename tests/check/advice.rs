@@ -4,6 +4,7 @@ use crate::support::{Said, Small};
 
 const CONFIGURATIONS: &str = "base = Configuration { create(\"a\", \"Drive\") }, soft = Configuration { property_set(\"a.gain\", 0.5) },
     other = Configuration { property_set(\"a.gain\", 0.7) }, gone = Configuration { destroy(\"a\") },
+    halt = Configuration { post_conf_state = { \"a:stopped\" } },
     run = Configuration { post_conf_state = { \"a:running\" } }, service = Configuration { post_conf_state = { \"a:running\" } },";
 
 const STATES: &str = "idle = state {}, building = state { entry = \"base\" }, up = state {}, leaving = state { entry = \"base.undo\" }, stuck = state {},
@@ -66,10 +67,12 @@ fn an_operator_in_the_way_is_told_to_undo_first_and_not_to_have_components_of_it
 
 #[test]
 fn an_operator_is_not_blamed_for_the_frames_of_a_coordinator() {
-    let more = "more = state { entry = \"soft\" }, trans { src = \"up\", tgt = \"more\", events = { \"e_go\" } },
-        trans { src = \"more\", tgt = \"leaving\", events = { \"soft.ok\", \"soft.failed\", \"soft.broken\", \"e_shutdown\" } },";
+    let more = "more = state { entry = \"halt\" }, trans { src = \"up\", tgt = \"more\", events = { \"e_go\" } },
+        trans { src = \"more\", tgt = \"leaving\", events = { \"halt.failed\", \"halt.broken\", \"e_shutdown\" } },
+        last = state { config = \"soft\" }, trans { src = \"more\", tgt = \"last\", events = { \"halt.ok\" } },
+        trans { src = \"last\", tgt = \"leaving\", events = { \"soft.failed\", \"soft.broken\", \"e_shutdown\" } },";
     let states = STATES.replace("base.undone", "gone.ok").replace("base.undo", "gone");
-    let said = Small::new(CONFIGURATIONS, &format!("{states}{more}"), "operator: [other]\nlimits: { stack: 1 }\n").check();
+    let said = Small::new(CONFIGURATIONS, &format!("{states}{more}"), "operator: [run]\nlimits: { stack: 2 }\n").check();
     let full = |f: &&&serde_json::Value| f["message"].as_str().unwrap().contains("none can be squashed");
     let (own, others) = (said.of("coord::request_refused"), said.of("coord::refused_by_other"));
     assert!(own.iter().any(|f| full(&f)) && !others.iter().any(|f| full(&f)), "{:#}", said.0);

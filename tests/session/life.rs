@@ -336,16 +336,16 @@ fn a_command_during_bring_up_rolls_back() {
 fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
     let clock = Clock::simulated();
     let _me = clock.enter();
-    let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
+    let session = app::start(&checked("deployments/hello.yaml"), &clock).unwrap();
     session.bring_up().unwrap();
     let service = SessionService::new(Arc::downgrade(&session));
-    service.call(1, "apply", &json!({"configuration": "profile_soft", "force": true})).unwrap();
+    service.call(1, "apply", &json!({"configuration": "run", "force": true})).unwrap();
     clock.sleep(Duration::from_secs(1));
     let frames = session.status().stack.len();
     for (method, params, near) in [
-        ("apply", json!({"configuration": "profile_soft", "wiat": true}), "did you mean `wait`?"),
-        ("undo", json!({"configuraton": "profile_soft"}), "did you mean `configuration`?"),
-        ("undo", json!(["profile_soft"]), ""),
+        ("apply", json!({"configuration": "run", "wiat": true}), "did you mean `wait`?"),
+        ("undo", json!({"configuraton": "run"}), "did you mean `configuration`?"),
+        ("undo", json!(["run"]), ""),
         ("shutdown", json!({"forced": true}), "did you mean `force`?"),
         ("status", json!({"all": true}), "there are no parameters here"),
     ] {
@@ -355,7 +355,7 @@ fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
     }
     clock.sleep(Duration::from_secs(1));
     assert_eq!(session.status().stack.len(), frames);
-    service.call(1, "undo", &json!({"configuration": "profile_soft", "force": null})).unwrap();
+    service.call(1, "undo", &json!({"configuration": "run", "force": null})).unwrap();
     clock.sleep(Duration::from_secs(1));
     assert_eq!(session.status().stack.len(), frames - 1);
 }
