@@ -234,13 +234,13 @@ impl Default for DeploymentLimits {
 }
 
 impl Deployment {
-    /// Whether an event is spelt like an answer of the configurator: it ends like one, or it is about a configuration.
+    /// Whether an event is spelt like an answer of the configurator: it ends like one, or is about a configuration or `undo`.
     pub fn looks_like_answer(&self, event: &str) -> bool {
         match Verdict::split(event) {
             Some((subject, _)) => ConfigId::new(subject).is_ok(),
             None => event.rsplit_once('.').is_some_and(|(subject, _)| {
                 let subject = subject.strip_suffix(".undo").unwrap_or(subject);
-                ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
+                subject == Ask::Undo.subject() || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
             }),
         }
     }
