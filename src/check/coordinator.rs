@@ -161,7 +161,8 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
     known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
     known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
-    let declared: BTreeSet<EventName> = deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
+    let declared: BTreeSet<EventName> =
+        deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
         for trigger in chart.triggers(edge).unwrap_or(&[]) {
@@ -225,7 +226,11 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                     Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` is no answer of a configurator"))
                         .at(at)
                         .labelled("waits for it")
-                        .help(did_you_mean(suffix, "answers", Verdict::ENDINGS.iter().map(|s| s.trim_start_matches('.')))),
+                        .help(did_you_mean(
+                            suffix,
+                            "answers",
+                            Verdict::ENDINGS.iter().map(|s| s.trim_start_matches('.')),
+                        )),
                 );
             }
         }

@@ -4,7 +4,8 @@
 use super::monitors;
 use super::universe::Universe;
 use crate::model::codes::{
-    CONF_HOLDS_UNSEEN, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
+    CONF_HOLDS_UNSEEN, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE,
+    UNKNOWN_PROPERTY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, SELF, SignalKind};

@@ -244,16 +244,22 @@ impl Graph<'_, '_> {
             let trace = self.trace(at);
             let undo = Ask::UndoOf(id);
             let not_undone = [undo.failed().event(undo), undo.broken().event(undo)];
-            let failed = trace.iter().flat_map(TraceStep::answers).any(|told| not_undone.iter().any(|e| e.as_str() == told));
+            let failed =
+                trace.iter().flat_map(TraceStep::answers).any(|told| not_undone.iter().any(|e| e.as_str() == told));
             let (how, help) = match (failed, self.is_scoped(id)) {
                 (true, _) => (
                     "after its undo has failed",
-                    format!("on `{}` lead to a state that asks for its undo once more, not back to where it is applied", not_undone[0]),
+                    format!(
+                        "on `{}` lead to a state that asks for its undo once more, not back to where it is applied",
+                        not_undone[0]
+                    ),
                 ),
                 (false, true) => ("without undoing it", "undo it on the way round, or give it a group".to_owned()),
                 (false, false) => (
                     "without undoing it",
-                    format!("undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"),
+                    format!(
+                        "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
+                    ),
                 ),
             };
             let message = format!("going round applies `{id}` again and again {how}");

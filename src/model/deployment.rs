@@ -240,7 +240,8 @@ impl Deployment {
             Some((subject, _)) => ConfigId::new(subject).is_ok(),
             None => event.rsplit_once('.').is_some_and(|(subject, _)| {
                 let subject = subject.strip_suffix(".undo").unwrap_or(subject);
-                subject == Ask::Undo.subject() || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
+                subject == Ask::Undo.subject()
+                    || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
             }),
         }
     }

@@ -72,7 +72,8 @@ fn an_operator_is_not_blamed_for_the_frames_of_a_coordinator() {
         last = state { config = \"soft\" }, trans { src = \"more\", tgt = \"last\", events = { \"halt.ok\" } },
         trans { src = \"last\", tgt = \"leaving\", events = { \"soft.failed\", \"soft.broken\", \"e_shutdown\" } },";
     let states = STATES.replace("base.undone", "gone.ok").replace("base.undo", "gone");
-    let said = Small::new(CONFIGURATIONS, &format!("{states}{more}"), "operator: [run]\nlimits: { stack: 2 }\n").check();
+    let said =
+        Small::new(CONFIGURATIONS, &format!("{states}{more}"), "operator: [run]\nlimits: { stack: 2 }\n").check();
     let full = |f: &&&serde_json::Value| f["message"].as_str().unwrap().contains("none can be squashed");
     let (own, others) = (said.of("coord::request_refused"), said.of("coord::refused_by_other"));
     assert!(own.iter().any(|f| full(&f)) && !others.iter().any(|f| full(&f)), "{:#}", said.0);
@@ -87,7 +88,9 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
         let more: String = events
             .iter()
             .zip(states)
-            .map(|(event, state)| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"{event}\" }} }},"))
+            .map(|(event, state)| {
+                format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"{event}\" }} }},")
+            })
             .collect();
         check(&more, keys).of("coord::near_event").len()
     };

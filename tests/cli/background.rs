@@ -28,7 +28,11 @@ fn deployed_switched_undone_and_shut_down() {
 
     let never = run(&["event", "e_fast", "--wait", "fast.okk"]);
     assert!(never.code == 1 && never.err.contains("did you mean `fast.ok`?"), "{}{}", never.out, never.err);
-    assert_eq!(run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"], 1.0, "not raised");
+    assert_eq!(
+        run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"],
+        1.0,
+        "not raised"
+    );
     let event = run(&["event", "e_fast", "--wait", "fast.ok"]);
     assert_eq!(event.code, 0, "{}{}", event.out, event.err);
     assert_eq!(run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"], 9.0);

@@ -81,7 +81,9 @@ fn a_confirmation_that_runs_out_moves_nothing_unasked() {
         undo('tried') wait_answer('tried.undone', 1)");
     assert!(steps(&log, "tried.undo.failed").is_empty(), "{log}");
     assert!(log.contains("nobody asked for that"), "{log}");
-    let log = run("apply('meant', {force = true}) wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)");
+    let log = run(
+        "apply('meant', {force = true}) wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)",
+    );
     assert_eq!(steps(&log, "meant.reverted"), ["operation_call a.dn"]);
 }
 
@@ -101,8 +103,10 @@ fn recover_leaves_alone_what_is_whole() {
 /// Requests of one connection begin one after the other, also where they have nothing to do with each other; a script is one.
 #[test]
 fn what_one_asks_for_begins_one_after_the_other() {
-    let log = run("fault('property_set a.k = 1', 'slow', 1, 0.5) apply('first', {force = true}) apply('other', {force = true})
-        wait_answer('other.ok', 5) assert(property('a.k') == 1)");
+    let log = run(
+        "fault('property_set a.k = 1', 'slow', 1, 0.5) apply('first', {force = true}) apply('other', {force = true})
+        wait_answer('other.ok', 5) assert(property('a.k') == 1)",
+    );
     let at = |answer: &str| log.find(answer).unwrap_or_else(|| panic!("no `{answer}`: {log}"));
     assert!(at("first.ok") < at("other.ok"), "{log}");
 }

@@ -18,7 +18,9 @@ pub(super) fn flag(options: Option<Table>, name: &'static str) -> mlua::Result<b
         // To Lua everything is true but `false` and nil; `force = 0` would be, too.
         match value {
             mlua::Value::Boolean(value) => set = value,
-            other => return Err(error(format!("`{name}` is true or false, and this is of the type {}", other.type_name()))),
+            other => {
+                return Err(error(format!("`{name}` is true or false, and this is of the type {}", other.type_name())));
+            }
         }
     }
     Ok(set)
