@@ -136,7 +136,7 @@ fn main() {
     // Two of them, measured in turn, so that whatever else the machine does comes to both.
     let idle = Watched::new(&checked, &clock);
     let stuck = Watched::new(&checked, &clock);
-    stuck.session.request(Ask::Apply(ConfigId::new("hang").expect("a name")), "bench", false);
+    stuck.session.request(Ask::Apply(ConfigId::new("hang").expect("a name")), "bench", true);
     clock.sleep(Duration::from_millis(100)); // the operation is out
     let (mut quick, mut held) = (Vec::new(), Vec::new());
     for round in 0..ROUNDS {

@@ -125,6 +125,7 @@ impl Switched {
         let handle = Configurator::start(Setup {
             configurations: configurations(others),
             rest: Vec::new(),
+            operator: vec![ConfigId::new("make").expect("a name"), ConfigId::new("switch").expect("a name")],
             catalogue: libraries().catalogue(),
             activities: BTreeSet::from([loop_]),
             coordinators: BTreeSet::new(),

@@ -107,6 +107,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let platform = Arc::new(Talkative(Simulated::new(catalogue.clone(), clock.clone(), Options::default())));
     let (answered, answers) = clock.channel(16);
     let configurator = Configurator::start(Setup {
+        operator: loaded.configurations.iter().map(|configuration| configuration.id).collect(),
         configurations: loaded.configurations,
         rest: Vec::new(),
         catalogue,

@@ -19,7 +19,7 @@ assert(property("Dynamics.force_gain")[1] == 0)
 raise("e_8dof")
 wait_answer("eight_DOF.ok", 1)
 
-apply("profile_soft")
+apply("profile_soft", { force = true })    -- no `operator:` lists it
 wait_answer("profile_soft.ok", 1)
 assert(property("Cart_Impedance.stiffness") == 70)
 undo()

@@ -82,6 +82,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
     let handle = Configurator::start(Setup {
         configurations: configurations(),
         rest: Vec::new(),
+        operator: Vec::new(),
         catalogue: libraries.catalogue(),
         activities: BTreeSet::from([name]),
         coordinators: BTreeSet::new(),

@@ -4,6 +4,7 @@
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
 mod faults;
+mod looks;
 mod options;
 mod sandbox;
 mod values;
@@ -13,7 +14,7 @@ use crate::functions::message_within;
 use crate::lang::LoadOptions;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ComponentName, ConfigId, EventName, Ident, MemberRef};
+use crate::model::{Ask, ConfigId, EventName, Ident};
 use crate::runtime::Libraries;
 use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Observer, Session, recovery};
 use crate::time::{Clock, Time};
@@ -209,11 +210,11 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     });
     function!("wait_state", (String, f64), |h, _lua, (state, seconds)| wait_state(h, &state, seconds));
     function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| wait_answer(h, &event, seconds));
-    function!("assert_running", String, |h, _lua, name| assert_state(h, &name, "running"));
-    function!("assert_state", (String, String), |h, _lua, (name, state)| assert_state(h, &name, &state));
-    function!("state", String, |h, _lua, name| Ok(component_state(h, &name)?.map(|s| s.to_string())));
-    function!("property", String, |h, lua, name| property(h, lua, &name));
-    function!("port", String, |h, lua, name| port(h, lua, &name));
+    function!("assert_running", String, |h, _lua, name| looks::assert_state(h, &name, "running"));
+    function!("assert_state", (String, String), |h, _lua, (name, state)| looks::assert_state(h, &name, &state));
+    function!("state", String, |h, _lua, name| Ok(looks::component_state(h, &name)?.map(|s| s.to_string())));
+    function!("property", String, |h, lua, name| looks::property(h, lua, &name));
+    function!("port", String, |h, lua, name| looks::port(h, lua, &name));
     function!("system", (), |h, lua, ()| values::to_lua(
         lua,
         &serde_json::to_value(session(h)?.system()).expect("plain data")
@@ -411,8 +412,12 @@ fn wait_until<T>(
 }
 
 fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
-    if !session(host)?.knows_state(state) {
-        return Err(error(format!("the coordinator has no state `{state}`")));
+    let deployed = session(host)?;
+    if !deployed.knows_state(state) {
+        let states = deployed.states();
+        let own = state.rsplit(['.', ':']).next().unwrap_or(state);
+        let help = did_you_mean(own, "states", states.iter().map(String::as_str));
+        return Err(error(format!("the coordinator has no state `{state}`: {help}")));
     }
     wait_until(
         host,
@@ -423,6 +428,9 @@ fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
 }
 
 fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
+    if let Some(why) = session(host)?.never_heard(event) {
+        return Err(error(why));
+    }
     let (mark, taken) = (host.borrow().mark, host.borrow().taken.clone());
     let number = wait_until(
         host,
@@ -437,56 +445,4 @@ fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
     )?;
     host.borrow_mut().taken.push(number);
     Ok(())
-}
-
-fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<crate::model::RunState>> {
-    let system = session(host)?.system();
-    let state = ComponentName::new(name).ok().and_then(|n| system.components.get(&n)).map(|c| c.state);
-    Ok(state)
-}
-
-fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Result<()> {
-    match component_state(host, name)? {
-        Some(state) if state.as_str() == wanted => Ok(()),
-        Some(state) => Err(error(format!("`{name}` is {state}, not {wanted}"))),
-        None => {
-            let system = session(host)?.system();
-            let help = did_you_mean(name, "components", system.components.keys().map(ComponentName::as_str));
-            Err(error(format!("there is no component `{name}`: {help}")))
-        }
-    }
-}
-
-fn member(text: &str) -> mlua::Result<MemberRef> {
-    MemberRef::new(text).map_err(|e| error(e.to_string()))
-}
-
-fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
-    let name = member(text)?;
-    let system = session(host)?.system();
-    let Some(component) = system.components.get(&name.component) else {
-        let help =
-            did_you_mean(name.component.as_str(), "components", system.components.keys().map(ComponentName::as_str));
-        return Err(error(format!("there is no component `{}`: {help}", name.component)));
-    };
-    match component.properties.get(&name.member) {
-        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
-        None => {
-            let known = component.properties.keys().map(crate::model::Ident::as_str);
-            Err(error(format!(
-                "`{}` has no property `{}`: {}",
-                name.component,
-                name.member,
-                did_you_mean(name.member.as_str(), "properties", known)
-            )))
-        }
-    }
-}
-
-/// The value written on an in-port by a configuration; nil when never written.
-fn port(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
-    match session(host)?.system().ports.get(&member(text)?) {
-        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
-        None => Ok(LuaValue::Nil),
-    }
 }

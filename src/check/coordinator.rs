@@ -6,7 +6,7 @@ use crate::model::codes::{
 };
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Raise, Verdict};
-use crate::statechart::{Chart, EdgeId, NodeId, When};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
 use std::collections::BTreeSet;
 
 /// What a raised name asks for; none when it is no request.
@@ -19,10 +19,7 @@ pub fn ask_of(deployment: &Deployment, name: EventName) -> Option<Ask> {
 
 /// The answers to `ask` that need somebody to hear them.
 pub fn bad_answers(ask: Ask) -> [EventName; 2] {
-    match ask {
-        Ask::Apply(_) => [Verdict::Failed.event(ask), Verdict::Broken.event(ask)],
-        _ => [Verdict::UndoFailed.event(ask), Verdict::UndoBroken.event(ask)],
-    }
+    [ask.failed().event(ask), ask.broken().event(ask)]
 }
 
 /// What is wrong between the coordinator and the deployment.
@@ -87,7 +84,7 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
         .events()
         .iter()
         .copied()
-        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !looks_like_answer(deployment, e.as_str()))
+        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !deployment.looks_like_answer(e.as_str()))
         .collect()
 }
 
@@ -95,25 +92,6 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
 /// Whether the statechart makes events of that name itself.
 pub fn is_internal(event: &str) -> bool {
     event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
-}
-
-const SUFFIXES: [&str; 9] =
-    [".undo.failed", ".undo.broken", ".ok", ".failed", ".broken", ".cancelled", ".undone", ".reverted", ".lost"];
-
-/// The configuration that an event seems to be an answer about, with the suffix.
-fn split_answer(event: &str) -> Option<(&str, &'static str)> {
-    SUFFIXES.iter().find_map(|suffix| event.strip_suffix(suffix).map(|id| (id, *suffix)))
-}
-
-/// Whether an event is spelt like an answer of the configurator.
-pub fn looks_like_answer(deployment: &Deployment, event: &str) -> bool {
-    match split_answer(event) {
-        Some((id, _)) => ConfigId::new(id).is_ok(),
-        None => event.rsplit_once('.').is_some_and(|(id, _)| {
-            let id = id.strip_suffix(".undo").unwrap_or(id);
-            ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some())
-        }),
-    }
 }
 
 /// All answers to what the chart asks for, and what it is told about that later.
@@ -183,6 +161,8 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
     known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
     known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
+    let declared: BTreeSet<EventName> =
+        deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
         for trigger in chart.triggers(edge).unwrap_or(&[]) {
@@ -192,9 +172,13 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 continue;
             }
             let at = chart.edge_origin(edge);
-            if !looks_like_answer(deployment, &text) {
-                if let Some(near) = nearest(&text, known.iter().copied())
-                    && strsim::damerau_levenshtein(&text, near) <= 2
+            if !deployment.looks_like_answer(&text) {
+                // In a short name two letters make another word; and nobody slips twice in the same way.
+                let slips = if text.chars().count() < 8 { 1 } else { 2 };
+                if !declared.contains(&event)
+                    && listed(chart, *trigger) < 2
+                    && let Some(near) = nearest(&text, known.iter().copied())
+                    && strsim::damerau_levenshtein(&text, near) <= slips
                 {
                     findings.push(
                         Finding::warning(
@@ -209,9 +193,10 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 }
                 continue;
             }
-            let (id, suffix) = split_answer(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));
+            let (id, suffix) = Verdict::split(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));
             let id = id.strip_suffix(".undo").unwrap_or(id);
-            let exists = ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some());
+            let bare = id == Ask::Undo.subject();
+            let exists = bare || ConfigId::new(id).is_ok_and(|id| deployment.configuration(id).is_some());
             if !exists {
                 findings.push(
                     Finding::error(
@@ -223,9 +208,9 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                     .also(deployment.key_origin("configurations"), "the configurations of the deployment")
                     .help(did_you_mean(id, "configurations", ids.iter().copied())),
                 );
-            } else if SUFFIXES.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
+            } else if Verdict::ENDINGS.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
                 let undo = text.contains(".undo") || text.ends_with(".undone");
-                let what = if undo { format!("{id}.undo") } else { id.to_owned() };
+                let what = if undo && !bare { format!("{id}.undo") } else { id.to_owned() };
                 findings.push(
                     Finding::warning(
                         COORD_ANSWER_NEVER_COMES,
@@ -241,11 +226,20 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                     Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` is no answer of a configurator"))
                         .at(at)
                         .labelled("waits for it")
-                        .help(did_you_mean(suffix, "answers", SUFFIXES.iter().map(|s| s.trim_start_matches('.')))),
+                        .help(did_you_mean(
+                            suffix,
+                            "answers",
+                            Verdict::ENDINGS.iter().map(|s| s.trim_start_matches('.')),
+                        )),
                 );
             }
         }
     }
+}
+
+/// How many transitions list an event.
+fn listed(chart: &Chart, event: EventId) -> usize {
+    edges(chart).filter(|edge| chart.triggers(*edge).is_some_and(|triggers| triggers.contains(&event))).count()
 }
 
 /// Every transition of the chart.

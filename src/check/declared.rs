@@ -4,7 +4,8 @@
 use super::monitors;
 use super::universe::Universe;
 use crate::model::codes::{
-    CONF_HOLDS_UNSEEN, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
+    CONF_HOLDS_UNSEEN, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE,
+    UNKNOWN_PROPERTY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, SELF, SignalKind};
@@ -24,6 +25,18 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
             OperatorMay::Set(member) => settable(universe, *member, *at),
         };
         findings.extend(wrong.map(|finding| finding.path(format!("operator[{i}]"))));
+    }
+    for (i, (event, at)) in deployment.safety.iter().enumerate() {
+        if deployment.looks_like_answer(event.as_str()) {
+            let message = format!("`{event}` is an answer of the configurator, which nobody else raises");
+            findings.push(
+                Finding::error(DEPLOY_SAFETY_ANSWER, message)
+                    .at(*at)
+                    .labelled("no event from outside")
+                    .path(format!("safety[{i}]"))
+                    .help("list an event that a component, a monitor or an operator raises: `safety: [e_estop]`"),
+            );
+        }
     }
     for (i, (id, at)) in deployment.shutdown.rest.iter().enumerate() {
         let wrong = configuration(deployment, *id, *at);

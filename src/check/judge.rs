@@ -8,6 +8,7 @@ use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
     COORD_ENDLESS, COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK,
+    STACK_FULL,
 };
 use crate::model::{
     Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,
@@ -87,18 +88,22 @@ impl Graph<'_, '_> {
             return Finding::new(class, COORD_REQUEST_REFUSED, format!("`{ask}` is refused: {why}"));
         };
         let member = &self.product.members[number];
-        let others = self.blamed(state, request);
+        let blamed = self.blamed(state, request);
+        // So many frames of its own are there through nobody else's doing.
+        let own = reasons.first().is_some_and(|first| first.code == STACK_FULL);
+        let by_operator = blamed.contains(&Requester::Operator);
+        let others: Vec<Requester> = blamed.into_iter().filter(|by| !own || *by != Requester::Operator).collect();
         let maker = self.maker(number, state, ask);
         let mut finding = if others.is_empty() {
             let message = format!("`{ask}` is refused when it is asked for: {why}");
-            let shared = maker.is_some() || self.shares(number, ask) || !member.chart.is_pure();
+            let shared = by_operator || maker.is_some() || self.shares(number, ask) || !member.chart.is_pure();
             let severity = if shared { class.min(Severity::Warning) } else { class };
             Finding::new(severity, COORD_REQUEST_REFUSED, message)
         } else {
             let message = format!(
                 "`{ask}` of `{}` is refused because of the frames of {}: {why}",
                 member.name,
-                others.join(" and ")
+                others.iter().map(|by| self.called(*by)).collect::<Vec<_>>().join(" and ")
             );
             Finding::new(class.min(Severity::Warning), COORD_REFUSED_BY_OTHER, message)
         };
@@ -115,6 +120,9 @@ impl Graph<'_, '_> {
                  `{other}` can tell by an event"
             ),
             (None, true) => help.unwrap_or_else(|| "ask for it where it fits the system".to_owned()),
+            (None, false) if others == [Requester::Operator] => {
+                "let the operator undo that first (`davit undo`), or leave it out of `operator:`".to_owned()
+            }
             (None, false) => {
                 "give each coordinator components of its own, or let one ask the other by an event".to_owned()
             }
@@ -145,7 +153,7 @@ impl Graph<'_, '_> {
 
     /// Those whose frames are in the way of a request: they share a component (or a group) with it, and without their frames
     /// it would not be refused.
-    fn blamed(&self, state: &State, request: &Request) -> Vec<String> {
+    fn blamed(&self, state: &State, request: &Request) -> Vec<Requester> {
         let Some(world) = self.product.worlds.get(state.world) else { return Vec::new() };
         let strange = |requester: &Requester| *requester != request.requester;
         if !world.stack.frames().iter().any(|frame| strange(&frame.requester))
@@ -168,11 +176,14 @@ impl Graph<'_, '_> {
                 others.push(frame.requester);
             }
         }
-        let name = |by: &Requester| match self.product.member(*by) {
+        others
+    }
+
+    fn called(&self, by: Requester) -> String {
+        match self.product.member(by) {
             Some(number) => format!("`{}`", self.product.members[number].name),
             None => "an operator".to_owned(),
-        };
-        others.iter().map(name).collect()
+        }
     }
 
     fn asked_by(&self, number: usize) -> BTreeSet<ConfigId> {
@@ -230,13 +241,37 @@ impl Graph<'_, '_> {
                 continue;
             }
             let origin = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
-            let message = format!("going round applies `{id}` again and again without undoing it");
-            let finding = Finding::warning(COORD_STACK_GROWS, message).at(origin).help(format!(
-                "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
-            ));
             let trace = self.trace(at);
+            let undo = Ask::UndoOf(id);
+            let not_undone = [undo.failed().event(undo), undo.broken().event(undo)];
+            let failed =
+                trace.iter().flat_map(TraceStep::answers).any(|told| not_undone.iter().any(|e| e.as_str() == told));
+            let (how, help) = match (failed, self.is_scoped(id)) {
+                (true, _) => (
+                    "after its undo has failed",
+                    format!(
+                        "on `{}` lead to a state that asks for its undo once more, not back to where it is applied",
+                        not_undone[0]
+                    ),
+                ),
+                (false, true) => ("without undoing it", "undo it on the way round, or give it a group".to_owned()),
+                (false, false) => (
+                    "without undoing it",
+                    format!(
+                        "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
+                    ),
+                ),
+            };
+            let message = format!("going round applies `{id}` again and again {how}");
+            let finding = Finding::warning(COORD_STACK_GROWS, message).at(origin).help(help);
             found.push((finding, trace));
         }
+    }
+
+    /// Whether some state of a coordinator has it as its `config`.
+    fn is_scoped(&self, id: ConfigId) -> bool {
+        let of = |site: &RaiseSite| site.scoped && site.name.as_str() == id.as_str();
+        self.product.members.iter().any(|member| member.chart.raises().iter().any(of))
     }
 
     /// What is lost and nobody hears.

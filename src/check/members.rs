@@ -3,7 +3,7 @@
 use super::coordinator::ask_of;
 use super::reactions::{Reaction, Reactions};
 use super::shape::Undone;
-use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, OperatorMay, Verdict};
+use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, Verdict};
 use crate::stack::Requester;
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashSet;
@@ -84,10 +84,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
         counts.filter(|c| c.group.is_some() || c.confirm.is_some() || c.holds.is_some() || c.safe).map(|c| c.id),
     );
     ids.extend(deployment.configurations.iter().map(|c| c.id).filter(|id| hears_loss(charts, numbers, *id)));
-    ids.extend(deployment.operator.iter().filter_map(|(may, _)| match may {
-        OperatorMay::Apply(id) => Some(*id),
-        OperatorMay::Set(_) => None,
-    }));
+    ids.extend(deployment.operator_applies());
     let mut undone = Undone { bare: FxHashSet::default(), ..Undone::default() };
     let mut members = Vec::new();
     for number in numbers {

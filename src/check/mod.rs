@@ -161,6 +161,12 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
             replayed = Some(Checked(shared.clone()));
             explored = follow(deployment, &views, &charts, catalogue, &mut traced, &mut left);
+            // Where there is an actuator, more is said of it.
+            let said = |finding: &crate::model::Finding| {
+                traced.iter().any(|(f, _)| (f.code, f.origin) == (finding.code, finding.origin))
+            };
+            let unheard: Findings = safety::unheard(deployment, &charts).into_iter().filter(|f| !said(f)).collect();
+            traced.extend(unheard.into_iter().map(|finding| (finding, Vec::new())));
         }
     }
     traced.sort_by_key(|(finding, _)| Reverse(finding.severity));

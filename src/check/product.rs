@@ -16,7 +16,7 @@ use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
 use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
 use crate::limits;
-use crate::model::{Catalogue, ConfigId, Deployment, EventName, OperatorMay, RequestId, Verdict};
+use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use smallvec::SmallVec;
@@ -69,10 +69,7 @@ impl<'a> Product<'a> {
         }
         let mut operator: Vec<ConfigId> = Vec::new();
         operator.extend(deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id));
-        operator.extend(deployment.operator.iter().filter_map(|(may, _)| match may {
-            OperatorMay::Apply(id) if deployment.configuration(*id).is_some() => Some(*id),
-            _ => None,
-        }));
+        operator.extend(deployment.operator_applies().filter(|id| deployment.configuration(*id).is_some()));
         operator.sort_unstable();
         operator.dedup();
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));

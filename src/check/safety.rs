@@ -1,14 +1,36 @@
 //! Safety events: wherever an actuator exists, each must lead to a safe configuration without another event from outside.
 
+use super::coordinator::outside_events;
 use super::explore::Graph;
 use super::judge::Traced;
 use super::product::Product;
 use super::state::{Move, State};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
-use crate::model::{Ask, EventName, Finding, Severity};
-use crate::statechart::{EventId, NodeId};
+use crate::model::finding::did_you_mean;
+use crate::model::{Ask, Deployment, EventName, Finding, Findings, Origin, Severity};
+use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
+
+/// Events that no coordinator listens to.
+pub(super) fn unheard(deployment: &Deployment, charts: &[&Chart]) -> Findings {
+    let event = |(event, at): &(EventName, Origin)| {
+        let help = near(deployment, charts, *event)?;
+        let message = format!("no coordinator waits for the safety event `{event}`");
+        Some(Finding::warning(COORD_SAFETY_UNHEARD, message).at(*at).path("safety").help(help))
+    };
+    deployment.safety.iter().filter_map(event).collect()
+}
+
+/// What may have been meant by a safety event that no coordinator listens to; none: one does, or a function may.
+fn near(deployment: &Deployment, charts: &[&Chart], event: EventName) -> Option<String> {
+    if charts.iter().any(|chart| !chart.is_pure() || chart.events().contains(&event)) {
+        return None;
+    }
+    let heard: BTreeSet<EventName> = charts.iter().flat_map(|chart| outside_events(deployment, chart)).collect();
+    Some(did_you_mean(event.as_str(), "events", heard.iter().map(EventName::as_str)))
+}
 
 impl Graph<'_, '_> {
     /// One finding for each event that does not lead to a safe configuration somewhere.
@@ -50,8 +72,10 @@ impl Graph<'_, '_> {
                 places.join(", "),
                 if unknown { "may be there after something broke" } else { "is there" },
             );
+            let charts: Vec<&Chart> = self.product.members.iter().map(|member| member.chart).collect();
+            let near = near(self.product.deployment, &charts, event).map(|near| near + " if not, ").unwrap_or_default();
             let finding = Finding::new(severity, COORD_SAFETY_UNHEARD, message).at(origin).path("safety").help(format!(
-                "add a transition on `{event}` to a state that asks for a `safe` configuration on its entry; one from the \
+                "{near}add a transition on `{event}` to a state that asks for a `safe` configuration on its entry; one from the \
                  outermost state in which actuators exist serves for all inside"
             ));
             let trace = self.trace(at);

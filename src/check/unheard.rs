@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Requests whose failure no transition waits for that could be there to hear it.
 pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     let mut findings = Vec::new();
-    let mut missing: BTreeMap<EventName, (&RaiseSite, BTreeSet<EventName>)> = BTreeMap::new();
+    let mut missing: BTreeMap<EventName, (&RaiseSite, Ask, BTreeSet<EventName>)> = BTreeMap::new();
     let mut ears: FxHashMap<EventId, Vec<NodeId>> = FxHashMap::default();
     for site in chart.raises() {
         let Some(ask) = ask_of(deployment, site.name) else { continue };
@@ -33,12 +33,12 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
             let event = chart.event(answer);
             let ears = ears.entry(event).or_insert_with(|| hearing(chart, event));
             if !ears.iter().any(|state| chart.is_inside(*state, owner) || chart.is_inside(owner, *state)) {
-                missing.entry(site.name).or_insert_with(|| (site, BTreeSet::new())).1.insert(answer);
+                missing.entry(site.name).or_insert_with(|| (site, ask, BTreeSet::new())).2.insert(answer);
             }
         }
     }
-    for (name, (site, answers)) in missing {
-        let failed = answers.iter().any(|a| a.as_str().ends_with(".failed") || a.as_str().ends_with(".reverted"));
+    for (name, (site, ask, answers)) in missing {
+        let failed = [ask.failed(), Verdict::Reverted].iter().any(|verdict| answers.contains(&verdict.event(ask)));
         let list: Vec<String> = answers.iter().map(|a| format!("`{a}`")).collect();
         let message = format!("no transition hears {} of the request raised here", list.join(" or "));
         let finding = if failed {

@@ -122,6 +122,7 @@ pub struct SafeComes {
 pub struct Worlds<'a> {
     deployment: &'a Deployment,
     configurations: FxHashMap<ConfigId, Configuration>,
+    operator: FxHashSet<ConfigId>,
     /// What requests may touch, by their text.
     pub claims: Claims,
     context: Context,
@@ -155,6 +156,7 @@ impl<'a> Worlds<'a> {
         let mut worlds = Self {
             deployment,
             configurations: deployment.configurations.iter().map(|c| (c.id, c.clone())).collect(),
+            operator: deployment.operator_applies().collect(),
             claims: Claims::new(deployment.configurations.iter()),
             context: context(deployment),
             shapes: Shapes::new(undone),
@@ -257,6 +259,7 @@ impl<'a> Worlds<'a> {
     fn rules(&self) -> Rules<'_> {
         Rules {
             configurations: &self.configurations,
+            operator: &self.operator,
             context: &self.context,
             at: Time::default(),
             busy: false,

@@ -51,7 +51,7 @@ impl Run for EventArgs {
 pub struct ApplyArgs {
     /// The configuration.
     configuration: String,
-    /// Also when it moves something while a safe configuration is in force.
+    /// Also when the deployment's `operator:` does not list it, or it moves something while a safe configuration is in force.
     #[arg(long)]
     force: bool,
     #[command(flatten)]

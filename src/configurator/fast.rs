@@ -12,7 +12,7 @@ use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{Ask, Cause, Outcome};
-use crate::stack::{Group, HandOver, Planned, Resolved, Switch, World};
+use crate::stack::{Group, HandOver, Planned, Resolved, Switch, World, may_apply};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -51,6 +51,7 @@ impl Engine {
             Ask::UndoOf(id) => (id, true),
             _ => return Fared::Not,
         };
+        let allowed = self.configurations.get(&id).is_some_and(|c| may_apply(&request, c, &self.operator));
         let begun = self.current.last().map_or_else(|| self.clock.now(), |(_, begun)| *begun);
         let World { system, stack, .. } = &self.world;
         let own = || {
@@ -62,7 +63,7 @@ impl Engine {
         };
         let fits = |Fast { switch, .. }: &mut Fast| match undoing {
             true => stack.is_top(switch) && own() && switch.fits(system, true),
-            false => stack.takes(switch) && switch.ready(system, request.requester, begun, request.scope),
+            false => allowed && stack.takes(switch) && switch.ready(system, request.requester, begun, request.scope),
         };
         let Some(kept) = self.switches.get_mut(&id) else { return Fared::Not };
         let Some(place) = kept.iter_mut().position(fits) else { return Fared::Not };

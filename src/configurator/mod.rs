@@ -63,6 +63,8 @@ pub struct Setup {
     pub configurations: Vec<Configuration>,
     /// Those of them that bring the system to rest when it is taken down by force, in this order.
     pub rest: Vec<ConfigId>,
+    /// Those of them that an operator may apply, beside those that are safe.
+    pub operator: Vec<ConfigId>,
     /// The component types.
     pub catalogue: Catalogue,
     /// The deployment's activities.
@@ -105,6 +107,7 @@ impl Configurator {
             limits: setup.limits,
             configurations: Arc::new(configurations),
             force,
+            operator: setup.operator.into_iter().collect(),
             context: Context { activities: setup.activities, avoid: BTreeSet::new() },
             coordinators: setup.coordinators,
             pool: Pool::new(setup.clock.clone(), setup.platform, post.clone(), setup.workers.min(limits::WORKERS_MOST)),

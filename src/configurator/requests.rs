@@ -49,6 +49,7 @@ impl Engine {
             let held = self.held_frames();
             let rules = Rules {
                 configurations: &configurations,
+                operator: &self.operator,
                 context: &self.context,
                 at: self.clock.now(),
                 busy,

@@ -1,5 +1,6 @@
 //! What one call may take, and what its errors are called.
 
+use super::errors::UsedUp;
 use super::exact;
 #[cfg(target_os = "linux")]
 use super::watch::Watch;
@@ -169,7 +170,7 @@ impl Budget {
         } else {
             format!("ended after {millions} million instructions: is there an endless loop?")
         };
-        mlua::Error::runtime(text)
+        mlua::Error::external(UsedUp(text))
     }
 
     /// Makes a call of at most `limit` instructions. A call inside another shares the outer one's budget.

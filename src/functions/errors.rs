@@ -3,6 +3,29 @@
 use crate::limits;
 use mlua::Error;
 
+/// What a call ends with that has used up what it may use of the processor.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct UsedUp(pub String);
+
+/// Of which there was not enough.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Short {
+    /// Instructions, or the processor's time.
+    Instructions,
+    /// Memory.
+    Memory,
+}
+
+/// What an error ran out of, if that is what it is.
+pub fn short_of(error: &Error) -> Option<Short> {
+    match error {
+        Error::CallbackError { cause, .. } | Error::WithContext { cause, .. } => short_of(cause),
+        Error::MemoryError(_) => Some(Short::Memory),
+        other => other.downcast_ref::<UsedUp>().map(|_| Short::Instructions),
+    }
+}
+
 /// The text of an error of a coordinator's functions, with file and line where Lua knows them.
 pub fn message_of(error: &Error) -> String {
     message_within(error, limits::FUNCTIONS_BYTES)

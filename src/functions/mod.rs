@@ -31,7 +31,7 @@ mod work;
 
 pub use aside::Field;
 pub use budget::{Budget, processor_time};
-pub use errors::message_within;
+pub use errors::{Short, message_within};
 pub use guards::{Guards, install as guard, loops};
 pub use lower::{Problem, Spot};
 pub use open::{Functions, Lab, NotOpened, Opener, Reads, read};

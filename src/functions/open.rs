@@ -2,7 +2,7 @@
 
 use super::aside::{self, Field};
 use super::calls::{Calls, address};
-use super::errors::{message_of, undefined_global};
+use super::errors::{Short, message_of, short_of, undefined_global};
 use super::host::{Host, Reader, run, run_program, state};
 use super::lower::{self, Problem, Spot};
 use super::unset::Watch;
@@ -32,6 +32,8 @@ pub struct NotOpened {
     pub syntax: bool,
     /// The global name that the model expects and that nobody gave.
     pub missing: Option<String>,
+    /// What it had not enough of.
+    pub short: Option<Short>,
 }
 
 impl NotOpened {
@@ -45,12 +47,12 @@ impl NotOpened {
             (Some(file), Some(line), Some(rest)) => (file.to_owned(), Some(line), rest.trim().to_owned()),
             _ => (file.to_owned(), None, full.clone()),
         };
-        Self { file, line, message, syntax, missing }
+        Self { file, line, message, syntax, missing, short: short_of(error) }
     }
 
     fn plain(program: &Program, message: impl Into<String>) -> Self {
         let file = program.file.clone();
-        Self { file, line: None, message: message.into(), syntax: false, missing: None }
+        Self { file, line: None, message: message.into(), syntax: false, missing: None, short: None }
     }
 }
 

@@ -13,7 +13,7 @@ use super::print;
 use super::slips;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::diagnostics::{FileId, Language};
-use crate::functions::{self, Field, NotOpened, Spot};
+use crate::functions::{self, Field, NotOpened, Short, Spot};
 use crate::limits;
 use crate::model::finding::nearest;
 use crate::model::program::{Openings, Program};
@@ -289,12 +289,10 @@ fn refuse(cx: &mut Cx, ids: &FxHashMap<String, FileId>, reading: Reading, failur
         cx.report(finding.labelled("used here"));
         return;
     }
-    let code = if failure.message.contains("million instructions") {
-        codes::LUA_INSTRUCTIONS
-    } else if failure.message.contains("MB of memory") {
-        codes::LUA_MEMORY
-    } else {
-        codes::LUA_ERROR
+    let code = match failure.short {
+        Some(Short::Instructions) => codes::LUA_INSTRUCTIONS,
+        Some(Short::Memory) => codes::LUA_MEMORY,
+        None => codes::LUA_ERROR,
     };
     let finding = Finding::error(code, format!("the file fails: {}", failure.message)).at(at);
     cx.report(finding.help("the message is Lua's own; the file must run to its end once and return a state"));

@@ -486,7 +486,16 @@ codes! {
          either is not heard, or what it leads to asks for no safe configuration before another event comes. After something \
          ended *broken* nothing is known of the system, and the same is demanded as a warning. Add a transition on the event \
          to a state that asks for a safe configuration on its entry; a transition from the outermost state in which actuators \
-         exist serves for all states inside.";
+         exist serves for all states inside. Where no coordinator waits for the event at all, that is a warning even without an \
+         actuator: it is probably a slip.";
+    DEPLOY_SAFETY_ANSWER = "deploy::safety_answer", "an answer of the configurator is listed as a safety event",
+        "`safety` lists events from outside that must lead to a `safe` configuration: what a component, a monitor or an operator \
+         raises. An answer (`ID.ok`, `ID.failed`, …) comes only to who asked for something. Hear it with a transition of the \
+         coordinator, and list the events that mean danger.";
+    DEPLOY_OPERATOR_NAME = "deploy::operator_name", "a coordinator is called `operator`",
+        "Frames, answers and the log are told by who asked for them, and `operator` is who asks by hand, from a script or through \
+         the control socket. A coordinator of that name could not be told from an operator. Give it (or, where it has no name of \
+         its own, the deployment) another name.";
     COORD_LOST_UNHEARD = "coord::lost_unheard", "nobody hears that what a configuration stands for is lost",
         "A configuration says with `holds` what it stands for. When that becomes false while a frame of it is in force, the \
          coordinator hears `ID.lost`, in whatever state it is. On the way shown it is in a state in which no transition hears \
@@ -517,12 +526,14 @@ codes! {
         "Coordinators side by side were followed together, and one of them is refused something because frames of those named \
          are in the way: they share a component or a group with it, and without them it would not be refused. Nothing is \
          broken by that, the request is answered as failed; but whether it happens depends on which of them was first. The \
-         trace shows a shortest way. Give each coordinator components of its own, or let one ask the other by an event.";
+         trace shows a shortest way. Give each coordinator components of its own, or let one ask the other by an event. Where it \
+         is an operator's frame, the operator undoes it first, or `operator:` does not list it.";
     COORD_STACK_GROWS = "coord::stack_grows", "going round makes the stack grow",
         "The coordinator can go round a circle of states that applies a configuration each time and never undoes it, \
          though elsewhere it undoes that configuration by name. Each round leaves a frame; past the limit the oldest are \
          squashed together and can no longer be undone one by one. Undo it on the way round, scope it to a state \
-         (`config = …`), or give it a group.";
+         (`config = …`), or give it a group. Where its undo failed on that way, lead from there to a state that asks for its \
+         undo once more.";
     // ---- run time: platform, configurator, session -----------------------------------------------------------------
     UNKNOWN_REQUEST = "run::unknown_configuration", "a request names no configuration",
         "A request was raised whose name is not a configuration of the running deployment. It was answered `ID.failed` and \
@@ -586,6 +597,11 @@ codes! {
     NEEDS_FORCE = "run::needs_force", "an operator's request concerns a coordinator's frame",
         "An operator undoes the operator's own frames, and commits while no frame of a coordinator is in force. What belongs to a \
          coordinator is taken back by that coordinator, which else would not know of it. With `--force` it is done all the same.";
+    NOT_LISTED = "run::not_listed", "an operator applies what the deployment does not list",
+        "While a deployment is up, an operator (a terminal, the control socket, a script) may apply what its `operator:` lists, \
+         and what is `safe`: `davit check` looked at what comes of these at any time. Anything else is answered `ID.failed` and \
+         nothing is done. Add the configuration to `operator:` and check the deployment, or say `--force` (`{force = true}` in \
+         a script, `\"force\": true` on the socket).";
     NOT_CONFIRMED = "run::not_confirmed", "a confirmation did not come",
         "The configuration says `confirm`: after it was applied an event had to come within a time, and it did not. Its frame was \
          popped and `ID.reverted` raised. Find out why the event did not come, or give it more time.";

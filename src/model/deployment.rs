@@ -2,13 +2,14 @@
 
 use super::component_type::ComponentType;
 use super::configuration::Configuration;
+use super::event::{Ask, Verdict};
 use super::finding::Origin;
 use super::monitor::Monitor;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::program::Program;
 use super::statechart::Statechart;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -162,6 +163,9 @@ impl FaultKind {
     }
 }
 
+/// By this name an operator is told as the one who asked for something.
+pub const OPERATOR: &str = "operator";
+
 /// Something that an operator may do without being told that it is outside of what was checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum OperatorMay {
@@ -230,6 +234,33 @@ impl Default for DeploymentLimits {
 }
 
 impl Deployment {
+    /// Whether an event is spelt like an answer of the configurator: it ends like one, or is about a configuration or `undo`.
+    pub fn looks_like_answer(&self, event: &str) -> bool {
+        match Verdict::split(event) {
+            Some((subject, _)) => ConfigId::new(subject).is_ok(),
+            None => event.rsplit_once('.').is_some_and(|(subject, _)| {
+                let subject = subject.strip_suffix(".undo").unwrap_or(subject);
+                subject == Ask::Undo.subject()
+                    || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
+            }),
+        }
+    }
+
+    /// Every answer that anybody may get.
+    pub fn answers(&self) -> BTreeSet<EventName> {
+        let about = self.configurations.iter().flat_map(|c| [Ask::Apply(c.id), Ask::UndoOf(c.id)]);
+        let asks = about.chain([Ask::Undo, Ask::Commit { force: false }]);
+        asks.flat_map(|ask| ask.verdicts().iter().map(move |verdict| verdict.event(ask))).collect()
+    }
+
+    /// The configurations that an operator may apply, beside those that are safe.
+    pub fn operator_applies(&self) -> impl Iterator<Item = ConfigId> + '_ {
+        self.operator.iter().filter_map(|(may, _)| match may {
+            OperatorMay::Apply(id) => Some(*id),
+            OperatorMay::Set(_) => None,
+        })
+    }
+
     /// The configuration of that name.
     pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
         self.configurations.iter().find(|c| c.id == id)

@@ -75,6 +75,15 @@ impl Ask {
         matches!(self, Self::UndoOf(_) | Self::Undo | Self::UndoTo(_))
     }
 
+    /// What its status events begin with.
+    pub fn subject(&self) -> &str {
+        match self {
+            Self::Apply(id) | Self::UndoOf(id) => id.as_str(),
+            Self::Undo | Self::UndoTo(_) => "undo",
+            Self::Commit { .. } => "commit",
+        }
+    }
+
     /// The verdict when it got what it asked for.
     pub fn done(self) -> Verdict {
         if self.is_undo() { Verdict::Undone } else { Verdict::Ok }
@@ -131,31 +140,71 @@ impl Verdict {
         matches!(self, Self::Ok | Self::Undone)
     }
 
+    /// How status events end, those first that end in others.
+    pub const ENDINGS: [&'static str; 10] = [
+        Self::UndoFailed.ending(false),
+        Self::UndoBroken.ending(false),
+        Self::Ok.ending(false),
+        Self::Failed.ending(false),
+        Self::Broken.ending(false),
+        Self::Cancelled.ending(false),
+        Self::Undone.ending(false),
+        Self::Undone.ending(true),
+        Self::Reverted.ending(false),
+        Self::Lost.ending(false),
+    ];
+
+    /// How the status event of this verdict ends; `bare`: on an undo that names no configuration.
+    pub const fn ending(self, bare: bool) -> &'static str {
+        match self {
+            Self::Ok => ".ok",
+            Self::Failed => ".failed",
+            Self::Broken => ".broken",
+            Self::Cancelled => ".cancelled",
+            Self::Undone if bare => ".done",
+            Self::Undone => ".undone",
+            Self::UndoFailed if bare => ".failed",
+            Self::UndoFailed => ".undo.failed",
+            Self::UndoBroken if bare => ".broken",
+            Self::UndoBroken => ".undo.broken",
+            Self::Reverted => ".reverted",
+            Self::Lost => ".lost",
+        }
+    }
+
+    /// What an event tells about that is spelt like an answer (a configuration, `undo`), with how it ends.
+    pub fn split(event: &str) -> Option<(&str, &'static str)> {
+        let told = |ending: &&'static str| event.strip_suffix(*ending).map(|subject| (subject, *ending));
+        Self::ENDINGS.iter().find_map(told).filter(|(subject, ending)| {
+            // Only a bare undo is answered so: `grasp.done` is somebody else's word.
+            *ending != Self::Undone.ending(true) || *subject == Ask::Undo.subject()
+        })
+    }
+
     /// The status event that tells the verdict on `ask`.
     ///
     /// # Panics
     /// Never: every status event is an event name.
     pub fn event(self, ask: Ask) -> EventName {
-        let subject = match ask {
-            Ask::Apply(id) | Ask::UndoOf(id) => id.as_str(),
-            Ask::Undo | Ask::UndoTo(_) => "undo",
-            Ask::Commit { .. } => "commit",
-        };
-        let plain = matches!(ask, Ask::Undo | Ask::UndoTo(_));
-        let suffix = match self {
-            Self::Ok => ".ok",
-            Self::Failed => ".failed",
-            Self::Broken => ".broken",
-            Self::Cancelled => ".cancelled",
-            Self::Undone if plain => ".done",
-            Self::Undone => ".undone",
-            Self::UndoFailed if plain => ".failed",
-            Self::UndoFailed => ".undo.failed",
-            Self::UndoBroken if plain => ".broken",
-            Self::UndoBroken => ".undo.broken",
-            Self::Reverted => ".reverted",
-            Self::Lost => ".lost",
-        };
-        EventName::new(&format!("{subject}{suffix}")).expect("a status event is a name")
+        let ending = self.ending(matches!(ask, Ask::Undo | Ask::UndoTo(_)));
+        EventName::new(&format!("{}{ending}", ask.subject())).expect("a status event is a name")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_answer_has_one_of_the_endings_and_the_first_that_fits_is_it() {
+        let id = ConfigId::new("grasp").unwrap();
+        for ask in [Ask::Apply(id), Ask::UndoOf(id), Ask::Undo, Ask::UndoTo(1), Ask::Commit { force: false }] {
+            for verdict in ask.verdicts() {
+                let event = verdict.event(ask).to_string();
+                let subject = Verdict::ENDINGS.iter().find_map(|ending| event.strip_suffix(ending));
+                assert_eq!(subject, Some(ask.subject()), "{event}");
+                assert_eq!(Verdict::split(&event).map(|(subject, _)| subject), subject, "{event}");
+            }
+        }
     }
 }

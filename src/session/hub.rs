@@ -7,7 +7,7 @@ use super::lanes::Lanes;
 use super::log::{Answered, Fault, Happening, Log, Phase};
 use crate::coordinator::Refused;
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, RequestId};
+use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
 use crate::time::{Clock, Signal, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, VecDeque};
@@ -113,20 +113,11 @@ impl Hub {
     /// What a raised name means (design §7): a request if it is a configuration's ID or ends in `.undo` (or is `undo`);
     /// else an event that the deployment declares as emitted; else nothing, which `check` refuses.
     pub fn meaning(&self, name: EventName) -> Meaning {
-        let text = name.as_str();
-        if text == "undo" {
-            return Meaning::Request(Ask::Undo);
-        }
-        if let Some(id) = text.strip_suffix(".undo") {
-            return match ConfigId::new(id) {
-                Ok(id) if self.configurations.contains(&id) => Meaning::Request(Ask::UndoOf(id)),
-                _ => Meaning::UnknownUndo(name),
-            };
-        }
-        match ConfigId::new(text) {
-            Ok(id) if self.configurations.contains(&id) => Meaning::Request(Ask::Apply(id)),
-            _ if self.emits.contains(&name) => Meaning::Emitted(name),
-            _ => Meaning::Unknown(name),
+        match Raise::of(name, |id| self.configurations.contains(&id)) {
+            Raise::Request(ask) => Meaning::Request(ask),
+            Raise::UnknownUndo => Meaning::UnknownUndo(name),
+            Raise::Event if self.emits.contains(&name) => Meaning::Emitted(name),
+            Raise::Event => Meaning::Unknown(name),
         }
     }
 

@@ -9,6 +9,7 @@ pub mod hub;
 mod lanes;
 mod life;
 pub mod log;
+mod names;
 mod parts;
 pub mod place;
 mod recovery;

@@ -1,5 +1,6 @@
 //! JSON-RPC 2.0, one object a line: the words of the control socket (documented in `docs/control-socket.md`).
 
+use crate::model::finding::did_you_mean;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value as Json, json};
 
@@ -84,6 +85,27 @@ pub fn answer(id: &Json, result: Result<Json, RpcError>) -> String {
 /// A notification line.
 pub fn notification(method: &str, params: &Json) -> String {
     json!({"jsonrpc": "2.0", "method": method, "params": params}).to_string()
+}
+
+/// `params` holds nothing but these: a name that is misspelt would else be as if it were not there.
+///
+/// # Errors
+/// It does, or it is no object.
+pub fn only(method: &str, params: &Json, known: &[&str]) -> Result<(), RpcError> {
+    let given = match params {
+        Json::Null => return Ok(()),
+        Json::Array(given) if given.is_empty() => return Ok(()),
+        Json::Object(given) => given,
+        _ => return Err(RpcError::new(INVALID_PARAMS, "`params` is an object: parameters are named")),
+    };
+    match given.keys().find(|name| !known.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(name) => Err(RpcError {
+            code: INVALID_PARAMS,
+            message: format!("`{method}` has no parameter `{name}`"),
+            data: json!({ "help": did_you_mean(name, "parameters", known.iter().copied()) }),
+        }),
+    }
 }
 
 /// A member of `params`, which must be an object or absent.

@@ -2,7 +2,7 @@
 
 use super::hub::Hub;
 use super::log::Answered;
-use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, optional, param};
+use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::socket::Service;
 use super::{Command, NO_FORWARD, Session, recovery};
 use crate::model::finding::did_you_mean;
@@ -16,9 +16,32 @@ pub struct SessionService {
     session: Weak<Session>,
 }
 
-/// The methods, for the help of an unknown one and for the documentation's test.
-pub const METHODS: &[&str] =
-    &["status", "stack", "log", "event", "apply", "undo", "drift", "recover", "commit", "shutdown", "subscribe"];
+/// The methods with their parameters, for the help of an unknown one and for the documentation's test.
+pub const METHODS: &[(&str, &[&str])] = &[
+    ("status", &[]),
+    ("stack", &[]),
+    ("log", &["last"]),
+    ("event", &["event", "wait_for", "within_s"]),
+    ("apply", &["configuration", "force", "wait", "within_s"]),
+    ("undo", &["configuration", "to", "force", "wait", "within_s"]),
+    ("drift", &["within_s"]),
+    ("recover", &["direction", "within_s"]),
+    ("commit", &["force", "wait", "within_s"]),
+    ("shutdown", &["force", "wait"]),
+    ("subscribe", &[]),
+];
+
+/// There is such a method, and it has all of these parameters.
+fn known(method: &str, params: &Json) -> Result<(), RpcError> {
+    match METHODS.iter().find(|(name, _)| *name == method) {
+        Some((_, parameters)) => only(method, params, parameters),
+        None => Err(RpcError {
+            code: METHOD_NOT_FOUND,
+            message: format!("there is no method `{method}`"),
+            data: json!({ "help": did_you_mean(method, "methods", METHODS.iter().map(|(name, _)| *name)) }),
+        }),
+    }
+}
 
 impl SessionService {
     /// The service of `session`.
@@ -46,6 +69,7 @@ fn view(value: &impl serde::Serialize) -> Json {
 
 impl Service for SessionService {
     fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError> {
+        known(method, params)?;
         let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
         match method {
             "status" => Ok(view(&session.status())),
@@ -86,11 +110,7 @@ impl Service for SessionService {
                     .map(|ended| view(&ended))
                     .ok_or_else(|| RpcError::new(TIMED_OUT, "it is not down yet"))
             }
-            _ => Err(RpcError {
-                code: METHOD_NOT_FOUND,
-                message: format!("there is no method `{method}`"),
-                data: json!({ "help": did_you_mean(method, "methods", METHODS.iter().copied()) }),
-            }),
+            _ => Err(RpcError::new(METHOD_NOT_FOUND, format!("`{method}` is the socket's own"))),
         }
     }
 }
@@ -120,6 +140,9 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
     let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
     if !listed {
         answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
+    }
+    if let Some(why) = wait_for.as_ref().and_then(|name| session.never_heard(name)) {
+        return Err(refused(why, "wait for an answer that may come, or for an event".to_owned()));
     }
     let since = session.hub().heard();
     session.raise(event, "operator");

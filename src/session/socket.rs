@@ -232,6 +232,10 @@ fn serve(
         };
         match result {
             Ok(call) if call.method == "subscribe" => {
+                if let Err(error) = rpc::only(&call.method, &call.params, &[]) {
+                    call.id.as_ref().map_or(Ok(()), |id| send(&writer, &rpc::answer(id, Err(error))))?;
+                    continue;
+                }
                 let lines = subscribers.add();
                 forward(lines, writer.clone())?;
                 if let Some(id) = &call.id {

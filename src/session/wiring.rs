@@ -19,7 +19,7 @@ use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, S
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::{Clock, Time};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
@@ -69,6 +69,7 @@ impl Session {
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
             rest: deployment.shutdown.rest.iter().map(|(id, _)| *id).collect(),
+            operator: deployment.operator_applies().collect(),
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
             coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
@@ -149,6 +150,15 @@ impl Session {
         self.parts.iter().any(|part| part.sees_all)
     }
 
+    /// The states of its coordinators, by name.
+    pub fn states(&self) -> BTreeSet<String> {
+        let of = |part: &Part| -> Vec<String> {
+            let chart = &part.chart;
+            chart.nodes().filter(|node| chart.is_state(*node)).map(|node| chart.name(node).to_string()).collect()
+        };
+        self.parts.iter().flat_map(of).collect()
+    }
+
     /// Gives an event to all coordinators, in the name of `from`.
     pub fn raise(&self, event: EventName, from: &str) {
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
@@ -162,8 +172,8 @@ impl Session {
         }
     }
 
-    /// Makes a request in the name of an operator. `force`: also one that undoes a coordinator's frame, or moves while a safe
-    /// configuration is in force.
+    /// Makes a request in the name of an operator. `force`: also one that applies what is not listed, undoes a coordinator's
+    /// frame, or moves while a safe configuration is in force.
     pub fn request(&self, ask: Ask, by: &str, force: bool) -> RequestId {
         self.request_on(0, ask, by, force)
     }

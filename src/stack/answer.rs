@@ -83,6 +83,8 @@ pub enum Reason {
     Busy,
     /// A coordinator's frames are in force, and force was not asked for.
     NeedsForce(ConfigId),
+    /// An operator asked for what the deployment's `operator:` does not list, and not with force.
+    NotListed(ConfigId),
     /// The system is neither as before nor as asked for.
     Broken(Arc<Residual>),
     /// Nothing is done while the system is broken.
@@ -229,6 +231,8 @@ impl Reason {
             Self::Busy => Finding::error(codes::BUSY, self.to_string()).help("ask again when `davit status` shows nothing outstanding"),
             Self::NeedsForce(_) => Finding::error(codes::NEEDS_FORCE, self.to_string())
                 .help("undo only your own, or say `--force` if the coordinator's is meant"),
+            Self::NotListed(_) => Finding::error(codes::NOT_LISTED, self.to_string())
+                .help("`davit check` follows what comes of what is listed, applied at any time"),
             Self::NotConfirmed(..) => Finding::error(codes::NOT_CONFIRMED, self.to_string())
                 .help("find out why the event did not come, or give it more time with `within`"),
             Self::NothingToUndo => {
@@ -270,6 +274,10 @@ impl fmt::Display for Reason {
             Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),
             Self::NeedsForce(id) => write!(f, "`{id}` is a frame of a coordinator"),
+            Self::NotListed(id) => write!(
+                f,
+                "the deployment's `operator:` does not list `{id}`: add it there, or say `--force` (in a script `{{force = true}}`)"
+            ),
             Self::Broken(residual) => write!(f, "{residual}"),
             Self::StillBroken(residual) => write!(f, "what it names is broken since an earlier request: {residual}"),
             Self::NotConfirmed(event, within) => {

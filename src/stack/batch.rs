@@ -12,7 +12,7 @@ use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailu
 use crate::plan::{Context, PlannedStep};
 use crate::system::Overlay;
 use crate::time::Time;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
 /// What requests are judged by, beside the world.
@@ -20,6 +20,8 @@ use smallvec::SmallVec;
 pub struct Rules<'a> {
     /// The configurations.
     pub configurations: &'a FxHashMap<ConfigId, Configuration>,
+    /// What an operator may apply without force, beside what is safe: the deployment's `operator:`.
+    pub operator: &'a FxHashSet<ConfigId>,
     /// What plans are made with.
     pub context: &'a Context,
     /// When.
@@ -187,6 +189,9 @@ fn resolve<'a>(
     match request.ask {
         Ask::Apply(id) => {
             let Some(configuration) = rules.configurations.get(&id) else { return tell(failed, Reason::Unknown(id)) };
+            if !may_apply(request, configuration, rules.operator) {
+                return tell(failed, Reason::NotListed(id));
+            }
             if !world.broken.is_empty()
                 && let Some(reason) = still_broken(&mut claims::components(configuration).into_iter())
             {
@@ -277,6 +282,14 @@ fn resolve<'a>(
             }
         }
     }
+}
+
+/// Whether who asks may have this applied: what an operator is not expected to apply was not checked with everything else.
+pub fn may_apply(request: &Request, configuration: &Configuration, operator: &FxHashSet<ConfigId>) -> bool {
+    request.requester != Requester::Operator
+        || request.force
+        || configuration.safe
+        || operator.contains(&configuration.id)
 }
 
 /// A frame of a coordinator that an operator without force does not meddle with.

@@ -1,6 +1,6 @@
 //! What is asked of a configurator: requests, who makes them, and which belong together (design §6).
 
-use crate::model::{Ask, ComponentName, EventName, RequestId};
+use crate::model::{Ask, ComponentName, EventName, OPERATOR, RequestId};
 use smallvec::SmallVec;
 use std::fmt;
 use std::time::Duration;
@@ -18,7 +18,7 @@ impl fmt::Display for Requester {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Coordinator(name) => write!(f, "{name}"),
-            Self::Operator => f.write_str("operator"),
+            Self::Operator => f.write_str(OPERATOR),
         }
     }
 }

@@ -364,6 +364,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
         at: Time(0),
         busy: false,
         held: &[],
+        operator: &rustc_hash::FxHashSet::default(),
         joined: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());

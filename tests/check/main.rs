@@ -4,6 +4,7 @@
 #[allow(dead_code)]
 mod demo;
 
+mod advice;
 mod asked;
 mod beside;
 mod demands;

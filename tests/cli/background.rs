@@ -26,11 +26,22 @@ fn deployed_switched_undone_and_shut_down() {
     assert_eq!(status["system"]["components"]["source"]["state"], "running");
     assert_eq!(status["system"]["connections"][0]["to"], "sink.u");
 
+    let never = run(&["event", "e_fast", "--wait", "fast.okk"]);
+    assert!(never.code == 1 && never.err.contains("did you mean `fast.ok`?"), "{}{}", never.out, never.err);
+    assert_eq!(
+        run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"],
+        1.0,
+        "not raised"
+    );
     let event = run(&["event", "e_fast", "--wait", "fast.ok"]);
     assert_eq!(event.code, 0, "{}{}", event.out, event.err);
     assert_eq!(run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"], 9.0);
 
-    let applied = run(&["apply", "rename", "--wait", "--json"]);
+    let unlisted = run(&["apply", "rename", "--wait"]);
+    assert_eq!(unlisted.code, 1, "{}{}", unlisted.out, unlisted.err);
+    assert!(unlisted.out.contains("rename.failed") && unlisted.out.contains("`operator:`"), "{}", unlisted.out);
+    assert!(unlisted.out.contains("`--force`"), "{}", unlisted.out);
+    let applied = run(&["apply", "rename", "--force", "--wait", "--json"]);
     assert_eq!(applied.code, 0, "{}{}", applied.out, applied.err);
     let name = || run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["name"].clone();
     assert_eq!(name(), "second");

@@ -10,6 +10,7 @@ mod explored;
 mod faults;
 mod force;
 mod hot_swap;
+mod listed;
 mod lost;
 mod monitor;
 mod motion;

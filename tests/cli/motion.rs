@@ -66,10 +66,10 @@ fn steps(log: &str, answer: &str) -> Vec<String> {
 #[test]
 fn a_call_that_may_have_happened_is_taken_back_by_its_compensation() {
     // Nobody gave it up: what became of it is not known, until somebody asks for its undo.
-    let log = run("fault('operation_call a.open', 'lost') apply('open') wait_answer('open.broken', 5)
+    let log = run("fault('operation_call a.open', 'lost') apply('open', {force = true}) wait_answer('open.broken', 5)
         undo('open') wait_answer('open.undone', 5) assert(#stack() == 1)");
     assert_eq!(steps(&log, "open.undone"), ["operation_call a.close"]);
-    let log = run("fault('operation_call a.up', 'lost') apply('lift') wait_answer('lift.broken', 5)
+    let log = run("fault('operation_call a.up', 'lost') apply('lift', {force = true}) wait_answer('lift.broken', 5)
         undo('lift') wait_answer('lift.undone', 5) assert(#stack() == 1)");
     assert_eq!(steps(&log, "lift.broken"), ["operation_call a.up"]);
     assert_eq!(steps(&log, "lift.undone"), ["operation_call a.dn"]);
@@ -77,11 +77,13 @@ fn a_call_that_may_have_happened_is_taken_back_by_its_compensation() {
 
 #[test]
 fn a_confirmation_that_runs_out_moves_nothing_unasked() {
-    let log = run("apply('tried') wait_answer('tried.ok', 1) wait_answer('tried.undo.failed', 2) assert(#stack() == 2)
+    let log = run("apply('tried', {force = true}) wait_answer('tried.ok', 1) wait_answer('tried.undo.failed', 2) assert(#stack() == 2)
         undo('tried') wait_answer('tried.undone', 1)");
     assert!(steps(&log, "tried.undo.failed").is_empty(), "{log}");
     assert!(log.contains("nobody asked for that"), "{log}");
-    let log = run("apply('meant') wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)");
+    let log = run(
+        "apply('meant', {force = true}) wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)",
+    );
     assert_eq!(steps(&log, "meant.reverted"), ["operation_call a.dn"]);
 }
 
@@ -94,15 +96,17 @@ fn force_tries_again_what_failed_once() {
 
 #[test]
 fn recover_leaves_alone_what_is_whole() {
-    run("apply('lift') wait_answer('lift.ok', 1) recover('accept') assert(#stack() == 2)
+    run("apply('lift', {force = true}) wait_answer('lift.ok', 1) recover('accept') assert(#stack() == 2)
         undo('lift') wait_answer('lift.undone', 1) recover('back') assert(#stack() == 1)");
 }
 
 /// Requests of one connection begin one after the other, also where they have nothing to do with each other; a script is one.
 #[test]
 fn what_one_asks_for_begins_one_after_the_other() {
-    let log = run("fault('property_set a.k = 1', 'slow', 1, 0.5) apply('first') apply('other')
-        wait_answer('other.ok', 5) assert(property('a.k') == 1)");
+    let log = run(
+        "fault('property_set a.k = 1', 'slow', 1, 0.5) apply('first', {force = true}) apply('other', {force = true})
+        wait_answer('other.ok', 5) assert(property('a.k') == 1)",
+    );
     let at = |answer: &str| log.find(answer).unwrap_or_else(|| panic!("no `{answer}`: {log}"));
     assert!(at("first.ok") < at("other.ok"), "{log}");
 }
@@ -115,7 +119,7 @@ fn drift_tells_of_what_is_unknown_and_of_who_has_not_come_back() {
     };
     let (unknown, quarantined) = (told("nobody knows"), told("a is in quarantine"));
     run(&format!(
-        "fault('operation_call a.open', 'late') apply('open') wait_answer('open.broken', 5)
+        "fault('operation_call a.open', 'late') apply('open', {{force = true}}) wait_answer('open.broken', 5)
         do {unknown} assert(f and f.how == 'unknown') end
         do {quarantined} assert(f and f.how == 'quarantined') end
         wait(10) assert(#drift() == 0)"

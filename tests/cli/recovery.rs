@@ -72,7 +72,7 @@ impl Deployed {
     /// The system is broken: the logger's file cannot be made, and what was done is held.
     fn broken() -> Self {
         let deployed = Self::new();
-        let swap = deployed.0.run(&["apply", "swap", "--wait"]);
+        let swap = deployed.0.run(&["apply", "swap", "--force", "--wait"]);
         assert_eq!(swap.code, 3, "{}{}", swap.out, swap.err);
         deployed
     }
@@ -154,7 +154,7 @@ fn what_is_there_is_taken_as_the_state() {
     assert_eq!((&status["phase"], &status["stack"]), (&json!("up"), &json!([])));
     assert_eq!(status["system"]["components"]["log"]["properties"]["path"], "gone/b.csv");
     assert_eq!(deployed.0.run(&["drift"]).code, 0);
-    assert_eq!(deployed.0.run(&["apply", "thick", "--wait"]).code, 0, "requests are taken again");
+    assert_eq!(deployed.0.run(&["apply", "thick", "--force", "--wait"]).code, 0, "requests are taken again");
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn commit_makes_the_operators_frames_permanent_and_no_others() {
         stack.as_array().unwrap().iter().map(|f| f["configuration"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
     assert_eq!(run(&["event", "e_thin", "--wait", "thin.ok"]).code, 0);
-    assert_eq!(run(&["apply", "thick", "--wait"]).code, 0);
+    assert_eq!(run(&["apply", "thick", "--force", "--wait"]).code, 0);
     assert_eq!(frames(), ["make", "thin", "thick"]);
     let refused = run(&["commit"]);
     assert_eq!(refused.code, 1, "{}{}", refused.out, refused.err);
@@ -234,7 +234,7 @@ fn a_script_recovers() {
 deploy("deployment.yaml")
 assert(#drift() == 0)
 recover("back")
-apply("swap")
+apply("swap", { force = true })
 wait_answer("swap.broken", 1)
 assert(#drift() == 0 and stack()[#stack()].partial, "what is left is in force")
 local ok, why = pcall(recover, "forward")
@@ -242,14 +242,14 @@ assert(not ok and tostring(why):find("journal"), tostring(why))
 recover("back")
 assert(#drift() == 0)
 assert_running("log")
-apply("thick")
+apply("thick", { force = true })
 wait_answer("thick.ok", 1)
 commit()
 wait_answer("commit.failed", 1)
 commit { force = true }
 wait_answer("commit.ok", 1)
 assert(#stack() == 1, "the coordinator's")
-apply("swap")
+apply("swap", { force = true })
 wait_answer("swap.broken", 1)
 recover("accept")
 assert_state("log", "unconfigured")

@@ -201,7 +201,7 @@ fn rows(document: &str) -> String {
 #[test]
 fn the_socket_and_the_scripts_are_documented() {
     let socket = rows("docs/control-socket.md");
-    for method in davit::session::service::METHODS {
+    for (method, _) in davit::session::service::METHODS {
         assert!(socket.contains(&format!("`{method}`")), "docs/control-socket.md has no `{method}`");
     }
     let scripts = rows("docs/scripts.md");

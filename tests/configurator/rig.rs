@@ -195,6 +195,7 @@ impl Rig {
         let progress: Arc<Mutex<Vec<Progress>>> = Arc::default();
         let told = progress.clone();
         let handle = Configurator::start(Setup {
+            operator: configurations.iter().map(|c| c.id).collect(),
             configurations,
             rest: Vec::new(),
             catalogue,

@@ -90,6 +90,11 @@ fn a_file_that_runs_for_ever_or_eats_memory_is_ended() {
     assert_eq!(finding.code, codes::LUA_INSTRUCTIONS, "{finding:?}");
     let (finding, _) = refused("local one = ('x'):rep(5000000) local t = {} for i = 1, 1e9 do t[i] = one .. i end");
     assert_eq!(finding.code, codes::LUA_MEMORY, "{finding:?}");
+    // What a model says itself is its own, whatever the words.
+    for word in ["three million instructions", "2 MB of memory"] {
+        let (finding, _) = refused(&format!("error('{word} are not enough')"));
+        assert_eq!(finding.code, codes::LUA_ERROR, "{finding:?}");
+    }
     let (finding, _) = refused("local t = setmetatable({}, { __gc = function() end })\nreturn rfsm.state {}");
     assert!(finding.message.contains("__gc"), "{finding:?}");
 }

@@ -196,7 +196,7 @@ fn what_the_inbox_cannot_hold_is_counted_and_told_and_an_operator_goes_first() {
             }
         }));
         let burst = ConfigId::new("burst").unwrap();
-        flooded.session.request(Ask::Apply(burst), "operator", false);
+        flooded.session.request(Ask::Apply(burst), "operator", true);
         flooded.clock.sleep(Duration::from_secs(3));
         let raised = flooded.count(|what| is_event(what, "e_burst"));
         assert_eq!(raised, 6000);

@@ -4,8 +4,12 @@ use davit::app::script::{self, Options};
 use davit::app::{self, Checked};
 use davit::lang::LoadOptions;
 use davit::libraries;
+use davit::session::rpc;
+use davit::session::service::SessionService;
+use davit::session::socket::Service;
 use davit::session::{Command, Happening, Phase, Session};
 use davit::time::Clock;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -154,11 +158,18 @@ fn a_script_that_fails_leaves_nothing_behind() {
     for (script, message) in [
         ("deploy('@generic_arm.yaml') assert(false, 'no luck')", "no luck"),
         ("deploy('@generic_arm.yaml') wait_state('idle', 0.5)", "not in `idle` after 0.5 s"),
-        ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`"),
+        ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`: did you mean `idle`?"),
         ("deploy('@generic_arm.yaml') raise('e_5dofs')", "did you mean `e_5dof`?"),
         ("deploy('@generic_arm.yaml') apply('eight_DOFF')", "did you mean `eight_DOF`?"),
         ("deploy('@generic_arm.yaml') asert_running('x')", "did you mean `assert_running`?"),
-        ("deploy('@generic_arm.yaml') wait_answer('never.ok', 1)", "`never.ok` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') wait_answer('e_never', 1)", "`e_never` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "is never heard"),
+        ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "did you mean `eight_DOF.ok`?"),
+        ("deploy('@generic_arm.yaml') wait_answer('eigth_DOF.ok', 1)", "did you mean `eight_DOF.ok`?"),
+        ("deploy('@generic_arm.yaml') wait_answer('undo.dome', 1)", "did you mean `undo.done`?"),
+        ("deploy('@generic_arm.yaml') port('follower.folow')", "did you mean `follow`?"),
+        ("deploy('@generic_arm.yaml') port('folower.follow')", "did you mean `follower`?"),
+        ("deploy('@generic_arm.yaml') undo('eight_DOF', {force = 1})", "`force` is true or false"),
         ("deploy('@generic_arm.yaml') local t = {} while true do t[1] = 1 end", "endless loop"),
         ("deploy('@generic_arm.yaml') while true do pcall(function() while true do end end) end", "endless loop"),
         (
@@ -220,10 +231,11 @@ fn an_operator_meddles_with_a_coordinator_only_by_force() {
         "deploy('@generic_arm.yaml') wait_answer('five_DOF.ok', 1) raise('e_aligned') wait_answer('eight_DOF.ok', 1)
          undo('eight_DOF') wait_answer('eight_DOF.undo.failed', 1) assert(property('follower.cart_share') == 0.5)
          undo('eight_DOF', {force = true}) wait_answer('eight_DOF.undone', 1) assert(property('follower.cart_share') ~= 0.5)
-         -- Nothing moves while a safe configuration is in force.
+         -- What is safe may be applied, what `operator:` does not list only by force.
          apply('safe_hold') wait_answer('safe_hold.ok', 1)
          apply('unfold') wait_answer('unfold.failed', 1)
          apply('unfold', {force = true}) wait_answer('unfold.ok', 20)
+         -- Nothing moves while a safe configuration is in force.
          undo() wait_answer('undo.failed', 1)
          undo('unfold', {force = true}) wait_answer('unfold.undone', 20)
          undo() wait_answer('undo.done', 1)
@@ -286,7 +298,7 @@ fn an_operator_pushes_and_undoes() {
         }
         session.hub().answer(request).unwrap()
     };
-    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", false)).answer, "profile_soft.ok");
+    assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", true)).answer, "profile_soft.ok");
     assert_ne!(session.system(), before);
     assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator", false)).answer, "undo.done");
     assert_eq!(session.system(), before);
@@ -318,4 +330,32 @@ fn a_command_during_bring_up_rolls_back() {
     assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
     interrupter.join(clock.now() + Duration::from_secs(1)).unwrap();
     clock.shutdown();
+}
+
+#[test]
+fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let session = app::start(&checked("deployments/hello.yaml"), &clock).unwrap();
+    session.bring_up().unwrap();
+    let service = SessionService::new(Arc::downgrade(&session));
+    service.call(1, "apply", &json!({"configuration": "run", "force": true})).unwrap();
+    clock.sleep(Duration::from_secs(1));
+    let frames = session.status().stack.len();
+    for (method, params, near) in [
+        ("apply", json!({"configuration": "run", "wiat": true}), "did you mean `wait`?"),
+        ("undo", json!({"configuraton": "run"}), "did you mean `configuration`?"),
+        ("undo", json!(["run"]), ""),
+        ("shutdown", json!({"forced": true}), "did you mean `force`?"),
+        ("status", json!({"all": true}), "there are no parameters here"),
+    ] {
+        let error = service.call(1, method, &params).expect_err(method);
+        assert_eq!(error.code, rpc::INVALID_PARAMS, "{method}: {error}");
+        assert!(error.data["help"].as_str().unwrap_or_default().contains(near), "{method}: {error:?}");
+    }
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(session.status().stack.len(), frames);
+    service.call(1, "undo", &json!({"configuration": "run", "force": null})).unwrap();
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(session.status().stack.len(), frames - 1);
 }

@@ -75,6 +75,8 @@ fn subscribers_hear_notifications() {
     let (_, socket) = open("subscribe");
     let mut stream = UnixStream::connect(socket.path()).unwrap();
     let mut lines = BufReader::new(stream.try_clone().unwrap()).lines();
+    stream.write_all(b"{\"jsonrpc\":\"2.0\",\"method\":\"subscribe\",\"params\":{\"to\":1},\"id\":0}\n").unwrap();
+    assert!(lines.next().unwrap().unwrap().contains("no parameter `to`"));
     stream.write_all(b"{\"jsonrpc\":\"2.0\",\"method\":\"subscribe\",\"id\":1}\n").unwrap();
     assert!(lines.next().unwrap().unwrap().contains("true"));
     socket.notify("event", &json!({"name": "e_x"}));

@@ -6,7 +6,7 @@ use crate::app::start::rule;
 use crate::check;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{FaultKind, Origin, StepFault};
+use crate::model::{Direction, FaultKind, Ident, Origin, StepFault, TypeName};
 use crate::platform::simulated::Simulated;
 use std::time::Duration;
 
@@ -58,6 +58,13 @@ impl Faults {
     /// Whether what waits for this deployment can go wrong in it.
     pub(super) fn fit(&self, checked: &Checked) -> mlua::Result<()> {
         self.waiting.iter().try_for_each(|fault| fits(fault, checked))
+    }
+
+    /// The in-ports of the components of a type, as the deployment that is up has it.
+    pub(super) fn in_ports(&self, ty: TypeName) -> Vec<Ident> {
+        let known = self.up.as_ref().and_then(|(checked, _)| checked.catalogue.get(ty));
+        let ports = known.iter().flat_map(|ty| &ty.ports);
+        ports.filter(|(_, port)| port.direction == Direction::In).map(|(name, _)| *name).collect()
     }
 
     /// A deployment is about to be brought up; what waited for it is in force.

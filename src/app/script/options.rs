@@ -7,12 +7,21 @@ use mlua::Table;
 /// Whether the one option that there is is set; another one is a typo.
 pub(super) fn flag(options: Option<Table>, name: &'static str) -> mlua::Result<bool> {
     let Some(options) = options else { return Ok(false) };
+    let mut set = false;
     for pair in options.pairs::<mlua::Value, mlua::Value>() {
-        let key = pair?.0.to_string()?;
+        let (key, value) = pair?;
+        let key = key.to_string()?;
         if key != name {
             let help = did_you_mean(&key, "options", [name]);
             return Err(error(format!("there is no option `{key}`: {help}")));
         }
+        // To Lua everything is true but `false` and nil; `force = 0` would be, too.
+        match value {
+            mlua::Value::Boolean(value) => set = value,
+            other => {
+                return Err(error(format!("`{name}` is true or false, and this is of the type {}", other.type_name())));
+            }
+        }
     }
-    options.get::<Option<bool>>(name).map(|set| set.unwrap_or(false))
+    Ok(set)
 }

@@ -8,7 +8,7 @@ use super::{Unit, name, one_or_more, text, time};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    BringUp, ConfigId, Coordinator, EventName, Finding, Ident, Origin, Statechart, TakeDown, Written, codes,
+    BringUp, ConfigId, Coordinator, EventName, Finding, Ident, OPERATOR, Origin, Statechart, TakeDown, Written, codes,
 };
 use std::time::Duration;
 
@@ -135,6 +135,17 @@ pub fn join(
             Finding::error(codes::TEXT_DUPLICATE_KEY, message)
                 .at(charts[again].2)
                 .help("the one under `coordinator` is called like the deployment: give the other another name"),
+        );
+    }
+    if let Some(at) = names.iter().position(|name| name.as_str() == OPERATOR) {
+        let help = match charts[at].0 {
+            Some(_) => "give it another name under `coordinators`",
+            None => "it is called like the deployment: give that another `name`",
+        };
+        cx.report(
+            Finding::error(codes::DEPLOY_OPERATOR_NAME, "a coordinator cannot be called `operator`")
+                .at(charts[at].2)
+                .help(help),
         );
     }
     for named in rise.up.iter().chain(&rise.failed).chain(&fall.down) {

@@ -1,0 +1,68 @@
+//! What a script looks at: components, their states, properties and in-ports.
+
+use super::{Shared, error, session, values};
+use crate::model::finding::did_you_mean;
+use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
+use mlua::{Lua, Value as LuaValue};
+
+pub(super) fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<RunState>> {
+    let system = session(host)?.system();
+    let state = ComponentName::new(name).ok().and_then(|n| system.components.get(&n)).map(|c| c.state);
+    Ok(state)
+}
+
+pub(super) fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Result<()> {
+    match component_state(host, name)? {
+        Some(state) if state.as_str() == wanted => Ok(()),
+        Some(state) => Err(error(format!("`{name}` is {state}, not {wanted}"))),
+        None => Err(no_component(name, &session(host)?.system())),
+    }
+}
+
+fn member(text: &str) -> mlua::Result<MemberRef> {
+    MemberRef::new(text).map_err(|e| error(e.to_string()))
+}
+
+/// A component that is there, as the snapshot of the system shows it.
+fn component(system: &Snapshot, name: ComponentName) -> mlua::Result<&ComponentSnapshot> {
+    system.components.get(&name).ok_or_else(|| no_component(name.as_str(), system))
+}
+
+fn no_component(name: &str, system: &Snapshot) -> mlua::Error {
+    let help = did_you_mean(name, "components", system.components.keys().map(ComponentName::as_str));
+    error(format!("there is no component `{name}`: {help}"))
+}
+
+pub(super) fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+    let name = member(text)?;
+    let system = session(host)?.system();
+    let component = component(&system, name.component)?;
+    match component.properties.get(&name.member) {
+        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
+        None => {
+            let known = component.properties.keys().map(Ident::as_str);
+            Err(error(format!(
+                "`{}` has no property `{}`: {}",
+                name.component,
+                name.member,
+                did_you_mean(name.member.as_str(), "properties", known)
+            )))
+        }
+    }
+}
+
+/// The value written on an in-port by a configuration; nil when never written.
+pub(super) fn port(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+    let name = member(text)?;
+    let system = session(host)?.system();
+    if let Some(value) = system.ports.get(&name) {
+        return values::to_lua(lua, &serde_json::to_value(value).expect("plain data"));
+    }
+    let ty = component(&system, name.component)?.ty;
+    let ins = host.borrow().faults.in_ports(ty);
+    if ins.contains(&name.member) {
+        return Ok(LuaValue::Nil);
+    }
+    let help = did_you_mean(name.member.as_str(), "in-ports", ins.iter().map(Ident::as_str));
+    Err(error(format!("`{}` has no in-port `{}`: {help}", name.component, name.member)))
+}

@@ -1,0 +1,143 @@
+//! Advice that is true: what is said of frames that pile up, of an operator in the way, of events that may be slips.
+
+use crate::support::{Said, Small};
+
+const CONFIGURATIONS: &str = "base = Configuration { create(\"a\", \"Drive\") }, soft = Configuration { property_set(\"a.gain\", 0.5) },
+    other = Configuration { property_set(\"a.gain\", 0.7) }, gone = Configuration { destroy(\"a\") },
+    halt = Configuration { post_conf_state = { \"a:stopped\" } },
+    run = Configuration { post_conf_state = { \"a:running\" } }, service = Configuration { post_conf_state = { \"a:running\" } },";
+
+const STATES: &str = "idle = state {}, building = state { entry = \"base\" }, up = state {}, leaving = state { entry = \"base.undo\" }, stuck = state {},
+    trans { src = \"initial\", tgt = \"idle\" },
+    trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+    trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+    trans { src = \"building\", tgt = \"leaving\", events = { \"base.failed\", \"base.broken\", \"e_shutdown\" } },
+    trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+    trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+    trans { src = \"leaving\", tgt = \"stuck\", events = { \"base.undo.failed\", \"base.undo.broken\" } },
+    trans { src = \"stuck\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+
+fn check(more: &str, keys: &str) -> Said {
+    Small::new(CONFIGURATIONS, &format!("{STATES}{more}"), keys).check()
+}
+
+fn texts<'a>(said: &'a Said, code: &str) -> Vec<(&'a str, &'a str)> {
+    let text = |f: &'a serde_json::Value, key: &str| f[key].as_str().unwrap_or_default();
+    said.of(code).into_iter().map(|f| (text(f, "message"), text(f, "help"))).collect()
+}
+
+#[test]
+fn what_is_scoped_and_piles_up_since_its_undo_failed_is_not_to_be_scoped() {
+    let round = |on: &str, inner: &str, way: &str| {
+        format!(
+            "on = state {{ {on} calm = state {{}}, more = state {{ entry = \"{inner}\" }}, trans {{ src = \"initial\", tgt = \"calm\" }},
+               trans {{ src = \"calm\", tgt = \"more\", events = {{ \"e_more\" }} }} }},
+             trans {{ src = \"up\", tgt = \"on\", events = {{ \"e_go\" }} }},
+             trans {{ src = \"on\", tgt = \"up\", events = {{ \"e_back\" }} }},
+             trans {{ src = \"on\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"{way}\" }},"
+        )
+    };
+    // What is applied inside lies above it and changes the same: the undo is refused each time.
+    let scoped = check(&round("config = \"soft\",", "other", "base.undo"), "");
+    let found = texts(&scoped, "coord::stack_grows");
+    let soft: Vec<_> = found.iter().filter(|(message, _)| message.contains("`soft`")).collect();
+    assert_eq!(soft.len(), 1, "{:#}", scoped.0);
+    let (message, help) = soft[0];
+    assert!(message.ends_with("after its undo has failed"), "{message}");
+    assert!(help.contains("`soft.undo.failed`") && !help.contains("config ="), "{help}");
+    // Where nobody undoes it on the way round, though elsewhere, the old advice is true.
+    let left = check(&round("", "soft", "soft.undo"), "");
+    let found = texts(&left, "coord::stack_grows");
+    assert_eq!(found.len(), 1, "{:#}", left.0);
+    let (message, help) = found[0];
+    assert!(message.ends_with("without undoing it") && help.contains("config = \"soft\""), "{message}: {help}");
+}
+
+#[test]
+fn an_operator_in_the_way_is_told_to_undo_first_and_not_to_have_components_of_its_own() {
+    let runs = "ready = state { config = \"run\" }, trans { src = \"up\", tgt = \"ready\", events = { \"e_go\" } },
+        trans { src = \"ready\", tgt = \"up\", events = { \"e_back\" } }, trans { src = \"ready\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let said = check(runs, "operator: [service]\n");
+    let found = texts(&said, "coord::refused_by_other");
+    assert!(!found.is_empty(), "{:#}", said.0);
+    for (message, help) in found {
+        assert!(help.contains("`operator:`") && !help.contains("each coordinator"), "{message}: {help}");
+    }
+}
+
+#[test]
+fn an_operator_is_not_blamed_for_the_frames_of_a_coordinator() {
+    let more = "more = state { entry = \"halt\" }, trans { src = \"up\", tgt = \"more\", events = { \"e_go\" } },
+        trans { src = \"more\", tgt = \"leaving\", events = { \"halt.failed\", \"halt.broken\", \"e_shutdown\" } },
+        last = state { config = \"soft\" }, trans { src = \"more\", tgt = \"last\", events = { \"halt.ok\" } },
+        trans { src = \"last\", tgt = \"leaving\", events = { \"soft.failed\", \"soft.broken\", \"e_shutdown\" } },";
+    let states = STATES.replace("base.undone", "gone.ok").replace("base.undo", "gone");
+    let said =
+        Small::new(CONFIGURATIONS, &format!("{states}{more}"), "operator: [run]\nlimits: { stack: 2 }\n").check();
+    let full = |f: &&&serde_json::Value| f["message"].as_str().unwrap().contains("none can be squashed");
+    let (own, others) = (said.of("coord::request_refused"), said.of("coord::refused_by_other"));
+    assert!(own.iter().any(|f| full(&f)) && !others.iter().any(|f| full(&f)), "{:#}", said.0);
+    // Without the operator's frame between them there would be two to squash.
+    assert!(own.iter().filter(full).all(|f| f["severity"] == "warning"), "{:#}", said.0);
+}
+
+#[test]
+fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
+    let listens = |events: &[&str], keys: &str| {
+        let states = ["building", "up", "stuck"];
+        let more: String = events
+            .iter()
+            .zip(states)
+            .map(|(event, state)| {
+                format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"{event}\" }} }},")
+            })
+            .collect();
+        check(&more, keys).of("coord::near_event").len()
+    };
+    assert_eq!(listens(&["e_tart"], ""), 1, "one letter");
+    assert_eq!(listens(&["e_stt"], ""), 0, "two letters of a short name");
+    assert_eq!(listens(&["e_shudwon"], ""), 1, "two letters of a long one");
+    assert_eq!(listens(&["e_tart", "e_tart"], ""), 0, "nobody slips twice in the same way");
+    assert_eq!(listens(&["e_tart"], "safety: [e_tart]\n"), 0, "declared");
+}
+
+#[test]
+fn a_safety_event_that_nobody_waits_for_is_told_without_an_actuator_and_an_answer_is_refused() {
+    let stops = "trans { src = \"up\", tgt = \"leaving\", events = { \"e_estop\" } },";
+    let slip = check(stops, "safety: [e_estp]\n");
+    let found = slip.of("coord::safety_unheard");
+    assert_eq!((found.len(), found[0]["severity"].as_str()), (1, Some("warning")), "{:#}", slip.0);
+    assert!(found[0]["help"].as_str().unwrap().contains("did you mean `e_estop`?"), "{:#}", found[0]);
+    assert!(check(stops, "safety: [e_estop]\n").of("coord::safety_unheard").is_empty());
+    // With an actuator more is said, once.
+    let arm = CONFIGURATIONS.replace("create(\"a\", \"Drive\")", "create(\"a\", \"Drive\"), create(\"arm\", \"Arm\")");
+    let moving = Small::new(&arm, &format!("{STATES}{stops}"), "safety: [e_estp]\n").check();
+    let found = moving.of("coord::safety_unheard");
+    assert_eq!((found.len(), found[0]["severity"].as_str()), (1, Some("error")), "{:#}", moving.0);
+    assert!(found[0]["help"].as_str().unwrap().starts_with("did you mean `e_estop`?"), "{:#}", found[0]);
+    let answer = check(stops, "safety: [base.ok]\n");
+    assert_eq!(answer.of("deploy::safety_answer").len(), 1, "{:#}", answer.0);
+    assert_eq!(answer.0["verdict"], "refused", "{:#}", answer.0);
+}
+
+#[test]
+fn no_coordinator_is_called_operator() {
+    let named = Small::several(CONFIGURATIONS, &[("operator", STATES)], "").check();
+    assert_eq!(named.of("deploy::operator_name").len(), 1, "{:#}", named.0);
+    let small = Small::new(CONFIGURATIONS, STATES, "");
+    small.demo.replace("small.yaml", "name: small", "name: operator");
+    let alone = small.check();
+    let found = texts(&alone, "deploy::operator_name");
+    assert!(found.len() == 1 && found[0].1.contains("`name`"), "{:#}", alone.0);
+}
+
+#[test]
+fn a_bare_undo_is_answered_too() {
+    let waits = "trans { src = \"up\", tgt = \"leaving\", events = { \"undo.done\" } },";
+    let never = check(waits, "");
+    let found = texts(&never, "coord::answer_never_comes");
+    assert!(found.len() == 1 && found[0].0.contains("does not ask for `undo`"), "{:#}", never.0);
+    // Somebody else's word, that ends in the same way.
+    let grasped = check("trans { src = \"up\", tgt = \"leaving\", events = { \"grasp.done\" } },", "");
+    assert!(grasped.of("coord::unknown_answer").is_empty(), "{:#}", grasped.0);
+}
