@@ -7,7 +7,7 @@ use super::Explored;
 use super::product::Product;
 use super::replay::Replay;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
-use super::trace::{Answered, Happened, Place, TraceStep};
+use super::trace::{Happened, Place, TraceStep};
 use super::world::{EMPTY, Top};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
@@ -453,58 +453,6 @@ impl Graph<'_, '_> {
             complete: self.bounds.is_empty() && unfollowed == 0,
             unfollowed,
             without_failure: !with.into_iter().any(|(followed, failed)| !followed && *failed == Failed::Nothing),
-        }
-    }
-}
-
-impl Product<'_> {
-    /// Where all coordinators are.
-    pub fn places(&self, state: &State) -> Vec<Place> {
-        let several = self.members.len() > 1;
-        let place = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| Place {
-            coordinator: several.then(|| member.name.to_string()),
-            state: member.chart.fqn(*leaf).to_string(),
-        };
-        self.members.iter().zip(&state.leaves).map(place).collect()
-    }
-
-    /// Where all of them are, in words.
-    pub fn place(&self, state: &State) -> String {
-        let told = |place: Place| match place.coordinator {
-            Some(name) => format!("{name}:{}", place.state),
-            None => place.state,
-        };
-        self.places(state).into_iter().map(told).collect::<Vec<_>>().join(", ")
-    }
-
-    /// A move as it is told.
-    pub fn told(&self, next: &Next) -> Happened {
-        let name = |number: u8| self.members[usize::from(number)].name.to_string();
-        let event = |number: u8, event| self.members[usize::from(number)].chart.event_text(event);
-        match next.by {
-            Move::Event(at) | Move::Dropped(at) => Happened::Event { event: self.outside[usize::from(at)].to_string() },
-            Move::Time(number, at) => Happened::Time { coordinator: name(number), event: event(number, at) },
-            Move::Taken(number, at) => Happened::Heard { coordinator: name(number), event: event(number, at) },
-            Move::Answer => Happened::Answer {
-                answers: (next.answers.iter())
-                    .map(|(request, verdict)| Answered {
-                        by: request.requester.to_string(),
-                        request: request.ask.to_string(),
-                        answer: verdict.event(request.ask).to_string(),
-                        verdict: *verdict,
-                    })
-                    .collect(),
-            },
-            Move::Confirmed(id) => Happened::Confirmed { configuration: id.to_string() },
-            Move::Lost(id) => Happened::Lost { configuration: id.to_string() },
-            Move::Operator(ask) => Happened::Operator {
-                request: match ask {
-                    Ask::Apply(id) => format!("apply {id}"),
-                    other => format!("undo {}", other.to_string().trim_end_matches(".undo")),
-                },
-            },
-            Move::OthersDown => Happened::Down,
-            Move::Rounds => Happened::Rounds { times: self.deployment.limits.stack },
         }
     }
 }

@@ -27,6 +27,7 @@ mod safety;
 mod shape;
 mod simulated;
 mod state;
+mod told;
 mod trace;
 mod types;
 mod unheard;
