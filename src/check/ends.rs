@@ -1,7 +1,7 @@
 //! How what is under way may end.
 
 use super::product::Product;
-use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, Trouble, Unconfirmed};
 use super::world::{Beside, Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
 use crate::stack::{Request, Requester, Why, given_up_of};
@@ -188,7 +188,14 @@ impl Product<'_> {
         if !left.is_empty() {
             // In the order of the batch.
             given_up.sort_by_key(|undo| given_up_of(undo, &left));
-            given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
+            let known = !self.tells_all || self.worlds.top(next.world).is_none();
+            for undo in given_up {
+                match known || given_up_of(&undo, &left).is_none() {
+                    true => self.give_up_behind(&mut next, number, undo),
+                    // It may have begun with those that are over now.
+                    false => next.stopped.push((number, Stop::GivenUp(undo))),
+                }
+            }
         }
         for undo in late.into_iter().rev() {
             next.desk.comes_next(undo);
@@ -239,6 +246,9 @@ impl Product<'_> {
             return;
         }
         if let Some(top) = self.worlds.top(state.world) {
+            if self.tells_all {
+                self.behind_given_up(state, number, &requests, nexts);
+            }
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
             // What is interrupted is not carried out; an undo of what is not there is done without.
             let done = (interrupted.is_none() || ask.is_undo()).then_some(ask.done());
@@ -265,6 +275,19 @@ impl Product<'_> {
             let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
             met.push(k);
             self.given_up_ends(state, number, &requests, &comes, k, nexts);
+        }
+    }
+
+    /// What stands behind in a batch of which nothing is known, and was given up, had perhaps not begun.
+    fn behind_given_up(&self, state: &State, number: u32, requests: &[Request], nexts: &mut Nexts) {
+        for (at, (of, stop)) in state.stopped.iter().enumerate() {
+            let Stop::GivenUp(undo) = stop else { continue };
+            if *of == number && given_up_of(undo, requests).is_none_or(|place| place > 0) {
+                let mut next = state.clone();
+                next.stopped.remove(at);
+                self.give_up_behind(&mut next, number, *undo);
+                nexts.all.push(Next::plain(Move::Answer, next, Failed::Nothing));
+            }
         }
     }
 

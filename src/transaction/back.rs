@@ -2,7 +2,7 @@
 //! before the failure is finished.
 
 use super::Transaction;
-use super::heed::Heed;
+use super::heed::{Heed, Touched};
 use super::run::Run;
 use crate::model::{Cause, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
@@ -59,6 +59,12 @@ impl WayBack {
     fn add_last(&mut self, step: Step, wave: u32, finishes: Option<u32>) {
         let after = (0..).take(self.list.len()).collect();
         self.add(step, wave, after, None, finishes);
+    }
+
+    /// Adds a step after all others that neither takes back nor finishes anything.
+    pub fn add_behind(&mut self, step: Step) {
+        let wave = self.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);
+        self.add_last(step, wave, None);
     }
 
     /// Adds a step that begins after those; answers its number.
@@ -157,6 +163,9 @@ impl Transaction {
                 _ => way.left_out.extend(left_out.then_some(i)),
             }
             ends[i as usize] = after;
+        }
+        if self.interrupted {
+            self.bring_as_wanted(&mut view, &mut way);
         }
         if part > 0 {
             self.finish_before(part, live, &mut way);
@@ -295,22 +304,37 @@ impl Transaction {
         system
     }
 
+    /// Steps of the forward list that were done and taken back.
+    pub(super) fn taken_back_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &Undo)> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let back = forward.done.iter().filter(|i| self.taken_back.contains(*i));
+        back.map(|i| (&forward.list[*i as usize], &forward.list[*i as usize].undo))
+    }
+
     /// Whether it has done anything that was not taken back.
     pub fn did_anything(&self) -> bool {
         self.origin.is_some() || self.done_so_far().next().is_some()
     }
 
-    /// Takes what it has done out of a picture of the system.
-    pub fn take_out(&self, picture: &mut System) {
+    /// Takes what it has done out of a picture of the system, but for what safe configurations that came before have
+    /// `touched`: that is theirs, and is there already.
+    pub fn take_out(&self, picture: &mut System, touched: &Touched) {
+        let mut theirs = self.touched.clone();
+        theirs.join(touched.clone());
         if let Some(origin) = &self.origin {
-            for step in self.own_difference(picture, origin) {
-                let _ = step::apply(&step, picture);
+            for step in self.own_difference(picture, origin).iter().filter(|step| !theirs.has(step)) {
+                let _ = step::apply(step, picture);
             }
             return;
         }
-        let done: Vec<&Undo> = self.done_so_far().map(|(_, undo)| undo).collect();
-        for back in done.iter().rev().flat_map(|undo| undo.steps()) {
-            let _ = step::apply(back, picture);
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
+        for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
+            for back in self.undo_of(*i, 0).steps() {
+                for back in heed.instead_of(back, &*picture) {
+                    let _ = step::apply(&back, picture);
+                }
+            }
         }
     }
 

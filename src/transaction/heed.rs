@@ -2,10 +2,11 @@
 //! never overwritten, and what is brought back comes back as they want it.
 
 use super::Transaction;
+use super::back::WayBack;
 use super::run::Run;
 use crate::model::{ComponentName, MemberRef, RunState, Step, Transition, Value, Wanted};
 use crate::system::touch::{Slot, components};
-use crate::system::{View, step};
+use crate::system::{Overlay, View, step};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::{SmallVec, smallvec};
 
@@ -121,6 +122,35 @@ impl Transaction {
     pub fn yield_to<'s>(&mut self, later: impl Iterator<Item = &'s Step>) -> bool {
         let slots: FxHashSet<Slot> = later.map(slot).collect();
         self.forward.as_mut().is_some_and(|run| run.leave_out(|step| slots.contains(&slot(step))))
+    }
+}
+
+impl Transaction {
+    /// What was destroyed when safe configurations came, and is brought back, goes on to where they want it: nothing of it was
+    /// there for them to bring anywhere, and their frames tell that they did. Nothing of it moves.
+    pub(super) fn bring_as_wanted(&self, view: &mut Overlay<'_>, way: &mut WayBack) {
+        let destroyed = self.done_so_far().chain(self.taken_back_so_far()).filter_map(|(planned, _)| match planned.step {
+            Step::Destroy { component } => Some(component),
+            _ => None,
+        });
+        let mut components: Vec<ComponentName> =
+            destroyed.filter(|component| self.touched.states.contains_key(component)).collect();
+        components.sort_unstable();
+        components.dedup();
+        for component in components {
+            let goal = self.touched.states[&component];
+            let Some(now) = view.component(component).map(|node| node.state) else { continue };
+            let Some(wanted) = goal.wanted().filter(|_| now != RunState::Faulted && height(goal) > height(now)) else {
+                continue;
+            };
+            for transition in now.path_to(wanted) {
+                let step = Step::State { component, transition: *transition };
+                if step::moves(&step, &*view) || step::apply(&step, view).is_err() {
+                    break;
+                }
+                way.add_behind(step);
+            }
+        }
     }
 }
 
