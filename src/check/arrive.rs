@@ -174,11 +174,14 @@ impl Product<'_> {
         if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if is_safe(id))) {
             let turns: SmallVec<[Turn; 2]> = state.desk.under_way().iter().cloned().collect();
             for Turn { number, batch } in turns {
-                let interrupted =
-                    |(of, stop): &(u32, Stop)| *of == number && matches!(stop, Stop::Interrupted(_));
-                if self.worlds.top(state.world).is_none() && !state.stopped.iter().any(interrupted) {
+                let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+                    Stop::Interrupted(planned) if *of == number => Some(*planned),
+                    _ => None,
+                });
+                let planned = planned.unwrap_or(state.world);
+                if self.worlds.top(planned).is_none() {
                     let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
-                    let takes = self.worlds.comes(state.world, &batch.requests, &beside).takes;
+                    let takes = self.worlds.comes(planned, &batch.requests, &beside).takes;
                     begun.push((number, batch.requests.into_iter().take(takes).collect()));
                 }
             }

@@ -46,9 +46,9 @@ impl Worlds<'_> {
                 let by = frame.requester == undo.requester;
                 by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
             };
-            // That which was the newest then: others may have come since, above it.
-            let count = planned.stack.frames().iter().filter(fits).count();
-            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
+            // Others may have come since, above it; but none that was not there then.
+            let was = planned.stack.frames().iter().any(|frame| fits(&frame));
+            stay.extend(before.stack.frames().iter().find(fits).filter(|_| was).map(|frame| frame.id));
         }
         self.unscoped(id, &stay)
     }

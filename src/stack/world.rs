@@ -73,7 +73,8 @@ impl World {
         let fits = |frame: &&Arc<super::Frame>| {
             (frame.scope, frame.configuration, frame.requester) == (undo.scope, id, undo.requester)
         };
-        self.stack.frames().iter().rev().find(fits).map(|frame| frame.id)
+        // A safe configuration of a later visit may be there already: visits are left in their order.
+        self.stack.frames().iter().find(fits).map(|frame| frame.id)
     }
 
     /// An undo by leaving a state was not carried out: its frame stays, and is one like others.
