@@ -194,7 +194,8 @@ impl Product<'_> {
             self.owed(&mut state, request);
             if *verdict == Verdict::UndoFailed {
                 state.stayed = true;
-                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request));
+                let held = self.beside(&state, None).held;
+                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &held);
                 self.go(&mut state, &went);
             }
             self.due(&mut state, *request, *verdict);

@@ -246,9 +246,6 @@ impl Product<'_> {
             return;
         }
         if let Some(top) = self.worlds.top(state.world) {
-            if self.tells_all {
-                self.behind_given_up(state, number, &requests, nexts);
-            }
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
             // What is interrupted is not carried out; an undo of what is not there is done without.
             let done = (interrupted.is_none() || ask.is_undo()).then_some(ask.done());
@@ -279,13 +276,16 @@ impl Product<'_> {
     }
 
     /// What stands behind in a batch of which nothing is known, and was given up, had perhaps not begun.
-    fn behind_given_up(&self, state: &State, number: u32, requests: &[Request], nexts: &mut Nexts) {
-        for (at, (of, stop)) in state.stopped.iter().enumerate() {
+    pub(super) fn behind_given_up(&self, state: &State, nexts: &mut Nexts) {
+        if !self.tells_all || self.worlds.top(state.world).is_none() {
+            return;
+        }
+        for (at, (number, stop)) in state.stopped.iter().enumerate() {
             let Stop::GivenUp(undo) = stop else { continue };
-            if *of == number && given_up_of(undo, requests).is_none_or(|place| place > 0) {
+            if given_up_of(undo, &Self::requests(state, *number)).is_none_or(|place| place > 0) {
                 let mut next = state.clone();
                 next.stopped.remove(at);
-                self.give_up_behind(&mut next, number, *undo);
+                self.give_up_behind(&mut next, *number, *undo);
                 nexts.all.push(Next::plain(Move::Answer, next, Failed::Nothing));
             }
         }
@@ -353,7 +353,7 @@ impl Product<'_> {
         undone.sort_unstable();
         undone.dedup();
         let undone = undone.into_iter().map(|place| requests[place]);
-        let world = self.worlds.stay(state.world, planned, undone);
+        let world = self.worlds.stay(state.world, planned, undone, &[]);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
         let can: SmallVec<[usize; 2]> =
             comes.parts.iter().filter(|part| part.failed.is_some()).map(|part| part.place).collect();

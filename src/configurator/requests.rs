@@ -208,7 +208,7 @@ impl Engine {
                 // Interrupted with the others, whatever it would have come to after them.
                 Some(reason) if told.place > first && told.verdict.is_some() => {
                     let request = &requests[told.place];
-                    self.world.stays(request);
+                    self.world.stays(request, &[]);
                     answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
                 }
                 _ => answers.push((told.place, told.verdict, told.reason)),
