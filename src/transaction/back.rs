@@ -202,9 +202,14 @@ impl Transaction {
 
     /// What takes back a step that came in after a safe configuration had begun, and the revision of the model it led to.
     fn late(&self, i: u32) -> Option<(&Undo, u64)> {
+        self.late_beside(i, &self.touched)
+    }
+
+    /// The same beside what these safe configurations have touched.
+    fn late_beside(&self, i: u32, touched: &Touched) -> Option<(&Undo, u64)> {
         let forward = self.forward.as_ref().expect("something was carried out");
         let late = forward.late.iter().find(|late| late.step == i)?;
-        let known = self.touched.knew(&forward.list[i as usize].step, late.revision);
+        let known = touched.knew(&forward.list[i as usize].step, late.revision);
         (!known).then_some((&late.undo, late.revision))
     }
 
@@ -330,8 +335,15 @@ impl Transaction {
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
-            for back in self.undo_of(*i, 0).steps() {
-                for back in heed.instead_of(back, &*picture) {
+            let step = &forward.list[*i as usize].step;
+            let late = self.late_beside(*i, &theirs);
+            if late.is_some_and(|(_, revision)| theirs.overwrote(step, revision)) {
+                continue;
+            }
+            for back in late.map_or_else(|| self.undo_of(*i, 0), |(undo, _)| undo).steps() {
+                // What came in late goes back to what safe ones had led to.
+                let goes = if late.is_some() { smallvec![back.clone()] } else { heed.instead_of(back, &*picture) };
+                for back in goes {
                     let _ = step::apply(&back, picture);
                 }
             }

@@ -213,6 +213,30 @@ fn a_second_one_finds_what_the_first_has_left() {
     rig.in_step();
 }
 
+#[test]
+fn a_second_one_finds_what_landed_after_the_first_as_it_was_before() {
+    let rig = about_a();
+    assert_eq!(rig.ask("low"), ["low.ok"]);
+    let before = rig.see();
+    // The step that the first does not know of is back when the second comes.
+    rig.platform.set_delays(slow("cleanup", 0.5));
+    rig.submit("low.undo drop");
+    rig.wait(0.2);
+    rig.submit_as("low", coordinator("c1")).unwrap();
+    rig.wait(0.1);
+    rig.platform.set_delays(slow("operation_call", 0.5));
+    rig.wait(0.25);
+    rig.submit_as("low", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.frames(), ["make", "low", "low", "low"]);
+    for of in ["c2", "c1"] {
+        assert_eq!(rig.ask_as("low.undo", coordinator(of)), ["low.undone"]);
+        assert_eq!(rig.see(), before, "the first is still in force");
+    }
+    rig.in_step();
+}
+
 /// `A` stopped, and a safe configuration that wants it running.
 fn wanted_higher() -> Rig {
     let mut all = vec![
