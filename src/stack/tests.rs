@@ -379,7 +379,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
 fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
     // A safe configuration of the next visit goes before the undo of the first one.
     let mut bench = Bench::new(64);
-    let mass = |value| conf("mass", None, &[], vec![set("A.mass", value)], &[]);
+    let mass = |value| conf("mass", None, &[], vec![set("A.gain", value)], &[]);
     let (first, later) = (mass(1.0), mass(2.0));
     let scope = Some(Scope(7));
     for configuration in [&first, &later] {

@@ -2,11 +2,10 @@
 //! never overwritten, and what is brought back comes back as they want it.
 
 use super::Transaction;
-use super::back::WayBack;
 use super::run::Run;
 use crate::model::{ComponentName, MemberRef, RunState, Step, Transition, Value, Wanted};
 use crate::system::touch::{Slot, components};
-use crate::system::{Overlay, View, step};
+use crate::system::{View, step};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::{SmallVec, smallvec};
 
@@ -83,6 +82,11 @@ impl Touched {
         self.states.extend(other.states);
     }
 
+    /// The run state that is wanted of `component`, if one is.
+    pub fn wants(&self, component: ComponentName) -> Option<RunState> {
+        self.states.get(&component).copied()
+    }
+
     /// Whether nothing was.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
@@ -125,35 +129,6 @@ impl Transaction {
     }
 }
 
-impl Transaction {
-    /// What was destroyed when safe configurations came, and is brought back, goes on to where they want it: nothing of it was
-    /// there for them to bring anywhere, and their frames tell that they did. Nothing of it moves.
-    pub(super) fn bring_as_wanted(&self, view: &mut Overlay<'_>, way: &mut WayBack) {
-        let destroyed = self.done_so_far().chain(self.taken_back_so_far()).filter_map(|(planned, _)| match planned.step {
-            Step::Destroy { component } => Some(component),
-            _ => None,
-        });
-        let mut components: Vec<ComponentName> =
-            destroyed.filter(|component| self.touched.states.contains_key(component)).collect();
-        components.sort_unstable();
-        components.dedup();
-        for component in components {
-            let goal = self.touched.states[&component];
-            let Some(now) = view.component(component).map(|node| node.state) else { continue };
-            let Some(wanted) = goal.wanted().filter(|_| now != RunState::Faulted && height(goal) > height(now)) else {
-                continue;
-            };
-            for transition in now.path_to(wanted) {
-                let step = Step::State { component, transition: *transition };
-                if step::moves(&step, &*view) || step::apply(&step, view).is_err() {
-                    break;
-                }
-                way.add_behind(step);
-            }
-        }
-    }
-}
-
 /// How far a way back has come: which components it will take away again, and which it has brought back.
 pub(super) struct Heed<'t> {
     touched: &'t Touched,
@@ -161,7 +136,8 @@ pub(super) struct Heed<'t> {
     remade: FxHashSet<ComponentName>,
 }
 
-fn height(state: RunState) -> u8 {
+/// How far up a run state is.
+pub(super) fn height(state: RunState) -> u8 {
     match state {
         RunState::Faulted | RunState::Unconfigured => 0,
         RunState::Stopped => 1,
