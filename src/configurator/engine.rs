@@ -308,7 +308,7 @@ impl Engine {
         for (request, verdict, reason) in arrival.told {
             self.owe(request);
             if verdict == Verdict::UndoFailed {
-                let held = self.held_frames();
+                let held = self.frames_left();
                 self.world.stays(&request, &held);
             }
             let reason = (verdict != Verdict::Undone).then_some(reason);

@@ -299,6 +299,16 @@ impl Engine {
         under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
     }
 
+    /// Frames that undos under way are about, also those of which it is known that they stay.
+    pub(super) fn frames_left(&self) -> Vec<FrameId> {
+        let groups = self.running.iter().filter_map(|running| match &running.purpose {
+            Purpose::Requests(_, group) => Some(group),
+            _ => None,
+        });
+        let stay = groups.flat_map(|group| group.stay.iter().map(|(_, frame)| *frame));
+        self.held_frames().into_iter().chain(stay).collect()
+    }
+
     /// What is under way is given up by its own undo.
     pub(super) fn give_up_request(&mut self, number: u32, undo: Request) {
         let of_batch = |running: &&mut Running| matches!(&running.purpose, Purpose::Requests(of, _) if *of == number);
