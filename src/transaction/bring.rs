@@ -10,10 +10,11 @@ impl Transaction {
     /// What was destroyed when safe configurations came, and is brought back, goes on to where they want it: nothing of it was
     /// there for them to bring anywhere, and their frames tell that they did. Nothing of it moves.
     pub(super) fn bring_as_wanted(&self, view: &mut Overlay<'_>, way: &mut WayBack) {
-        let destroyed = self.done_so_far().chain(self.taken_back_so_far()).filter_map(|(planned, _)| match planned.step {
-            Step::Destroy { component } => Some(component),
-            _ => None,
-        });
+        let destroyed =
+            self.done_so_far().chain(self.taken_back_so_far()).filter_map(|(planned, _)| match planned.step {
+                Step::Destroy { component } => Some(component),
+                _ => None,
+            });
         let mut components: Vec<ComponentName> = destroyed.collect();
         components.sort_unstable();
         components.dedup();
