@@ -98,7 +98,12 @@ impl Product<'_> {
             let mut turns = state.desk.under_way().iter();
             turns.any(|turn| given_up_of(undo, &turn.batch.requests).is_some())
         };
-        !arrival.told.is_empty() || !self.stopped_by(state, batch).is_empty() || batch.requests.iter().any(finds)
+        // Who stands in the queue as down may be taken up before a safe configuration makes everything wait.
+        let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
+        !arrival.told.is_empty()
+            || !self.stopped_by(state, batch).is_empty()
+            || batch.requests.iter().any(finds)
+            || !arrival.safe.is_empty() && state.desk.waiting().any(is_down)
     }
 
     /// What is in flight comes now, or later where that makes a difference.
@@ -165,12 +170,32 @@ impl Product<'_> {
             return state;
         }
         let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
+        let mut begun: SmallVec<[(u32, SmallVec<[Request; 2]>); 2]> = SmallVec::new();
+        if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if is_safe(id))) {
+            let turns: SmallVec<[Turn; 2]> = state.desk.under_way().iter().cloned().collect();
+            for Turn { number, batch } in turns {
+                let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+                    Stop::Interrupted(planned) if *of == number => Some(*planned),
+                    _ => None,
+                });
+                let planned = planned.unwrap_or(state.world);
+                if self.worlds.top(planned).is_none() {
+                    let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+                    let takes = self.worlds.comes(planned, &batch.requests, &beside).takes;
+                    begun.push((number, batch.requests.into_iter().take(takes).collect()));
+                }
+            }
+        }
+        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
+        // What has begun was planned as it was asked for.
+        begun.into_iter().for_each(|(number, requests)| state.desk.begun_as(number, &requests));
         for (request, verdict, _) in &arrival.told {
             self.owed(&mut state, request);
             if *verdict == Verdict::UndoFailed {
                 state.stayed = true;
-                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request));
+                let held = self.beside(&state, None).held;
+                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &held);
                 self.go(&mut state, &went);
             }
             self.due(&mut state, *request, *verdict);
@@ -210,7 +235,8 @@ impl Product<'_> {
         });
         let planned = planned.unwrap_or(state.world);
         let begun = match self.worlds.top(planned) {
-            Some(_) => place == 0,
+            // Where nothing is known what stands behind may have begun with the first, or not.
+            Some(_) => place == 0 || self.tells_all,
             None => {
                 let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
                 let comes = self.worlds.comes(planned, &requests, &beside);

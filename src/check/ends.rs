@@ -1,7 +1,7 @@
 //! How what is under way may end.
 
 use super::product::Product;
-use super::state::{Answers, Failed, Nexts, State, Stop, Trouble, Unconfirmed};
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, Trouble, Unconfirmed};
 use super::world::{Beside, Comes, Top, Went, WorldId};
 use crate::model::{Ask, Verdict};
 use crate::stack::{Request, Requester, Why, gave_up, given_up_of};
@@ -186,7 +186,14 @@ impl Product<'_> {
         if !left.is_empty() {
             // In the order of the batch.
             given_up.sort_by_key(|undo| given_up_of(undo, &left));
-            given_up.into_iter().for_each(|undo| self.give_up_behind(&mut next, number, undo));
+            let known = !self.tells_all || self.worlds.top(next.world).is_none();
+            for undo in given_up {
+                match known || given_up_of(&undo, &left).is_none() {
+                    true => self.give_up_behind(&mut next, number, undo),
+                    // It may have begun with those that are over now.
+                    false => next.stopped.push((number, Stop::GivenUp(undo))),
+                }
+            }
         }
         for undo in late.into_iter().rev() {
             next.desk.comes_next(undo);
@@ -266,6 +273,22 @@ impl Product<'_> {
         }
     }
 
+    /// What stands behind in a batch of which nothing is known, and was given up, had perhaps not begun.
+    pub(super) fn behind_given_up(&self, state: &State, nexts: &mut Nexts) {
+        if !self.tells_all || self.worlds.top(state.world).is_none() {
+            return;
+        }
+        for (at, (number, stop)) in state.stopped.iter().enumerate() {
+            let Stop::GivenUp(undo) = stop else { continue };
+            if given_up_of(undo, &Self::requests(state, *number)).is_none_or(|place| place > 0) {
+                let mut next = state.clone();
+                next.stopped.remove(at);
+                self.give_up_behind(&mut next, *number, *undo);
+                nexts.all.push(Next::plain(Move::Answer, next, Failed::Nothing));
+            }
+        }
+    }
+
     /// How a batch under way may end of which that part was given up.
     fn given_up_ends(
         &mut self,
@@ -328,7 +351,7 @@ impl Product<'_> {
         undone.sort_unstable();
         undone.dedup();
         let undone = undone.into_iter().map(|place| requests[place]);
-        let world = self.worlds.stay(state.world, planned, undone);
+        let world = self.worlds.stay(state.world, planned, undone, &[]);
         self.ended(state, number, requests, given.clone(), &world, class, nexts);
         let can: SmallVec<[usize; 2]> =
             comes.parts.iter().filter(|part| part.failed.is_some()).map(|part| part.place).collect();

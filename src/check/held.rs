@@ -2,10 +2,9 @@
 //! is found again in the world that follows.
 
 use super::world::{Beside, Held, Went, WorldId, Worlds, plain};
-use crate::model::{Ask, ConfigId};
+use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Request, Requester, Stack, held};
 use smallvec::SmallVec;
-use std::sync::Arc;
 
 impl Worlds<'_> {
     /// The frames that a batch under way pops or hands over to.
@@ -36,20 +35,19 @@ impl Worlds<'_> {
         alike(&to.stack).get(place).copied()
     }
 
-    /// The world in which these undos were taken back, planned in `planned`: frames that were to be undone with the states
-    /// they belonged to stay without these.
-    pub fn stay(&mut self, id: WorldId, planned: WorldId, undos: impl Iterator<Item = Request>) -> Went {
+    /// The world in which these undos were taken back, planned in `planned`, beside frames that others undo (`held`): frames
+    /// that were to be undone with the states they belonged to stay without these.
+    pub fn stay(
+        &mut self,
+        id: WorldId,
+        planned: WorldId,
+        undos: impl Iterator<Item = Request>,
+        held: &[FrameId],
+    ) -> Went {
         let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
-        let mut stay: SmallVec<[FrameId; 2]> = SmallVec::new();
-        for undo in undos.filter(|undo| undo.scope.is_some()) {
-            let fits = |frame: &&Arc<Frame>| {
-                let by = frame.requester == undo.requester;
-                by && frame.scope == undo.scope && undo.ask == Ask::UndoOf(frame.configuration)
-            };
-            // That which was the newest then: others may have come since, above it.
-            let count = planned.stack.frames().iter().filter(fits).count();
-            stay.extend(before.stack.frames().iter().filter(fits).take(count).last().map(|frame| frame.id));
-        }
+        // Others may have come since, above it; but none that was not there then.
+        let was = undos.filter(|undo| planned.of_visit(undo).is_some());
+        let stay: SmallVec<[FrameId; 2]> = was.filter_map(|undo| before.left_with(&undo, held)).collect();
         self.unscoped(id, &stay)
     }
 

@@ -145,6 +145,7 @@ impl<'a> Product<'a> {
         let mut nexts = Nexts::default();
         // A batch in flight comes when one of those that it would stop is over.
         self.answers_come(state, &mut nexts);
+        self.behind_given_up(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
         let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();

@@ -90,9 +90,8 @@ impl<'a> Reactions<'a> {
     /// The first entry; none when the coordinator cannot be entered.
     pub fn enter(&mut self) -> Option<Reaction> {
         let mut machine = Machine::new(self.chart);
+        // Where it begins in *down* it has come there: it is down until it asks for something.
         let mut hook = self.watch(None);
-        // Nothing was in force before: coming to *down* first means nothing.
-        hook.is_down = true;
         machine.run(self.chart, Time::default(), &mut hook);
         machine.leaf().map(|leaf| hook.reaction(leaf))
     }

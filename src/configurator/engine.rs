@@ -312,7 +312,8 @@ impl Engine {
         for (request, verdict, reason) in arrival.told {
             self.owe(request);
             if verdict == Verdict::UndoFailed {
-                self.world.stays(&request);
+                let held = self.frames_left();
+                self.world.stays(&request, &held);
             }
             let reason = (verdict != Verdict::Undone).then_some(reason);
             self.answer(request, verdict, reason);

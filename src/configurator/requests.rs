@@ -209,7 +209,7 @@ impl Engine {
                 // Interrupted with the others, whatever it would have come to after them.
                 Some(reason) if told.place > first && told.verdict.is_some() => {
                     let request = &requests[told.place];
-                    self.world.stays(request);
+                    self.world.stays(request, &[]);
                     answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
                 }
                 _ => answers.push((told.place, told.verdict, told.reason)),
@@ -298,6 +298,16 @@ impl Engine {
     pub(super) fn held_frames(&self) -> Vec<FrameId> {
         let under_way = self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned()));
         under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
+    }
+
+    /// Frames that undos under way are about, also those of which it is known that they stay.
+    pub(super) fn frames_left(&self) -> Vec<FrameId> {
+        let groups = self.running.iter().filter_map(|running| match &running.purpose {
+            Purpose::Requests(_, group) => Some(group),
+            _ => None,
+        });
+        let stay = groups.flat_map(|group| group.stay.iter().map(|(_, frame)| *frame));
+        self.held_frames().into_iter().chain(stay).collect()
     }
 
     /// What is under way is given up by its own undo.

@@ -118,9 +118,16 @@ impl Engine {
                 self.advance(at);
             }
         }
+        // Safe configurations that came before, and are not over or not told to what was interrupted yet.
+        let mut touched = self.touched.clone();
+        for other in self.running.iter().rev().filter(|other| other.is_safe()) {
+            if let Purpose::Safe(safe) = &other.purpose {
+                touched.join(safe.2.clone());
+            }
+        }
         let mut before: Option<System> = None;
         for running in self.running.iter().filter(|running| meets(running) && running.machine.did_anything()) {
-            running.machine.take_out(before.get_or_insert_with(|| self.world.system.clone()));
+            running.machine.take_out(before.get_or_insert_with(|| self.world.system.clone()), &touched);
         }
         before
     }

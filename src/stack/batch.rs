@@ -209,12 +209,13 @@ fn resolve<'a>(
                     Some(frame) => Some(frame),
                     None => return Resolved::Tell(None, None),
                 },
-                // Leaving a state undoes the frame of that visit and no other.
+                // Leaving a state undoes the frame of that visit and no other; that of a later one, which has gone before
+                // since it is safe, stands above.
                 (_, Some(scope)) => {
                     let of = |f: &&std::sync::Arc<super::Frame>| {
                         f.scope == Some(scope) && f.configuration == id && f.requester == request.requester
                     };
-                    work.frames.iter().rev().find(of)
+                    work.frames.iter().find(of)
                 }
                 _ => work.newest_of(id, own(request)),
             };

@@ -175,6 +175,13 @@ impl Desk {
         }
     }
 
+    /// The first requests of a batch under way are these: what comes later does not change how they are carried out.
+    pub fn begun_as(&mut self, number: u32, requests: &[Request]) {
+        if let Some(turn) = self.under_way.iter_mut().find(|turn| turn.number == number) {
+            turn.batch.requests.iter_mut().zip(requests).for_each(|(own, begun)| *own = *begun);
+        }
+    }
+
     /// Every request that waits or is under way.
     pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
         let waiting = self.waiting.iter_mut();

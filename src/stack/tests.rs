@@ -375,3 +375,35 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
     let frame = bench.stack.frames()[0].id;
     assert_eq!(group.stay[..], [(0, frame)]);
 }
+
+#[test]
+fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
+    // A safe configuration of the next visit goes before the undo of the first one.
+    let mut bench = Bench::new(64);
+    let mass = |value| conf("mass", None, &[], vec![set("A.gain", value)], &[]);
+    let (first, later) = (mass(1.0), mass(2.0));
+    let scope = Some(Scope(7));
+    for configuration in [&first, &later] {
+        bench.ok(&[Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope }]);
+    }
+    let ids: Vec<FrameId> = bench.stack.frames().iter().map(|frame| frame.id).collect();
+    let configurations = std::iter::once((later.id, later)).collect();
+    let context = Context::default();
+    let rules = super::Rules {
+        configurations: &configurations,
+        context: &context,
+        at: Time(0),
+        busy: false,
+        held: &[],
+        joined: false,
+    };
+    let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
+    let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
+    let mut world = super::World::new(bench.system.clone(), bench.stack.clone());
+    let planned = super::take_up(&world, &[undo], &rules).planned.expect("nothing is in its way");
+    assert_eq!(planned.parts[0].edits.pops.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids[..1]);
+    assert_eq!(world.of_visit(&undo), Some(ids[0]));
+    assert_eq!(world.left_with(&undo, &ids[..1]), Some(ids[1]), "the first is being undone: this is about the next");
+    world.stays(&undo, &[]);
+    assert_eq!(world.of_visit(&undo), Some(ids[1]), "what stays of the first is a frame like others");
+}

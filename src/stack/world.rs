@@ -69,16 +69,24 @@ impl World {
 
     /// The frame of the visit that an undo by leaving a state is about; none: it is no such undo, or there is no frame.
     pub fn of_visit(&self, undo: &Request) -> Option<FrameId> {
-        let (Ask::UndoOf(id), Some(_)) = (undo.ask, undo.scope) else { return None };
-        let fits = |frame: &&Arc<super::Frame>| {
-            (frame.scope, frame.configuration, frame.requester) == (undo.scope, id, undo.requester)
-        };
-        self.stack.frames().iter().rev().find(fits).map(|frame| frame.id)
+        self.left_with(undo, &[])
     }
 
-    /// An undo by leaving a state was not carried out: its frame stays, and is one like others.
-    pub fn stays(&mut self, undo: &Request) {
-        if let Some(frame) = self.of_visit(undo) {
+    /// The same beside frames that are being undone by what is under way.
+    pub fn left_with(&self, undo: &Request, held: &[FrameId]) -> Option<FrameId> {
+        let (Ask::UndoOf(id), Some(_)) = (undo.ask, undo.scope) else { return None };
+        let fits = |frame: &&Arc<super::Frame>| {
+            let of = (frame.scope, frame.configuration, frame.requester);
+            of == (undo.scope, id, undo.requester) && !held.contains(&frame.id)
+        };
+        // A safe configuration of a later visit may be there already: visits are left in their order.
+        self.stack.frames().iter().find(fits).map(|frame| frame.id)
+    }
+
+    /// An undo by leaving a state was not carried out: its frame stays, and is one like others. Frames that are being undone
+    /// (`held`) are those of visits before.
+    pub fn stays(&mut self, undo: &Request, held: &[FrameId]) {
+        if let Some(frame) = self.left_with(undo, held) {
             self.stack.unscope(frame);
         }
     }

@@ -2,7 +2,7 @@
 //! before the failure is finished.
 
 use super::Transaction;
-use super::heed::Heed;
+use super::heed::{Heed, Touched};
 use super::run::Run;
 use crate::model::{Cause, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
@@ -59,6 +59,12 @@ impl WayBack {
     fn add_last(&mut self, step: Step, wave: u32, finishes: Option<u32>) {
         let after = (0..).take(self.list.len()).collect();
         self.add(step, wave, after, None, finishes);
+    }
+
+    /// Adds a step after all others that neither takes back nor finishes anything.
+    pub fn add_behind(&mut self, step: Step) {
+        let wave = self.list.iter().map(|step| step.wave + 1).max().unwrap_or(0);
+        self.add_last(step, wave, None);
     }
 
     /// Adds a step that begins after those; answers its number.
@@ -158,6 +164,9 @@ impl Transaction {
             }
             ends[i as usize] = after;
         }
+        if self.interrupted {
+            self.bring_as_wanted(&mut view, &mut way);
+        }
         if part > 0 {
             self.finish_before(part, live, &mut way);
         } else if let Some(origin) = self.origin.as_ref().filter(|_| self.interrupted) {
@@ -193,9 +202,14 @@ impl Transaction {
 
     /// What takes back a step that came in after a safe configuration had begun, and the revision of the model it led to.
     fn late(&self, i: u32) -> Option<(&Undo, u64)> {
+        self.late_beside(i, &self.touched)
+    }
+
+    /// The same beside what these safe configurations have touched.
+    fn late_beside(&self, i: u32, touched: &Touched) -> Option<(&Undo, u64)> {
         let forward = self.forward.as_ref().expect("something was carried out");
         let late = forward.late.iter().find(|late| late.step == i)?;
-        let known = self.touched.knew(&forward.list[i as usize].step, late.revision);
+        let known = touched.knew(&forward.list[i as usize].step, late.revision);
         (!known).then_some((&late.undo, late.revision))
     }
 
@@ -295,22 +309,44 @@ impl Transaction {
         system
     }
 
+    /// Steps of the forward list that were done and taken back.
+    pub(super) fn taken_back_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &Undo)> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let back = forward.done.iter().filter(|i| self.taken_back.contains(*i));
+        back.map(|i| (&forward.list[*i as usize], &forward.list[*i as usize].undo))
+    }
+
     /// Whether it has done anything that was not taken back.
     pub fn did_anything(&self) -> bool {
         self.origin.is_some() || self.done_so_far().next().is_some()
     }
 
-    /// Takes what it has done out of a picture of the system.
-    pub fn take_out(&self, picture: &mut System) {
+    /// Takes what it has done out of a picture of the system, but for what safe configurations that came before have
+    /// `touched`: that is theirs, and is there already.
+    pub fn take_out(&self, picture: &mut System, touched: &Touched) {
+        let mut theirs = self.touched.clone();
+        theirs.join(touched.clone());
         if let Some(origin) = &self.origin {
-            for step in self.own_difference(picture, origin) {
-                let _ = step::apply(&step, picture);
+            for step in self.own_difference(picture, origin).iter().filter(|step| !theirs.has(step)) {
+                let _ = step::apply(step, picture);
             }
             return;
         }
-        let done: Vec<&Undo> = self.done_so_far().map(|(_, undo)| undo).collect();
-        for back in done.iter().rev().flat_map(|undo| undo.steps()) {
-            let _ = step::apply(back, picture);
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
+        for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
+            let step = &forward.list[*i as usize].step;
+            let late = self.late_beside(*i, &theirs);
+            if late.is_some_and(|(_, revision)| theirs.overwrote(step, revision)) {
+                continue;
+            }
+            for back in late.map_or_else(|| self.undo_of(*i, 0), |(undo, _)| undo).steps() {
+                // What came in late goes back to what safe ones had led to.
+                let goes = if late.is_some() { smallvec![back.clone()] } else { heed.instead_of(back, &*picture) };
+                for back in goes {
+                    let _ = step::apply(&back, picture);
+                }
+            }
         }
     }
 

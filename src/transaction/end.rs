@@ -243,10 +243,14 @@ impl Transaction {
         let missing = self.missing(part, live);
         // Interrupted, each part is to blame for what is left of it.
         let forward = self.forward.as_ref().expect("it was carried out");
-        let left: FxHashSet<usize> = remaining.iter().chain(&self.perhaps).map(|i| self.part_of(*i)).collect();
+        let differs: FxHashSet<ComponentName> = residual.components().collect();
+        let about = |i: &u32| touch::components(&forward.list[*i as usize].step).iter().any(|c| differs.contains(c));
+        // Where what remains is told as a difference, it is of whoever has touched that.
+        let open = if whole { self.remaining(part).into_iter().filter(about).collect() } else { remaining.clone() };
+        let left: FxHashSet<usize> = open.iter().chain(&self.perhaps).map(|i| self.part_of(*i)).collect();
         let blamed = left.iter().copied().min().unwrap_or(part);
         let own_left = |at: usize| -> Residual {
-            let own = remaining.iter().filter(|i| self.part_of(**i) == at && !self.is_partly_back(**i));
+            let own = open.iter().filter(|i| self.part_of(**i) == at && !self.is_partly_back(**i));
             Residual {
                 left: own.map(|i| forward.list[*i as usize].step.clone()).collect(),
                 observed: residual.observed,

@@ -82,6 +82,11 @@ impl Touched {
         self.states.extend(other.states);
     }
 
+    /// The run state that is wanted of `component`, if one is.
+    pub fn wants(&self, component: ComponentName) -> Option<RunState> {
+        self.states.get(&component).copied()
+    }
+
     /// Whether nothing was.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
@@ -131,7 +136,8 @@ pub(super) struct Heed<'t> {
     remade: FxHashSet<ComponentName>,
 }
 
-fn height(state: RunState) -> u8 {
+/// How far up a run state is.
+pub(super) fn height(state: RunState) -> u8 {
     match state {
         RunState::Faulted | RunState::Unconfigured => 0,
         RunState::Stopped => 1,

@@ -7,12 +7,13 @@
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
 //! was applied stands. `back`: the way back; `heed`: what it leaves to safe
-//! configurations. `end`: what comes of each part. `messages`: what goes in and out.
+//! configurations; `bring`: where it goes on for them. `end`: what comes of each part. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
 
 mod back;
+mod bring;
 mod end;
 mod heed;
 mod messages;

@@ -2,8 +2,8 @@
 
 use crate::rig::*;
 use davit::configurator::Requester;
-use davit::model::{RunState, Value, Verdict};
-use davit::platform::simulated::{Delays, Fault, StepPattern};
+use davit::model::{Configuration, RunState, Value, Verdict};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, StepPattern};
 use std::time::Duration;
 
 fn up() -> Rig {
@@ -188,4 +188,122 @@ fn of_two_at_once_the_later_wins_and_the_earlier_does_not_write_it() {
     assert_eq!(rig.ask_as("low.undo", coordinator("c1")), ["low.undone"]);
     assert_eq!(gain(&rig), Value::Float(3.0));
     rig.in_step();
+}
+
+#[test]
+fn a_second_one_finds_what_the_first_has_left() {
+    let rig = about_a();
+    let before = rig.see();
+    // `A` is on its way down, with its cleanup still out, when both come.
+    rig.platform.set_delays(slow("cleanup", 0.5));
+    rig.submit("drop");
+    rig.wait(0.2);
+    rig.submit_as("low", coordinator("c1")).unwrap();
+    rig.wait(0.1);
+    rig.submit_as("low", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[1..], ["low.ok", "low.ok", "drop.failed"]);
+    let stopped = rig.see();
+    assert_eq!(stopped.components[&name("A")].state, RunState::Stopped);
+    assert_eq!(rig.ask_as("low.undo", coordinator("c2")), ["low.undone"]);
+    assert_eq!(rig.see(), stopped, "the first is still in force");
+    assert_eq!(rig.ask_as("low.undo", coordinator("c1")), ["low.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
+
+#[test]
+fn a_second_one_finds_what_landed_after_the_first_as_it_was_before() {
+    let rig = about_a();
+    assert_eq!(rig.ask("low"), ["low.ok"]);
+    let before = rig.see();
+    // The step that the first does not know of is back when the second comes.
+    rig.platform.set_delays(slow("cleanup", 0.5));
+    rig.submit("low.undo drop");
+    rig.wait(0.2);
+    rig.submit_as("low", coordinator("c1")).unwrap();
+    rig.wait(0.1);
+    rig.platform.set_delays(slow("operation_call", 0.5));
+    rig.wait(0.25);
+    rig.submit_as("low", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.frames(), ["make", "low", "low", "low"]);
+    for of in ["c2", "c1"] {
+        assert_eq!(rig.ask_as("low.undo", coordinator(of)), ["low.undone"]);
+        assert_eq!(rig.see(), before, "the first is still in force");
+    }
+    rig.in_step();
+}
+
+/// `A` stopped, and a safe configuration that wants it running.
+fn wanted_higher() -> Rig {
+    let mut all = vec![
+        configuration("make", "", "create A; create B", "A:stopped"),
+        configuration("drop", "", "destroy A; call B.open", ""),
+        configuration("hold_up", "", "", "A:running"),
+    ];
+    all[2].safe = true;
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    rig
+}
+
+#[test]
+fn what_comes_back_goes_on_to_where_it_wants_it() {
+    for fails in [None, Some("configure A"), Some("start A")] {
+        let rig = wanted_higher();
+        let before = rig.see();
+        rig.platform.set_delays(slow("operation_call", 0.5));
+        rig.submit("drop");
+        rig.wait(0.2);
+        assert!(!rig.see().components.contains_key(&name("A")));
+        if let Some(step) = fails {
+            rig.inject(step, Fault::Fail);
+        }
+        rig.submit("hold_up");
+        rig.wait(50.0);
+        rig.platform.set_delays(Delays::default());
+        assert_eq!(rig.events()[1..], ["hold_up.ok", "drop.failed"], "{fails:?}");
+        assert_eq!(rig.see().components[&name("A")].state, RunState::Running, "{fails:?}");
+        assert_eq!(rig.ask("hold_up.undo"), ["hold_up.undone"]);
+        assert_eq!(rig.see(), before);
+        rig.in_step();
+    }
+}
+
+#[test]
+fn of_what_it_interrupted_that_is_broken_of_which_something_is_left() {
+    let all = vec![
+        configuration("make", "", "create A; create B; set A.k 3", ""),
+        configuration("same", "", "set A.k 3", ""),
+        configuration("gain", "", "set A.k 7", ""),
+        configuration("more", "", "create C", "C:stopped"),
+        Configuration { safe: true, ..configuration("low", "", "set B.k 1", "") },
+    ];
+    // Nothing is left of an undo without a step; of the other nothing could be taken back, since the way back ends before.
+    for (undone, verdict, value) in [("same", "failed", 3.0), ("gain", "broken", 3.0)] {
+        let rig = Rig::new(all.clone());
+        assert_eq!(rig.ask("make"), ["make.ok"]);
+        assert_eq!(rig.ask(undone), [format!("{undone}.ok")]);
+        rig.platform.set_delays(slow("configure", 0.5));
+        rig.submit(&format!("{undone}.undo more"));
+        rig.wait(0.2);
+        rig.platform.set_faults(Faults::new([FaultRule::on("destroy", Fault::Fail).times(100)]));
+        rig.submit("low");
+        rig.wait(50.0);
+        rig.platform.set_delays(Delays::default());
+        let (undo, broken) = (format!("{undone}.undo.{verdict}"), "more.broken".to_owned());
+        assert_eq!(rig.events()[2..], ["low.ok".to_owned(), undo, broken]);
+        assert_eq!(rig.frames(), ["make", undone, "more", "low"]);
+        assert_eq!(gain(&rig), Value::Float(value));
+        assert!(rig.see().components.contains_key(&name("C")));
+        if verdict == "failed" {
+            assert_eq!(rig.ask("more.undo"), ["more.undone"]);
+            assert!(!rig.see().components.contains_key(&name("C")));
+        }
+        rig.in_step();
+        rig.each_answered_once();
+    }
 }
