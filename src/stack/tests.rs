@@ -395,6 +395,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         at: Time(0),
         busy: false,
         held: &[],
+        operator: &rustc_hash::FxHashSet::default(),
         joined: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
