@@ -280,6 +280,8 @@ impl Engine {
             self.desk.over(turn.number);
         }
         self.giving_up.clear();
+        // It may have been taking everything down: what comes from now on begins again.
+        self.taking_down = false;
         let seen = self.look();
         let observed = seen.is_some_and(|seen| self.adopt(&seen).is_ok());
         let residual =
