@@ -1,9 +1,9 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
+use super::outcome::Beside;
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
-use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
@@ -181,7 +181,7 @@ impl Product<'_> {
                 let planned = planned.unwrap_or(state.world);
                 if self.worlds.top(planned).is_none() {
                     let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
-                    let takes = self.worlds.comes(planned, &batch.requests, &beside).takes;
+                    let takes = self.worlds.comes(planned, &batch.requests, &beside).takes();
                     begun.push((number, batch.requests.into_iter().take(takes).collect()));
                 }
             }
@@ -241,10 +241,10 @@ impl Product<'_> {
                 let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
                 let comes = self.worlds.comes(planned, &requests, &beside);
                 // What was begun as one stays so, whatever of it is answered now.
-                if comes.takes > 1 && !beside.joined {
+                if comes.takes() > 1 && !beside.joined {
                     state.joined.push(number);
                 }
-                comes.parts.iter().any(|part| part.place == place)
+                comes.group.places.contains(&place)
             }
         };
         if begun {

@@ -6,9 +6,9 @@
 
 use super::beside;
 use super::members::Member;
+use super::outcome::Held;
 use super::product::Product;
 use super::state::{Move, Next, State};
-use super::world::Held;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;

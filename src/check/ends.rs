@@ -1,25 +1,26 @@
 //! How what is under way may end.
 
+use super::outcome::{Beside, Comes, Went, WorldId};
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, Trouble, Unconfirmed};
-use super::world::{Beside, Comes, Top, Went, WorldId};
+use super::world::Top;
 use crate::model::{Ask, Verdict};
-use crate::stack::{Request, Requester, Why, gave_up, given_up_of};
+use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, gave_up, given_up_of, settle};
+use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 
-/// A request as it is answered: what takes back what was not confirmed tells of that.
-fn as_told(request: Request, verdict: Verdict) -> (Request, Verdict) {
-    match (request.why, verdict, request.ask) {
-        (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
-            (Request { ask: Ask::Apply(id), why: Why::Asked, ..request }, Verdict::Reverted)
-        }
-        (Why::Unconfirmed(..), ..) => (Request { why: Why::Asked, ..request }, verdict),
-        _ => (request, verdict),
-    }
+/// How a group under way has ended: what it leads to, and the answers.
+struct End<'e> {
+    went: &'e Went,
+    /// The requests that are answered: place and verdict; none: nobody is told.
+    given: SmallVec<[(usize, Option<Verdict>); 2]>,
+    class: Failed,
 }
 
-/// Requests of a batch that are answered: place and verdict; none: nobody is told.
-type Given = SmallVec<[(usize, Option<Verdict>); 2]>;
+/// Who is answered what, as it is settled.
+fn given(settled: &Settled) -> SmallVec<[(usize, Option<Verdict>); 2]> {
+    settled.answers.iter().map(|(place, verdict, _)| (*place, *verdict)).collect()
+}
 
 impl Product<'_> {
     fn requests(state: &State, number: u32) -> SmallVec<[Request; 2]> {
@@ -39,71 +40,34 @@ impl Product<'_> {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
             }
         }
-        let from = nexts.all.len();
-        let done = Self::done_before(&requests, &comes, comes.parts.len(), comes.takes);
-        self.ended(state, number, &requests, done, &comes.done, Failed::Nothing, nexts);
-        let deep = (comes.done.deep, comes.done.left);
-        nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
-        for (k, part) in comes.parts.iter().enumerate() {
-            if part.failed.is_some() {
-                let ask = requests[part.place].ask;
-                self.fails(state, number, &requests, &comes, k, nexts);
-                self.missing(state, number, &requests, &comes, k, &[ask.failed(), ask.broken()], nexts);
+        for endings in endings(&comes.can_fail, Stopping::Not, self.tells_all) {
+            let from = nexts.all.len();
+            self.ends_so(state, number, &requests, &comes, &endings, nexts);
+            if endings.iter().all(|ending| *ending == Ending::Done) {
+                let deep = (comes.done.deep, comes.done.left);
+                nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
             }
         }
     }
 
-    /// A part fails, or is left broken; those before it are done.
-    fn fails(&mut self, state: &State, number: u32, requests: &[Request], comes: &Comes, k: usize, nexts: &mut Nexts) {
-        let part = &comes.parts[k];
-        let Some(went) = &part.failed else { return };
-        let ask = requests[part.place].ask;
-        let mut failed = Self::done_before(requests, comes, k, part.place);
-        let mut broken = failed.clone();
-        failed.push((part.place, Some(ask.failed())));
-        let class = if part.undo { Failed::Undo } else { Failed::Apply };
-        self.ended(state, number, requests, failed, went, class, nexts);
-        broken.push((part.place, Some(ask.broken())));
-        self.broke(state, number, requests, broken, nexts);
-    }
-
-    /// What stands before a part that ends so was to stand, and cannot be finished: it is broken too.
-    #[allow(clippy::too_many_arguments)]
-    fn missing(
+    /// The parts of a group under way have ended so, and no safe configuration interrupts them.
+    fn ends_so(
         &mut self,
         state: &State,
         number: u32,
         requests: &[Request],
         comes: &Comes,
-        k: usize,
-        verdicts: &[Verdict],
+        endings: &[Ending],
         nexts: &mut Nexts,
     ) {
-        // Nothing is known after either; only whoever compares answers minds which ones it were.
-        for some in 1..1u32 << if self.tells_all { k.min(4) } else { 0 } {
-            let is_broken = |part: usize| some & (1 << part) != 0;
-            let first = comes.parts[some.trailing_zeros() as usize].place;
-            let mut given: Given = comes.told.iter().copied().filter(|(told, _)| *told < first).collect();
-            for (at, part) in comes.parts[..k].iter().enumerate() {
-                let ask = requests[part.place].ask;
-                given.push((part.place, Some(if is_broken(at) { ask.broken() } else { ask.done() })));
-            }
-            for verdict in verdicts {
-                let mut given = given.clone();
-                given.push((comes.parts[k].place, Some(*verdict)));
-                given.sort_by_key(|(place, _)| *place);
-                self.broke(state, number, requests, given, nexts);
-            }
-        }
-    }
-
-    /// The answers when the first `parts` are done: theirs, and what is told before `place`.
-    fn done_before(requests: &[Request], comes: &Comes, parts: usize, place: usize) -> Given {
-        let done = comes.parts[..parts].iter().map(|part| (part.place, Some(requests[part.place].ask.done())));
-        let told = comes.told.iter().copied().filter(|(told, _)| *told < place);
-        let mut given: Given = done.chain(told).collect();
-        given.sort_by_key(|(place, _)| *place);
-        given
+        let given = given(&settle(requests, &comes.group, endings, Stopped::Not));
+        let Some(went) = comes.went(endings) else { return self.broke(state, number, requests, given, nexts) };
+        let class = match endings.iter().position(|ending| *ending == Ending::Failed) {
+            Some(part) if comes.undoes(part, requests) => Failed::Undo,
+            Some(_) => Failed::Apply,
+            None => Failed::Nothing,
+        };
+        self.ended(state, number, requests, &End { went, given, class }, nexts);
     }
 
     /// Nothing is known: each request may end in any way, one after the other.
@@ -111,45 +75,34 @@ impl Product<'_> {
         let ask = requests[0].ask;
         for verdict in [ask.done(), ask.failed(), ask.broken()] {
             let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
-            let given = Given::from_iter([(0, Some(verdict))]);
-            self.ended(state, number, requests, given, &went, Failed::Nothing, nexts);
+            self.ended(state, number, requests, &End::of_first(&went, Some(verdict)), nexts);
         }
         if matches!(requests[0].why, Why::Unconfirmed(..)) {
             // Nobody is told where the frame is gone.
-            self.ended(
-                state,
-                number,
-                requests,
-                Given::from_iter([(0, None)]),
-                &Went::to(state.world),
-                Failed::Nothing,
-                nexts,
-            );
+            self.ended(state, number, requests, &End::of_first(&Went::to(state.world), None), nexts);
         }
     }
 
     /// Something of a batch under way is left in between.
-    fn broke(&mut self, state: &State, number: u32, requests: &[Request], given: Given, nexts: &mut Nexts) {
+    fn broke(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        given: SmallVec<[(usize, Option<Verdict>); 2]>,
+        nexts: &mut Nexts,
+    ) {
         let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
         let mut state = state.clone();
         if !self.tells_all {
             state.unconfirmed.clear();
         }
-        self.ended(&state, number, requests, given, &Went::to(world), Failed::Broken, nexts);
+        self.ended(&state, number, requests, &End { went: &Went::to(world), given, class: Failed::Broken }, nexts);
     }
 
     /// These requests of a batch under way are answered, and the world has become another one.
-    #[allow(clippy::too_many_arguments)]
-    fn ended(
-        &mut self,
-        state: &State,
-        number: u32,
-        requests: &[Request],
-        given: Given,
-        went: &Went,
-        failed: Failed,
-        nexts: &mut Nexts,
-    ) {
+    fn ended(&mut self, state: &State, number: u32, requests: &[Request], end: &End<'_>, nexts: &mut Nexts) {
+        let End { went, given, class } = end;
         let mut next = state.clone();
         self.go(&mut next, went);
         let mut given_up: SmallVec<[Request; 1]> = SmallVec::new();
@@ -167,10 +120,10 @@ impl Product<'_> {
         }
         let mut answers = Answers::new();
         let mut late: SmallVec<[Request; 1]> = SmallVec::new();
-        for (place, verdict) in &given {
+        for (place, verdict) in given {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
-            answers.push(as_told(request, verdict));
+            answers.push(request.as_told(verdict));
             let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
             // It may have been given up more than once.
             while let Some(at) = given_up.iter().position(fits) {
@@ -199,7 +152,7 @@ impl Product<'_> {
             next.desk.comes_next(undo);
         }
         for next in self.lands(next) {
-            self.tell(next, answers.clone(), failed, nexts);
+            self.tell(next, answers.clone(), *class, nexts);
         }
     }
 
@@ -252,13 +205,12 @@ impl Product<'_> {
                     true => Went::to(state.world),
                     false => Went::to(self.worlds.answered(top, &requests[0], verdict)),
                 };
-                let given = Given::from_iter([(0, Some(verdict))]);
-                self.ended(state, number, &requests, given, &went, Failed::Nothing, nexts);
+                self.ended(state, number, &requests, &End::of_first(&went, Some(verdict)), nexts);
             }
             return;
         }
         let comes = self.comes(state, number, &requests);
-        let first = |given_up: &[usize]| comes.parts.iter().position(|part| given_up.contains(&part.place));
+        let first = |given_up: &[usize]| comes.group.places.iter().position(|place| given_up.contains(place));
         // It may be refused by now, or have been; or it was on its way back, or through, when that came.
         if self.tells_all || first(&given_up).is_none() {
             self.ends(state, number, nexts);
@@ -269,7 +221,9 @@ impl Product<'_> {
         for count in some..=given_up.len() {
             let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
             met.push(k);
-            self.given_up_ends(state, number, &requests, &comes, k, nexts);
+            for endings in endings(&comes.can_fail, Stopping::GivenUp(k), self.tells_all) {
+                self.ends_so(state, number, &requests, &comes, &endings, nexts);
+            }
         }
     }
 
@@ -289,35 +243,6 @@ impl Product<'_> {
         }
     }
 
-    /// How a batch under way may end of which that part was given up.
-    fn given_up_ends(
-        &mut self,
-        state: &State,
-        number: u32,
-        requests: &[Request],
-        comes: &Comes,
-        k: usize,
-        nexts: &mut Nexts,
-    ) {
-        // One before it may fail meanwhile.
-        for before in 0..if self.tells_all { 0 } else { k } {
-            self.fails(state, number, requests, comes, before, nexts);
-        }
-        let part = &comes.parts[k];
-        let mut cancelled = Self::done_before(requests, comes, k, part.place);
-        let mut broken = cancelled.clone();
-        cancelled.push((part.place, Some(Verdict::Cancelled)));
-        self.ended(state, number, requests, cancelled, &part.before, Failed::Nothing, nexts);
-        // The last of it may have been done when that came.
-        let done = Self::done_before(requests, comes, comes.parts.len(), comes.takes);
-        self.ended(state, number, requests, done, &comes.done, Failed::Nothing, nexts);
-        if part.failed.is_some() {
-            broken.push((part.place, Some(Verdict::Broken)));
-            self.broke(state, number, requests, broken, nexts);
-        }
-        self.missing(state, number, requests, comes, k, &[Verdict::Cancelled, Verdict::Broken], nexts);
-    }
-
     /// How a batch may end that a safe configuration has interrupted: it is taken back, as far as it was planned in the world
     /// from before.
     fn interrupted_ends(
@@ -331,38 +256,21 @@ impl Product<'_> {
     ) {
         let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
         let comes = self.worlds.comes(planned, requests, &beside);
-        let end =
-            |place: usize| if given_up.contains(&place) { Verdict::Cancelled } else { requests[place].ask.failed() };
-        // What was decided of those behind took the first for done.
-        let first = comes.parts.first().map_or(usize::MAX, |part| part.place);
-        let told = |(place, verdict): (usize, Option<Verdict>)| {
-            (place, verdict.map(|verdict| if place < first { verdict } else { requests[place].ask.failed() }))
-        };
-        let mut given: Given = comes.told.iter().copied().map(told).collect();
-        given.extend(comes.parts.iter().map(|part| (part.place, Some(end(part.place)))));
-        given.sort_by_key(|(place, _)| *place);
+        let parts = comes.group.places.iter().enumerate();
+        let given_up: SmallVec<[usize; 2]> =
+            parts.filter(|(_, place)| given_up.contains(place)).map(|(part, _)| part).collect();
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
-        let undo = comes.parts.iter().any(|part| part.undo);
+        let undo = (0..comes.can_fail.len()).any(|part| comes.undoes(part, requests));
         let class = if undo { Failed::Undo } else { Failed::Nothing };
-        let undone = comes.parts.iter().filter(|part| part.undo).map(|part| part.place);
-        let refused =
-            given.iter().filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed)).map(|(place, _)| *place);
-        let mut undone: SmallVec<[usize; 2]> = undone.chain(refused).collect();
-        undone.sort_unstable();
-        undone.dedup();
-        let undone = undone.into_iter().map(|place| requests[place]);
-        let world = self.worlds.stay(state.world, planned, undone, &[]);
-        self.ended(state, number, requests, given.clone(), &world, class, nexts);
-        let can: SmallVec<[usize; 2]> =
-            comes.parts.iter().filter(|part| part.failed.is_some()).map(|part| part.place).collect();
-        // Of each part something may be left; only whoever compares answers minds of which.
-        let all = if self.tells_all { (1u32 << can.len().min(5)) - 1 } else { u32::from(!can.is_empty()) };
-        for some in 1..=all {
-            let left = |place: usize| can.iter().position(|of| *of == place).is_some_and(|at| some & (1 << at) != 0);
-            let broken = |(place, verdict): (usize, Option<Verdict>)| {
-                (place, if left(place) { Some(requests[place].ask.broken()) } else { verdict })
-            };
-            self.broke(state, number, requests, given.iter().copied().map(broken).collect(), nexts);
+        for endings in endings(&comes.can_fail, Stopping::Safe(&given_up), self.tells_all) {
+            let settled = settle(requests, &comes.group, &endings, Stopped::Safe);
+            if endings.contains(&Ending::Broken) {
+                self.broke(state, number, requests, given(&settled), nexts);
+                continue;
+            }
+            let stay = settled.stay.iter().map(|(place, _)| requests[*place]);
+            let went = self.worlds.stay(state.world, planned, stay, &[]);
+            self.ended(state, number, requests, &End { went: &went, given: given(&settled), class }, nexts);
         }
     }
 
@@ -415,9 +323,9 @@ impl Product<'_> {
     }
 }
 
-impl Went {
-    /// To a world of which no frames are known.
-    pub(super) fn to(world: super::world::WorldId) -> Self {
-        Self { world, places: None, pushed: SmallVec::new(), deep: None, left: None }
+impl<'e> End<'e> {
+    /// The first request is answered so.
+    fn of_first(went: &'e Went, verdict: Option<Verdict>) -> Self {
+        Self { went, given: SmallVec::from_iter([(0, verdict)]), class: Failed::Nothing }
     }
 }

@@ -4,11 +4,12 @@
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::Explored;
+use super::outcome::EMPTY;
 use super::product::Product;
 use super::replay::Replay;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
 use super::trace::{Happened, Place, TraceStep};
-use super::world::{EMPTY, Top};
+use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
 use crate::stack::{Request, Requester};

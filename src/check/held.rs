@@ -1,7 +1,8 @@
 //! Frames of a world: which are held by what is under way, which stay though the state they belonged to was left, and how one
 //! is found again in the world that follows.
 
-use super::world::{Beside, Held, Went, WorldId, Worlds, plain};
+use super::outcome::{Beside, Held, Went, WorldId};
+use super::world::{Worlds, plain};
 use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Request, Requester, Stack, held};
 use smallvec::SmallVec;

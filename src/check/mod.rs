@@ -6,6 +6,7 @@
 mod alike;
 mod arrive;
 mod beside;
+mod comes;
 mod configurations;
 mod coordinator;
 mod declared;
@@ -18,6 +19,7 @@ mod held;
 mod judge;
 mod members;
 mod monitors;
+mod outcome;
 mod outside;
 mod product;
 mod purity;

@@ -152,7 +152,7 @@ impl Product<'_> {
             self.tell(left, stays, Failed::Undo, nexts);
             return;
         }
-        if comes.parts.iter().any(|part| part.failed.is_some()) {
+        if comes.can_fail.contains(&true) {
             self.tell(left.clone(), stays, Failed::Undo, nexts);
             let mut broken = left.clone();
             broken.unconfirmed.clear();

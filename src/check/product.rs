@@ -12,9 +12,10 @@
 
 use super::coordinator::outside_events;
 use super::members::{Member, hears_loss, members};
+use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
-use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
+use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};

@@ -5,9 +5,9 @@
 //! several of them has a slow step as long. What has no step takes no time: a way on which such a batch is still under way
 //! when something else happens is gone in another order, and a script that replays it fails there.
 
+use super::outcome::Beside;
 use super::product::Product;
 use super::state::{Move, Next, State, Stop};
-use super::world::Beside;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
 use crate::stack::Request;

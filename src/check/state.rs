@@ -1,6 +1,6 @@
 //! The states of the product, and the moves between them.
 
-use super::world::WorldId;
+use super::outcome::WorldId;
 use crate::model::{Ask, ConfigId, Findings, Verdict};
 use crate::stack::{Batch, Desk, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};

@@ -1,6 +1,7 @@
 //! Worlds of which not everything is known: what is left in between is nobody's to tell.
 
-use super::world::{EMPTY, Top, WorldId, Worlds};
+use super::outcome::{EMPTY, WorldId};
+use super::world::{Top, Worlds};
 use crate::model::{Ask, ChangeKind, ConfigId, TypeName, Verdict};
 use crate::stack::Request;
 

@@ -8,14 +8,13 @@
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
 use super::alike::{hash_system, same_system};
+use super::outcome::{Beside, Comes, Held, SafeComes, Went, WorldId};
 use super::shape::{Counted, Shapes, Undone};
 use crate::limits;
-use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, Verdict};
-use crate::plan::{Context, PlannedStep, Refusal, plan};
+use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
+use crate::plan::{Context, Refusal, plan};
 use crate::stack::claims::Claims;
-use crate::stack::{
-    Effort, Frame, FrameId, Group, Planned, Reason, Request, Requester, Rules, Stack, World, effort, take_up,
-};
+use crate::stack::{Effort, Frame, FrameId, Reason, Request, Requester, Rules, Stack, World, effort, take_up};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -24,12 +23,6 @@ use std::collections::BTreeSet;
 use std::hash::{Hash, Hasher};
 use std::rc::Rc;
 use std::sync::Arc;
-
-/// The number of a world.
-pub type WorldId = u32;
-
-/// The world in which nothing was applied.
-pub const EMPTY: WorldId = 0;
 
 /// What is known of a world of which not everything is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -52,76 +45,10 @@ struct Exact {
     ids: Vec<FrameId>,
 }
 
-/// Where something leads to.
-#[derive(Debug, Clone)]
-pub struct Went {
-    /// The world.
-    pub world: WorldId,
-    /// Of each frame that counted before, its place among those that count now; none: nothing was asked about that.
-    pub places: Option<Rc<Vec<Option<u8>>>>,
-    /// The places of the frames that were pushed, with the configurations.
-    pub pushed: SmallVec<[(ConfigId, u8); 1]>,
-    /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames then.
-    pub deep: Option<ConfigId>,
-    /// The same with [`limits::CHECK_LEFT`].
-    pub left: Option<ConfigId>,
-}
-
-/// A part of a group that is carried out.
-#[derive(Debug, Clone)]
-pub struct PartOf {
-    /// The place of its request in the batch.
-    pub place: usize,
-    /// When it was given up: those before it stand.
-    pub before: Went,
-    /// When it failed; none: there is nothing in it that can.
-    pub failed: Option<Went>,
-    /// Whether something is undone.
-    pub undo: bool,
-}
-
-/// What the first requests of a batch come to.
-#[derive(Debug, Clone)]
-pub struct Comes {
-    /// Told without being carried out: place and verdict.
-    pub told: SmallVec<[(usize, Option<Verdict>); 2]>,
-    /// Those that are told because they are refused.
-    pub refused: Vec<(usize, Rc<Findings>)>,
-    /// What is carried out; empty: nothing.
-    pub parts: Vec<PartOf>,
-    /// When all is done.
-    pub done: Went,
-    /// So many requests are settled then.
-    pub takes: usize,
-}
-
-/// Frames that must stay as they are.
-pub type Held = SmallVec<[FrameId; 2]>;
-
-/// What is under way beside a batch, as far as the batch minds it.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
-pub struct Beside {
-    /// Frames that others pop or hand over to, or that wait for their confirmation.
-    pub held: Held,
-    /// The batch was begun as one, and some of it were answered since.
-    pub joined: bool,
-}
-
-/// What a safe configuration comes to.
-#[derive(Debug, Clone)]
-pub struct SafeComes {
-    /// When all of it is done that can be.
-    pub done: Went,
-    /// What of it cannot be done there: then it ends *broken*.
-    pub troubles: Rc<Findings>,
-    /// Whether a step of it can fail.
-    pub may_fail: bool,
-}
-
 /// All worlds that were met.
 pub struct Worlds<'a> {
     deployment: &'a Deployment,
-    configurations: FxHashMap<ConfigId, Configuration>,
+    pub(super) configurations: FxHashMap<ConfigId, Configuration>,
     operator: FxHashSet<ConfigId>,
     /// What requests may touch, by their text.
     pub claims: Claims,
@@ -131,13 +58,13 @@ pub struct Worlds<'a> {
     confirms: bool,
     worlds: Vec<Known>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
+    pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
-    asked: FxHashSet<ConfigId>,
+    pub(super) asked: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
-    warned: FxHashSet<(Code, String)>,
+    pub(super) warned: FxHashSet<(Code, String)>,
 }
 
 /// Requests without what means nothing to what they come to.
@@ -239,24 +166,7 @@ impl<'a> Worlds<'a> {
         self.configurations.get(&id)
     }
 
-    /// What the rest of a batch comes to in a world that is known.
-    pub fn comes(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Rc<Comes> {
-        let key = (id, plain(requests), beside.clone());
-        if let Some(known) = self.comes.get(&key) {
-            return known.clone();
-        }
-        let comes = Rc::new(self.work_out(id, &key.1, beside));
-        self.comes.insert(key, comes.clone());
-        comes
-    }
-
-    /// The first requests of a batch, as the stack decides.
-    pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
-        let rules = Rules { held: &beside.held, joined: beside.joined, ..self.rules() };
-        self.get(id).map(|world| take_up(world, requests, &rules))
-    }
-
-    fn rules(&self) -> Rules<'_> {
+    pub(super) fn rules(&self) -> Rules<'_> {
         Rules {
             configurations: &self.configurations,
             operator: &self.operator,
@@ -266,79 +176,6 @@ impl<'a> Worlds<'a> {
             held: &[],
             joined: false,
         }
-    }
-
-    fn work_out(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Comes {
-        self.asked.extend(requests.iter().filter_map(|r| if let Ask::Apply(id) = r.ask { Some(id) } else { None }));
-        let group = self.group(id, requests, beside).unwrap_or_default();
-        let refused = group.told.iter().filter_map(|told| {
-            let reasons = match told.reason.as_ref()? {
-                Reason::Overtaken | Reason::GivenUp | Reason::SafeCame(_) => return None,
-                other => other.findings(),
-            };
-            Some((told.place, Rc::new(reasons)))
-        });
-        let mut comes = Comes {
-            told: group.told.iter().map(|told| (told.place, told.verdict)).collect(),
-            refused: refused.collect(),
-            parts: Vec::new(),
-            done: Went::to(id),
-            takes: group.takes.max(1),
-        };
-        let refused = |before: usize| -> Held {
-            group.stay.iter().filter(|(place, _)| *place < before).map(|(_, frame)| *frame).collect()
-        };
-        let Some(planned) = group.planned else {
-            comes.done = self.unscoped(id, &refused(comes.takes));
-            return comes;
-        };
-        let held = &beside.held;
-        for warning in &planned.warnings {
-            if self.warned.insert((warning.code, warning.message.clone())) {
-                self.warnings.push(warning.clone());
-            }
-        }
-        let mut may_fail = vec![false; planned.parts.len()];
-        for at in 0..planned.steps.len() {
-            may_fail[planned.part_of(planned.place(at))] = true;
-        }
-        for (k, part) in planned.parts.iter().enumerate() {
-            let place = group.places[k];
-            let holds = part.pushes.and_then(|id| self.configurations.get(&id)).is_some_and(|c| c.holds.is_some());
-            let mut stay = refused(place);
-            let before = self.after(id, &planned, k, &stay, held);
-            let request = &requests[place];
-            let stays = part.frame.as_ref().filter(|_| request.ask.is_undo() && request.scope.is_some());
-            let failed = (may_fail[k] || holds).then(|| match stays {
-                Some(frame) => {
-                    stay.push(frame.id);
-                    self.after(id, &planned, k, &stay, held)
-                }
-                None => before.clone(),
-            });
-            comes.parts.push(PartOf { place, before, failed, undo: part.pushes.is_none() });
-        }
-        comes.done = self.after(id, &planned, planned.parts.len(), &refused(comes.takes), held);
-        comes
-    }
-
-    /// The world after the first `parts` of a plan. `stay`: frames that were to be undone with the state they belonged to.
-    fn after(&mut self, id: WorldId, planned: &Planned, parts: usize, stay: &[FrameId], held: &[FrameId]) -> Went {
-        if parts == 0 {
-            return self.unscoped(id, stay);
-        }
-        let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
-        let mut world = before.clone();
-        if parts == planned.parts.len() {
-            planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
-        } else {
-            let steps = planned.parts[..parts].last().map_or(0, |part| part.range.end as usize);
-            planned.whole()[..steps].iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
-        }
-        let edits = planned.parts[..parts].iter().map(|part| &part.edits);
-        let pushed = world.stack.apply(edits, held);
-        stay.iter().for_each(|frame| world.stack.unscope(*frame));
-        self.went(id, world, &pushed)
     }
 
     /// What a safe configuration comes to in a world that is known.
@@ -430,13 +267,6 @@ impl<'a> Worlds<'a> {
         let alone = World::new(world.system.clone(), stack);
         let group = take_up(&alone, std::slice::from_ref(request), &self.rules());
         group.told.iter().any(|told| told.reason.is_some())
-    }
-
-    /// The steps of a group, for who shows them.
-    pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
-        self.group(id, requests, &Beside::default())
-            .and_then(|group| group.planned)
-            .map_or_else(Vec::new, |planned| planned.steps)
     }
 
     fn next(&self) -> WorldId {

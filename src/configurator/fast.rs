@@ -154,7 +154,9 @@ impl Engine {
         let spec = self.spec(&planned, false);
         let mut machine = Transaction::new(planned, spec);
         machine.resume(sent, outcome, &mut self.world.system);
-        let group = Group { takes: 1, places: SmallVec::from_iter([0]), ..Group::default() };
+        let visit = (undoing && request.scope.is_some()).then_some(switch.frame().id);
+        let places = SmallVec::from_iter([0]);
+        let group = Group { takes: 1, places, visits: SmallVec::from_iter([visit]), ..Group::default() };
         let purpose = Purpose::Requests(number, group);
         let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
         self.running.push(running);

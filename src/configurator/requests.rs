@@ -7,7 +7,10 @@ use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
-use crate::stack::{Batch, Broken, Frame, FrameId, Group, Planned, Rules, Turn, Why, gave_up, given_up_of, take_up};
+use crate::stack::{
+    About, Batch, Broken, Endings, Frame, FrameId, Group, Planned, Rules, Stopped, Turn, Why, gave_up, given_up_of,
+    settle, take_up,
+};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
@@ -150,83 +153,52 @@ impl Engine {
         let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
-        let mut answers: Vec<(usize, Option<Verdict>, Option<Reason>)> = Vec::new();
-        let mut confirm: Vec<(Request, FrameId)> = Vec::new();
-        let mut end = group.takes;
-        // All at once: one may pop what another one of them pushes.
-        let done = (0..parts.len()).filter(|part| matches!(parts[*part], PartEnd::Done));
-        let mut edits = SmallVec::<[_; 2]>::new();
-        if let Some((planned, ..)) = &planned {
-            edits.extend(done.map(|part| &planned.parts[part].edits));
-        }
-        let mut pushed = self.world.stack.apply_each(edits, &busy).into_iter();
-        // What was decided of those behind one that failed took that for done: they are taken up anew.
-        let failed = parts.iter().position(|part| !matches!(part, PartEnd::Done));
+        let endings: Endings = parts.iter().map(PartEnd::ending).collect();
         let interrupted = planned.as_ref().and_then(|(.., reason)| reason.clone());
-        if let Some(part) = failed.filter(|part| interrupted.is_none() && !was_taken_down(&parts[*part])) {
-            end = group.places[part] + 1;
-        }
-        let first = failed.map_or(usize::MAX, |part| group.places[part]);
-        for (part, ended) in parts.into_iter().enumerate() {
-            let place = group.places[part];
-            let request = requests[place];
-            let Some((planned, stood, _)) = &planned else { break };
-            let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
-            if !matches!(ended, PartEnd::Done) {
-                self.forget_conditions(stood);
-            }
-            match ended {
-                PartEnd::Anew => break,
-                PartEnd::Done => {
-                    if let Some(id) = planned.parts[part].pushes {
-                        self.applied(id, stood);
-                    }
-                    confirm.extend(pushed.next().flatten().map(|frame| (request, frame)));
-                    answers.push((place, Some(request.ask.done()), None));
+        let stopped = match &interrupted {
+            Some(_) => Stopped::Safe,
+            None if parts.iter().any(was_taken_down) => Stopped::Down,
+            None => Stopped::Not,
+        };
+        let settled = settle(&requests, &group, &endings, stopped);
+        let mut confirm: Vec<(Request, FrameId)> = Vec::new();
+        let mut reasons: Vec<Option<Reason>> = Vec::new();
+        if let Some((planned, stood, _)) = planned {
+            let edits = planned.parts.iter().map(|part| &part.edits);
+            let pushed = self.world.take_over(edits, &endings, &busy);
+            for (part, ended) in parts.into_iter().enumerate() {
+                let request = requests[group.places[part]];
+                reasons.push(ended.reason());
+                let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
+                match (&ended, planned.parts[part].pushes) {
+                    (PartEnd::Done, Some(id)) => self.applied(id, stood),
+                    (PartEnd::Done, None) => {}
+                    _ => self.forget_conditions(stood),
                 }
-                PartEnd::Failed(reason) => {
-                    self.stays(&request, planned.parts[part].frame.as_deref());
-                    answers.push((place, Some(request.ask.failed()), Some(reason)));
-                }
-                PartEnd::Cancelled => answers.push((place, Some(Verdict::Cancelled), Some(Reason::GivenUp))),
-                PartEnd::Broken(broken) => {
-                    self.stays(&request, planned.parts[part].frame.as_deref());
-                    let residual = broken.residual.clone();
+                confirm.extend(pushed[part].map(|frame| (request, frame)));
+                if let PartEnd::Broken(broken) = ended {
                     self.left_broken(&request, *broken);
-                    answers.push((place, Some(request.ask.broken()), Some(Reason::Broken(residual))));
                 }
             }
         }
-        // Not carried out, whatever came of the others.
-        for (_, frame) in group.stay.iter().filter(|(place, _)| *place < end) {
-            self.world.stack.unscope(*frame);
-        }
-        if group.commits {
-            answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), None)));
-        }
-        for told in group.told.into_iter().filter(|told| told.place < end) {
-            match &interrupted {
-                // Interrupted with the others, whatever it would have come to after them.
-                Some(reason) if told.place > first && told.verdict.is_some() => {
-                    let request = &requests[told.place];
-                    self.world.stays(request, &[]);
-                    answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
-                }
-                _ => answers.push((told.place, told.verdict, told.reason)),
-            }
-        }
-        answers.sort_by_key(|(place, ..)| *place);
+        self.world.keep(&requests, &settled);
         self.forget_confirmations();
         self.changed();
         for (request, frame) in confirm {
             self.await_confirmation(request, frame);
         }
         // From the last on, so that places stay.
-        for (place, ..) in answers.iter().rev() {
+        for (place, ..) in settled.answers.iter().rev() {
             self.desk.answered(number, *place);
         }
-        for (place, verdict, reason) in answers {
+        for (place, verdict, about) in settled.answers {
             let request = requests[place];
+            let reason = match about {
+                About::Part(part) => reasons[part].clone(),
+                About::Told(at) => group.told[at].reason.clone(),
+                About::Interrupted => interrupted.clone(),
+                About::Commit => None,
+            };
             self.finish(request, verdict, reason.clone());
             self.answer_giving_up(&request, verdict, reason.as_ref());
         }
@@ -237,30 +209,16 @@ impl Engine {
         match (request.why, verdict) {
             (_, None) | (Why::Down, _) => self.forget(request),
             (Why::Unconfirmed(_, event, within), Some(verdict)) => {
-                let (verdict, reason) = match verdict {
-                    Verdict::Undone => (Verdict::Reverted, Some(Reason::NotConfirmed(event, within))),
-                    other => (other, reason),
-                };
                 let begun =
                     self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
                 self.forget(request);
-                // It carries the number of the request that had pushed the frame, and is about that.
-                let Ask::UndoOf(id) = request.ask else { return };
-                let told =
-                    Request { ask: if verdict == Verdict::Reverted { Ask::Apply(id) } else { request.ask }, ..request };
+                // It carries the number of the request that had pushed the frame.
+                let (told, verdict) = request.as_told(verdict);
+                let late = verdict == Verdict::Reverted;
+                let reason = if late { Some(Reason::NotConfirmed(event, within)) } else { reason };
                 self.tell_answer(told, verdict, reason.map(Arc::new), begun);
             }
             (Why::Asked, Some(verdict)) => self.answer(request, verdict, reason),
-        }
-    }
-
-    /// A frame that was to be undone stays: it no longer belongs to the state that was left.
-    fn stays(&mut self, request: &Request, frame: Option<&Frame>) {
-        if request.ask.is_undo()
-            && request.scope.is_some()
-            && let Some(frame) = frame
-        {
-            self.world.stack.unscope(frame.id);
         }
     }
 

@@ -56,6 +56,8 @@ pub struct Group {
     pub planned: Option<Planned>,
     /// Of each operation of the plan, the place of its request in the batch.
     pub places: SmallVec<[usize; 2]>,
+    /// Of each operation, the frame that it undoes since the state it belongs to was left.
+    pub visits: SmallVec<[Option<FrameId>; 2]>,
     /// What is repaired before the plan is carried out, by its place in [`World::broken`].
     pub repairs: Option<usize>,
     /// The requester's frames are made permanent.
@@ -100,11 +102,14 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                 Resolved::Commit => group.commits = true,
                 Resolved::Down => group.down = true,
                 Resolved::Op(op) => {
+                    let visit = request.ask.is_undo() && request.scope.is_some();
+                    let visit = if let (true, Op::Undo(frame)) = (visit, &op) { Some(*frame) } else { None };
                     if let Err(refusal) = work.add(&op, context) {
                         refused.push(no(place, request, Reason::Refused(refusal.findings)));
                         continue 'anew;
                     }
                     group.places.push(place);
+                    group.visits.push(visit);
                 }
             }
         }

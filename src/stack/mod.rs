@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -18,6 +18,7 @@ mod net;
 mod permanent;
 mod prepared;
 pub mod request;
+mod settle;
 mod share;
 mod squash;
 #[cfg(test)]
@@ -33,6 +34,7 @@ pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
+pub use settle::{About, Ending, Endings, Settled, Stopped, settle};
 pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, transaction};
 pub use world::{Broken, World};

@@ -5,7 +5,7 @@ use super::{Can, Phase, Transaction};
 use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
-use crate::stack::{FrameId, Inverse, Reason, Residual};
+use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
 use crate::system::{System, Undo, View as _, diff, moves_any, step, touch};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -30,6 +30,29 @@ pub enum PartEnd {
     Broken(Box<BrokenPart>),
     /// It had not begun when one before it failed: to be taken up anew.
     Anew,
+}
+
+impl PartEnd {
+    /// Without the reason.
+    pub fn ending(&self) -> Ending {
+        match self {
+            Self::Done => Ending::Done,
+            Self::Failed(_) => Ending::Failed,
+            Self::Cancelled => Ending::Cancelled,
+            Self::Broken(_) => Ending::Broken,
+            Self::Anew => Ending::Anew,
+        }
+    }
+
+    /// Why it did not simply succeed.
+    pub fn reason(&self) -> Option<Reason> {
+        match self {
+            Self::Done | Self::Anew => None,
+            Self::Failed(reason) => Some(reason.clone()),
+            Self::Cancelled => Some(Reason::GivenUp),
+            Self::Broken(broken) => Some(Reason::Broken(broken.residual.clone())),
+        }
+    }
 }
 
 /// What is left of a part that is neither done nor taken back.

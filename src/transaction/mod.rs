@@ -7,7 +7,7 @@
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
 //! was applied stands. `back`: the way back; `heed`: what it leaves to safe
-//! configurations; `bring`: where it goes on for them. `end`: what comes of each part. `messages`: what goes in and out.
+//! configurations; `bring`: where it goes on for them. `end`: what comes of each part; `endings`: what may. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
@@ -15,6 +15,7 @@
 mod back;
 mod bring;
 mod end;
+mod endings;
 mod heed;
 mod messages;
 mod order;
@@ -23,6 +24,7 @@ mod settle;
 mod stand;
 
 pub use end::{BrokenPart, End, PartEnd};
+pub use endings::{Stopping, can_fail, endings};
 pub use heed::Touched;
 pub use messages::{Can, Input, Poll, Question, Spec};
 

@@ -9,7 +9,7 @@ use davit::plan::PlannedStep;
 use davit::stack::{Op, Planned, Stack, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
-use davit::transaction::{Can, Input, PartEnd, Poll, Spec, Transaction};
+use davit::transaction::{Can, Input, PartEnd, Poll, Spec, Touched, Transaction};
 use proptest::prelude::*;
 use std::time::Duration;
 
@@ -24,6 +24,12 @@ pub struct Bench {
     pub moved_back: Vec<Step>,
     /// How many steps were taken back.
     pub back: usize,
+    /// What comes in a turn of its own.
+    pub comes: Option<(usize, Input)>,
+    /// Nobody knows whether the steps that fail were done.
+    pub unknown: bool,
+    /// Nobody answers who is asked how things are.
+    pub blind: bool,
 }
 
 impl Bench {
@@ -36,7 +42,15 @@ impl Bench {
             picks,
             moved_back: Vec::new(),
             back: 0,
+            comes: None,
+            unknown: false,
+            blind: false,
         }
+    }
+
+    /// Whether a step is possible on the platform, which is not what the model takes it for.
+    fn fits(&self, step: &Step) -> bool {
+        step::precondition(step, &self.platform).is_empty()
     }
 
     pub fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
@@ -49,9 +63,14 @@ impl Bench {
         };
         let mut machine = Transaction::new(planned, spec);
         let mut out: Vec<u32> = Vec::new();
+        let mut released = true;
         let blocking = |_: &Step| Execution::Blocking;
         for turn in 0usize.. {
             assert!(turn < 10_000, "it ends");
+            if let Some((_, input)) = self.comes.take_if(|(at, _)| *at == turn) {
+                released = !matches!(input, Input::Interrupt(_));
+                machine.on(input, &mut self.model);
+            }
             let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[], busy: &[] };
             match machine.poll(&mut self.model, Time::default(), &can) {
                 Poll::Begin(steps) => out.extend(steps),
@@ -59,14 +78,21 @@ impl Bench {
                 Poll::Ask(question) => machine.on(Input::Told { question, is: Some(true) }, &mut self.model),
                 Poll::Read(components) => {
                     let seen = self.platform.snapshot_some(&components);
-                    machine.on(Input::Seen(Some(seen)), &mut self.model);
+                    machine.on(Input::Seen((!self.blind).then_some(seen)), &mut self.model);
+                }
+                Poll::Wait if out.is_empty() && !released => {
+                    released = true;
+                    machine.on(Input::Release(Touched::default()), &mut self.model);
                 }
                 Poll::Wait => {
                     assert!(!out.is_empty(), "it waits for something");
                     let at = self.picks[turn % self.picks.len()] as usize % out.len();
                     let number = out.remove(at);
                     self.asked += 1;
-                    let outcome = if self.fails.contains(&self.asked) {
+                    let fails = self.fails.contains(&self.asked);
+                    let outcome = if fails && self.unknown {
+                        Outcome::Unknown(Cause::Timeout)
+                    } else if fails || self.unknown && !self.fits(&machine.step(number).step) {
                         Outcome::NotDone(Cause::Failed("as told".to_owned()))
                     } else {
                         let step = &machine.step(number).step;

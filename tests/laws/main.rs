@@ -7,6 +7,7 @@
 mod alone;
 mod atomicity;
 mod difference;
+mod endings;
 mod generate;
 mod machine;
 mod motion;

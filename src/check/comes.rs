@@ -1,0 +1,110 @@
+//! What a batch comes to in a world: asked of the stack once, and followed to each end that it may have.
+
+use super::outcome::{Beside, Comes, Went, WorldId};
+use super::world::{Worlds, plain};
+use crate::model::Ask;
+use crate::plan::PlannedStep;
+use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, settle, take_up};
+use crate::system::step;
+use crate::transaction::can_fail;
+use smallvec::SmallVec;
+use std::rc::Rc;
+
+impl Worlds<'_> {
+    /// What the rest of a batch comes to in a world that is known.
+    pub fn comes(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Rc<Comes> {
+        let key = (id, plain(requests), beside.clone());
+        if let Some(known) = self.comes.get(&key) {
+            return known.clone();
+        }
+        let comes = Rc::new(self.work_out(id, &key.1, beside));
+        self.comes.insert(key, comes.clone());
+        comes
+    }
+
+    /// The first requests of a batch, as the stack decides.
+    pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
+        let rules = Rules { held: &beside.held, joined: beside.joined, ..self.rules() };
+        self.get(id).map(|world| take_up(world, requests, &rules))
+    }
+
+    fn work_out(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Comes {
+        self.asked.extend(requests.iter().filter_map(|r| if let Ask::Apply(id) = r.ask { Some(id) } else { None }));
+        let mut group = self.group(id, requests, beside).unwrap_or_default();
+        let refused = group.told.iter().filter_map(|told| {
+            let reasons = match told.reason.as_ref()? {
+                Reason::Overtaken | Reason::GivenUp | Reason::SafeCame(_) => return None,
+                other => other.findings(),
+            };
+            Some((told.place, Rc::new(reasons)))
+        });
+        let refused = refused.collect();
+        let planned = group.planned.take();
+        group.told.iter_mut().for_each(|told| told.reason = None);
+        for warning in planned.iter().flat_map(|planned| &planned.warnings) {
+            if self.warned.insert((warning.code, warning.message.clone())) {
+                self.warnings.push(warning.clone());
+            }
+        }
+        let can_fail = planned.as_ref().map(can_fail).unwrap_or_default();
+        let mut ends = |endings: &[Ending]| self.after(id, requests, &group, planned.as_ref(), endings, &beside.held);
+        let parts = can_fail.len();
+        let until = |part: usize, ending: Ending| -> Endings {
+            let of = |at: usize| {
+                if at < part {
+                    Ending::Done
+                } else if at == part {
+                    ending
+                } else {
+                    Ending::Anew
+                }
+            };
+            (0..parts).map(of).collect()
+        };
+        let done = ends(&until(parts, Ending::Anew));
+        let stopped = (0..parts).map(|part| {
+            let cancelled = ends(&until(part, Ending::Cancelled));
+            (cancelled, can_fail[part].then(|| ends(&until(part, Ending::Failed))))
+        });
+        let stopped = stopped.collect();
+        Comes { group, refused, can_fail, done, stopped }
+    }
+
+    /// The world after a group has ended so, nothing of it being left in between.
+    fn after(
+        &mut self,
+        id: WorldId,
+        requests: &[Request],
+        group: &Group,
+        planned: Option<&Planned>,
+        endings: &[Ending],
+        held: &[FrameId],
+    ) -> Went {
+        let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
+        let settled = settle(requests, group, endings, Stopped::Not);
+        let done = endings.iter().take_while(|ending| **ending == Ending::Done).count();
+        if done == 0 && settled.stay.is_empty() {
+            return Went::to(id);
+        }
+        let mut world = before.clone();
+        let mut pushed = Vec::new();
+        if let Some(planned) = planned {
+            let steps = match done == endings.len() {
+                true => &planned.steps[..],
+                false => &planned.whole()[..planned.parts[..done].last().map_or(0, |part| part.range.end as usize)],
+            };
+            steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+            pushed = world.take_over(planned.parts.iter().map(|part| &part.edits), endings, held);
+        }
+        world.keep(requests, &settled);
+        let pushed: SmallVec<[FrameId; 2]> = pushed.into_iter().flatten().collect();
+        self.went(id, world, &pushed)
+    }
+
+    /// The steps of a group, for who shows them.
+    pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
+        self.group(id, requests, &Beside::default())
+            .and_then(|group| group.planned)
+            .map_or_else(Vec::new, |planned| planned.steps)
+    }
+}

@@ -1,0 +1,94 @@
+//! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
+
+use crate::model::{ConfigId, Findings};
+use crate::stack::{Ending, FrameId, Group, Request};
+use smallvec::SmallVec;
+use std::rc::Rc;
+
+/// The number of a world.
+pub type WorldId = u32;
+
+/// The world in which nothing was applied.
+pub const EMPTY: WorldId = 0;
+
+/// Where something leads to.
+#[derive(Debug, Clone)]
+pub struct Went {
+    /// The world.
+    pub world: WorldId,
+    /// Of each frame that counted before, its place among those that count now; none: nothing was asked about that.
+    pub places: Option<Rc<Vec<Option<u8>>>>,
+    /// The places of the frames that were pushed, with the configurations.
+    pub pushed: SmallVec<[(ConfigId, u8); 1]>,
+    /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames then.
+    pub deep: Option<ConfigId>,
+    /// The same with [`limits::CHECK_LEFT`].
+    pub left: Option<ConfigId>,
+}
+
+/// Frames that must stay as they are.
+pub type Held = SmallVec<[FrameId; 2]>;
+
+impl Went {
+    /// To a world of which no frames are known.
+    pub fn to(world: WorldId) -> Self {
+        Self { world, places: None, pushed: SmallVec::new(), deep: None, left: None }
+    }
+}
+
+/// What is under way beside a batch, as far as the batch minds it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Beside {
+    /// Frames that others pop or hand over to, or that wait for their confirmation.
+    pub held: Held,
+    /// The batch was begun as one, and some of it were answered since.
+    pub joined: bool,
+}
+
+/// What the first requests of a batch come to.
+#[derive(Debug, Clone)]
+pub struct Comes {
+    /// The first requests as the stack decides, without the plan and the reasons.
+    pub group: Group,
+    /// Those that are told because they are refused.
+    pub refused: Vec<(usize, Rc<Findings>)>,
+    /// Of each part of the group, whether something in it can fail.
+    pub can_fail: SmallVec<[bool; 2]>,
+    /// When all is done.
+    pub done: Went,
+    /// Of each part: when it was given up, and when it failed; those before it stand.
+    pub(super) stopped: Vec<(Went, Option<Went>)>,
+}
+
+impl Comes {
+    /// Where it leads to that the parts ended so; none: something is left in between, or all was interrupted.
+    pub fn went(&self, endings: &[Ending]) -> Option<&Went> {
+        match endings.iter().enumerate().find(|(_, ending)| **ending != Ending::Done) {
+            None => Some(&self.done),
+            Some((part, Ending::Cancelled)) => Some(&self.stopped[part].0),
+            Some((part, Ending::Failed)) => self.stopped[part].1.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// So many requests are settled then.
+    pub fn takes(&self) -> usize {
+        self.group.takes.max(1)
+    }
+
+    /// Whether a part undoes something.
+    pub fn undoes(&self, part: usize, requests: &[Request]) -> bool {
+        requests[self.group.places[part]].ask.is_undo()
+    }
+}
+
+/// What a safe configuration comes to.
+#[derive(Debug, Clone)]
+pub struct SafeComes {
+    /// When all of it is done that can be.
+    pub done: Went,
+    /// What of it cannot be done there: then it ends *broken*.
+    pub troubles: Rc<Findings>,
+    /// Whether a step of it can fail.
+    pub may_fail: bool,
+}

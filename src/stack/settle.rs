@@ -1,0 +1,145 @@
+//! What it comes to that requests were carried out so: written once. The configurator books it, `check` follows it.
+//!
+//! The parts of a group end in order: those before one that failed stand, and what stands behind it is taken up anew, since
+//! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
+
+use super::{Edits, FrameId, Group, Request, Why, World};
+use crate::model::{Ask, Verdict};
+use smallvec::SmallVec;
+
+/// How a part of a group has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Ending {
+    /// It was done.
+    Done,
+    /// The system is as before it.
+    Failed,
+    /// It was given up, and the system is as before it.
+    Cancelled,
+    /// Neither done nor taken back.
+    Broken,
+    /// It had not begun when one before it failed.
+    Anew,
+}
+
+/// How the parts of a group have ended, in order.
+pub type Endings = SmallVec<[Ending; 2]>;
+
+/// What ended a group as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stopped {
+    /// Nothing did.
+    Not,
+    /// A safe configuration: nothing of it stands that was not told before.
+    Safe,
+    /// Everything is being taken down: nothing is taken up anew.
+    Down,
+}
+
+/// What an answer is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum About {
+    /// A part of the group, by its number.
+    Part(usize),
+    /// A request that was settled without being carried out, by its place in [`Group::told`].
+    Told(usize),
+    /// The same, but it ends with those that were interrupted.
+    Interrupted,
+    /// What was made permanent.
+    Commit,
+}
+
+/// What a group that has ended comes to.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Settled {
+    /// The answers in the order of the batch: place, verdict (none: nobody is told), and what it is about. What is not
+    /// answered is taken up anew.
+    pub answers: SmallVec<[(usize, Option<Verdict>, About); 2]>,
+    /// Undos by leaving a state that were not carried out, by their places: their frames stay, and are frames like others.
+    /// None: the frame of the visit that there is.
+    pub stay: SmallVec<[(usize, Option<FrameId>); 2]>,
+}
+
+/// What it comes to that the parts of `group` have ended so.
+pub fn settle(requests: &[Request], group: &Group, endings: &[Ending], stopped: Stopped) -> Settled {
+    let mut settled = Settled::default();
+    let failed = endings.iter().position(|ending| *ending != Ending::Done).map(|part| group.places[part]);
+    // What was decided of those behind one that failed took that for done.
+    let end = failed.filter(|_| stopped == Stopped::Not).map_or(group.takes, |place| place + 1);
+    for (part, ending) in endings.iter().enumerate() {
+        let (place, ask) = (group.places[part], requests[group.places[part]].ask);
+        let verdict = match ending {
+            Ending::Anew => break,
+            Ending::Done => ask.done(),
+            Ending::Failed => ask.failed(),
+            Ending::Cancelled => Verdict::Cancelled,
+            Ending::Broken => ask.broken(),
+        };
+        if verdict != ask.done() {
+            settled.stay.extend(group.visits.get(part).copied().flatten().map(|frame| (place, Some(frame))));
+        }
+        settled.answers.push((place, Some(verdict), About::Part(part)));
+    }
+    if group.commits {
+        settled.answers.extend((0..group.takes).map(|place| (place, Some(Verdict::Ok), About::Commit)));
+    }
+    // Refused, whatever came of the others.
+    settled
+        .stay
+        .extend(group.stay.iter().filter(|(place, _)| *place < end).map(|(place, frame)| (*place, Some(*frame))));
+    for (at, told) in group.told.iter().enumerate().filter(|(_, told)| told.place < end) {
+        let behind = stopped == Stopped::Safe && failed.is_some_and(|failed| told.place > failed);
+        settled.answers.push(match told.verdict {
+            // Whatever it would have come to after them.
+            Some(_) if behind => {
+                settled.stay.push((told.place, None));
+                (told.place, Some(requests[told.place].ask.failed()), About::Interrupted)
+            }
+            verdict => (told.place, verdict, About::Told(at)),
+        });
+    }
+    settled.answers.sort_by_key(|(place, ..)| *place);
+    settled
+}
+
+impl World {
+    /// The stack takes over what the parts that were done do to it; answers of each of them the frame that it pushed, unless a
+    /// later one popped that again. All at once: one may pop what another one pushes. `busy`: see [`Stack::apply`].
+    ///
+    /// [`Stack::apply`]: super::Stack::apply
+    pub fn take_over<'e>(
+        &mut self,
+        edits: impl Iterator<Item = &'e Edits>,
+        endings: &[Ending],
+        busy: &[FrameId],
+    ) -> Vec<Option<FrameId>> {
+        let done = edits.zip(endings).filter(|(_, ending)| **ending == Ending::Done);
+        let mut pushed = self.stack.apply_each(done.map(|(edits, _)| edits), busy).into_iter();
+        let of = |ending: &Ending| if *ending == Ending::Done { pushed.next().flatten() } else { None };
+        endings.iter().map(of).collect()
+    }
+
+    /// Frames that were to be undone with the state they belong to stay.
+    pub fn keep(&mut self, requests: &[Request], settled: &Settled) {
+        for (place, frame) in &settled.stay {
+            match frame {
+                Some(frame) => self.stack.unscope(*frame),
+                None => self.stays(&requests[*place], &[]),
+            }
+        }
+    }
+}
+
+impl Request {
+    /// A request as it is told of: what took back a frame that was not confirmed tells of that frame's configuration.
+    pub fn as_told(self, verdict: Verdict) -> (Self, Verdict) {
+        let told = Self { why: Why::Asked, ..self };
+        match (self.why, verdict, self.ask) {
+            (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
+                (Self { ask: Ask::Apply(id), ..told }, Verdict::Reverted)
+            }
+            (Why::Unconfirmed(..), ..) => (told, verdict),
+            _ => (self, verdict),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! However a transaction ends that is given up, interrupted or fails: so it may end by what `check` follows.
+
+use crate::atomicity::Bench;
+use crate::generate::{self, context, read};
+use crate::plans::operator;
+use crate::settings;
+use davit::model::ConfigId;
+use davit::stack::{Ending, Endings, Op, Stack, transaction};
+use davit::system::{System, step};
+use davit::transaction::{Input, PartEnd, Stopping, can_fail, endings};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+#[test]
+fn a_transaction_ends_as_check_follows_it() {
+    let met: RefCell<BTreeMap<String, usize>> = RefCell::default();
+    let cases = (
+        generate::types(),
+        generate::configs(2..6),
+        0usize..6,
+        (prop::collection::vec(1usize..16, 0..4), any::<bool>(), any::<bool>()),
+        prop::option::weighted(0.8, 0usize..10),
+        prop::collection::vec(any::<u8>(), 24),
+    );
+    let mut runner = TestRunner::new(settings());
+    let ran = runner.run(&cases, |(types, genes, what, (fails, unknown, blind), comes, picks)| {
+        let mut system = System::new(generate::catalogue(&types, false));
+        let mut stack = Stack::new(8);
+        let (last, first) = genes.split_last().unwrap();
+        for gene in first {
+            let conf = read(gene, &system);
+            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
+            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
+            stack.commit(push);
+        }
+        let conf = read(last, &system);
+        let ops = [Op::UndoTop, operator(&conf)];
+        let ops = [&ops[..1], &ops[1..], &ops[..]][what % 3];
+        let Ok(planned) = transaction(&system, &stack, ops, &context()) else { return Ok(()) };
+        let can = can_fail(&planned);
+        // What is given up is a push.
+        let part = ops.iter().position(|op| matches!(op, Op::Push { .. }));
+        let (input, stopping) = match (what < 3, part) {
+            (true, Some(part)) => (Input::GiveUp { part }, Stopping::GivenUp(part)),
+            _ => (Input::Interrupt(ConfigId::new("halt").unwrap()), Stopping::Safe(&[])),
+        };
+        let mut bench = Bench::new(&system, fails, picks);
+        (bench.unknown, bench.blind) = (unknown, blind);
+        bench.comes = comes.map(|at| (at, input));
+        let ends: Endings = bench.drive(planned).iter().map(PartEnd::ending).collect();
+        // Over before that came, it ended as if nothing had been to come.
+        let came = comes.is_some() && bench.comes.is_none();
+        let mut may = endings(&can, Stopping::Not, true);
+        if came {
+            may.extend(endings(&can, stopping, true));
+        }
+        prop_assert!(may.contains(&ends), "{ends:?} of {may:?}");
+        let kind = match came {
+            false => "nothing came",
+            true if matches!(stopping, Stopping::Safe(_)) => "interrupted",
+            true => "given up",
+        };
+        let worst = if ends.contains(&Ending::Broken) {
+            "broken"
+        } else if ends.contains(&Ending::Cancelled) {
+            "cancelled"
+        } else if ends.contains(&Ending::Failed) {
+            "failed"
+        } else {
+            "done"
+        };
+        *met.borrow_mut().entry(format!("{kind}, {worst}")).or_default() += 1;
+        Ok(())
+    });
+    ran.unwrap_or_else(|failed| panic!("{failed}"));
+    let (met, enough) = (met.into_inner(), crate::cases() as usize / 400);
+    for kind in [
+        "nothing came, broken",
+        "nothing came, failed",
+        "given up, cancelled",
+        "given up, broken",
+        "interrupted, failed",
+        "interrupted, broken",
+    ] {
+        assert!(met.get(kind).copied().unwrap_or_default() >= enough, "{kind}: {met:?}");
+    }
+}
