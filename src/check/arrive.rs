@@ -3,7 +3,7 @@
 use super::outcome::Beside;
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
-use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, index};
+use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
@@ -67,11 +67,6 @@ impl Product<'_> {
         }
         state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
-        for (_, stop) in &mut state.stopped {
-            if let Stop::GivenUp(undo) = stop {
-                gone(undo);
-            }
-        }
     }
 
     /// The batches under way that `batch` would stop.
@@ -83,7 +78,7 @@ impl Product<'_> {
         if !safe.is_empty() {
             stopped.extend(state.desk.under_way().iter().map(|turn| turn.number));
         }
-        stopped.retain(|number| !state.stopped.iter().any(|(of, _)| of == number));
+        stopped.retain(|number| !state.is_stopped(*number));
         stopped.sort_unstable();
         stopped.dedup();
         stopped
@@ -173,12 +168,8 @@ impl Product<'_> {
         let mut begun: SmallVec<[(u32, SmallVec<[Request; 2]>); 2]> = SmallVec::new();
         if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if is_safe(id))) {
             let turns: SmallVec<[Turn; 2]> = state.desk.under_way().iter().cloned().collect();
-            for Turn { number, batch } in turns {
-                let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
-                    Stop::Interrupted(planned) if *of == number => Some(*planned),
-                    _ => None,
-                });
-                let planned = planned.unwrap_or(state.world);
+            for Turn { number, batch, .. } in turns {
+                let planned = state.planned(number);
                 if self.worlds.top(planned).is_none() {
                     let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
                     let takes = self.worlds.comes(planned, &batch.requests, &beside).takes();
@@ -206,9 +197,9 @@ impl Product<'_> {
         }
         if !arrival.safe.is_empty() {
             for turn in state.desk.under_way() {
-                let interrupted = |(of, stop): &(u32, Stop)| *of == turn.number && matches!(stop, Stop::Interrupted(_));
-                if !state.stopped.iter().any(interrupted) {
-                    state.stopped.push((turn.number, Stop::Interrupted(state.world)));
+                if state.interrupted.iter().all(|of| of.number != turn.number) {
+                    let (number, given_up) = (turn.number, turn.given_up.len());
+                    state.interrupted.push(Interrupted { number, planned: state.world, given_up });
                 }
             }
         }
@@ -222,18 +213,13 @@ impl Product<'_> {
 
     /// What is under way is given up by its own undo.
     fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
-        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
-        let requests = turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default();
-        let Some(place) = given_up_of(&undo, &requests) else {
+        let Some(place) = state.desk.give_up(number, undo) else {
             // Another undo of the same step has given it up already.
             return self.due(state, undo, Verdict::Undone);
         };
+        let requests = state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default();
         // What was interrupted was planned before that.
-        let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
-            Stop::Interrupted(planned) if *of == number => Some(*planned),
-            _ => None,
-        });
-        let planned = planned.unwrap_or(state.world);
+        let planned = state.planned(number);
         let begun = match self.worlds.top(planned) {
             // Where nothing is known what stands behind may have begun with the first, or not.
             Some(_) => place == 0 || self.tells_all,
@@ -247,23 +233,17 @@ impl Product<'_> {
                 comes.group.places.contains(&place)
             }
         };
-        if begun {
-            state.stopped.push((number, Stop::GivenUp(undo)));
-            return;
+        if !begun {
+            self.cancel_behind(state, number, place);
         }
-        self.give_up_behind(state, number, undo);
     }
 
-    /// What stands behind in its batch and has not begun is given up.
-    pub(super) fn give_up_behind(&self, state: &mut State, number: u32, undo: Request) {
-        let requests =
-            state.desk.under_way().iter().find(|turn| turn.number == number).map(|turn| &turn.batch.requests);
-        let request = requests.and_then(|requests| Some((given_up_of(&undo, requests)?, requests)));
-        if let Some((place, request)) = request.map(|(place, requests)| (place, requests[place])) {
-            state.desk.answered(number, place);
-            self.due(state, request, Verdict::Cancelled);
-        }
-        self.due(state, undo, Verdict::Undone);
+    /// What stands behind in its batch, has not begun and was given up, is cancelled.
+    pub(super) fn cancel_behind(&self, state: &mut State, number: u32, place: usize) {
+        let request = state.desk.turn_of(number).and_then(|turn| turn.batch.requests.get(place)).copied();
+        let gone = state.desk.answered(number, place, Some(Verdict::Cancelled));
+        request.into_iter().for_each(|request| self.due(state, request, Verdict::Cancelled));
+        gone.undone.into_iter().for_each(|(undo, verdict)| self.due(state, undo, verdict));
     }
 
     /// An answer is on its way, if anybody waits for it (or all are to be given).

@@ -2,10 +2,10 @@
 
 use super::outcome::{Beside, Comes, Went, WorldId};
 use super::product::Product;
-use super::state::{Answers, Failed, Move, Next, Nexts, State, Stop, Trouble, Unconfirmed};
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, Unconfirmed};
 use super::world::Top;
 use crate::model::{Ask, Verdict};
-use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, gave_up, given_up_of, settle};
+use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, settle};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 
@@ -24,8 +24,7 @@ fn given(settled: &Settled) -> SmallVec<[(usize, Option<Verdict>); 2]> {
 
 impl Product<'_> {
     fn requests(state: &State, number: u32) -> SmallVec<[Request; 2]> {
-        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
-        turn.map(|turn| turn.batch.requests.clone()).unwrap_or_default()
+        state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default()
     }
 
     /// How a batch under way may end, or its first requests.
@@ -105,51 +104,22 @@ impl Product<'_> {
         let End { went, given, class } = end;
         let mut next = state.clone();
         self.go(&mut next, went);
-        let mut given_up: SmallVec<[Request; 1]> = SmallVec::new();
-        next.stopped.retain(|(of, stop)| {
-            let over = *of == number;
-            if let (true, Stop::GivenUp(undo)) = (over, &*stop) {
-                given_up.push(*undo);
-            }
-            !over
-        });
+        next.interrupted.retain(|of| of.number != number);
         next.joined.retain(|of| *of != number);
-        // From the last on, so that places stay.
-        for (place, _) in given.iter().rev() {
-            next.desk.answered(number, *place);
-        }
+        let gone = next.desk.all_answered(number, given.iter().copied());
         let mut answers = Answers::new();
-        let mut late: SmallVec<[Request; 1]> = SmallVec::new();
-        for (place, verdict) in given {
+        for ((place, verdict), gone) in given.iter().zip(gone) {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
             answers.push(request.as_told(verdict));
-            let fits = |undo: &Request| given_up_of(undo, requests) == Some(*place);
-            // It may have been given up more than once.
-            while let Some(at) = given_up.iter().position(fits) {
-                let undo = given_up.remove(at);
-                match gave_up(verdict) {
-                    None => late.push(undo),
-                    Some(answer) => answers.push((undo, answer)),
-                }
-            }
+            answers.extend(gone.undone);
         }
-        // What was given up together with one before it is not taken up anew.
-        let left = Self::requests(&next, number);
-        if !left.is_empty() {
-            // In the order of the batch.
-            given_up.sort_by_key(|undo| given_up_of(undo, &left));
-            let known = !self.tells_all || self.worlds.top(next.world).is_none();
-            for undo in given_up {
-                match known || given_up_of(&undo, &left).is_none() {
-                    true => self.give_up_behind(&mut next, number, undo),
-                    // It may have begun with those that are over now.
-                    false => next.stopped.push((number, Stop::GivenUp(undo))),
-                }
-            }
-        }
-        for undo in late.into_iter().rev() {
-            next.desk.comes_next(undo);
+        // What was given up together with one before it is not taken up anew; where nothing is known it may have begun with it.
+        while (!self.tells_all || self.worlds.top(next.world).is_none())
+            && let Some(place) =
+                next.desk.turn_of(number).and_then(|turn| turn.given_up.iter().map(|of| of.place).min())
+        {
+            self.cancel_behind(&mut next, number, place);
         }
         for next in self.lands(next) {
             self.tell(next, answers.clone(), *class, nexts);
@@ -177,25 +147,21 @@ impl Product<'_> {
             return;
         }
         // In the order in which they came.
-        let mut given_up: SmallVec<[usize; 1]> = SmallVec::new();
-        let mut late: SmallVec<[usize; 1]> = SmallVec::new();
-        let mut interrupted = None;
-        for (_, stop) in state.stopped.iter().filter(|(of, _)| *of == number) {
-            match stop {
-                Stop::GivenUp(undo) if interrupted.is_none() => given_up.extend(given_up_of(undo, &requests)),
-                Stop::GivenUp(undo) => late.extend(given_up_of(undo, &requests)),
-                Stop::Interrupted(planned) => interrupted = Some(*planned),
-            }
-        }
+        let turn = state.desk.turn_of(number);
+        let mut given_up: SmallVec<[usize; 1]> =
+            turn.iter().flat_map(|turn| &turn.given_up).map(|given_up| given_up.place).collect();
+        let interrupted = state.interrupted(number);
+        let before = interrupted.map_or(given_up.len(), |interrupted| interrupted.given_up.min(given_up.len()));
+        let interrupted = interrupted.map(|interrupted| interrupted.planned);
         if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
             // What came at the same moment may have been told first; and what came when it was on its way back, too late.
-            let some = if self.tells_all { 0 } else { given_up.len() };
-            given_up.append(&mut late);
+            let some = if self.tells_all { 0 } else { before };
             for count in some..=given_up.len() {
                 self.interrupted_ends(state, number, &requests, planned, &given_up[..count], nexts);
             }
             return;
         }
+        given_up.truncate(before);
         if let Some(top) = self.worlds.top(state.world) {
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
             // What is interrupted is not carried out; an undo of what is not there is done without.
@@ -232,12 +198,14 @@ impl Product<'_> {
         if !self.tells_all || self.worlds.top(state.world).is_none() {
             return;
         }
-        for (at, (number, stop)) in state.stopped.iter().enumerate() {
-            let Stop::GivenUp(undo) = stop else { continue };
-            if given_up_of(undo, &Self::requests(state, *number)).is_none_or(|place| place > 0) {
+        for turn in state.desk.under_way() {
+            let mut behind: SmallVec<[usize; 1]> =
+                turn.given_up.iter().map(|given_up| given_up.place).filter(|place| *place > 0).collect();
+            behind.sort_unstable();
+            behind.dedup();
+            for place in behind {
                 let mut next = state.clone();
-                next.stopped.remove(at);
-                self.give_up_behind(&mut next, *number, *undo);
+                self.cancel_behind(&mut next, turn.number, place);
                 nexts.all.push(Next::plain(Move::Answer, next, Failed::Nothing));
             }
         }

@@ -254,7 +254,7 @@ impl<'a> Follower<'a> {
             let (desk, due) = (open(state), &state.due);
             let batch = |batch: &Batch| batch.requests.iter().map(|r| r.ask.to_string()).collect::<Vec<_>>();
             let flight: Vec<_> = state.flight.iter().map(batch).collect();
-            let stopped = &state.stopped;
+            let stopped = state.interrupted.len() + state.undos().count();
             let under_way: Vec<_> = state.desk.under_way().iter().map(|turn| batch(&turn.batch)).collect();
             format!(
                 "- {:?} frames {:?} open {desk:?} of them under way {under_way:?} due {} inbox {} flight {flight:?} stopped {} unconfirmed {} system {world}",
@@ -262,7 +262,7 @@ impl<'a> Follower<'a> {
                 self.frames(state),
                 due.len(),
                 state.inbox.len(),
-                stopped.len(),
+                stopped,
                 state.unconfirmed.len(),
             )
         };
@@ -285,11 +285,7 @@ fn sorted(list: &[String]) -> Vec<String> {
 fn open(state: &State) -> Vec<String> {
     let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
     let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
-    let given_up = state.stopped.iter().filter_map(|(_, stop)| match stop {
-        super::state::Stop::GivenUp(undo) => Some(undo),
-        super::state::Stop::Interrupted(_) => None,
-    });
-    let all = under_way.chain(waiting).chain(&state.safe).chain(given_up);
+    let all = under_way.chain(waiting).chain(&state.safe).chain(state.undos());
     let told = all.filter(|request| request.why == Why::Asked).map(|r| format!("{} by {}", r.ask, r.requester));
     sorted(&told.collect::<Vec<_>>())
 }

@@ -14,7 +14,7 @@ use super::coordinator::outside_events;
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
-use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
+use super::state::{Failed, Move, Next, Nexts, State, index};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
@@ -111,7 +111,7 @@ impl<'a> Product<'a> {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
             desk: Desk::default(),
-            stopped: SmallVec::new(),
+            interrupted: SmallVec::new(),
             joined: SmallVec::new(),
             safe: SmallVec::new(),
             due: SmallVec::new(),
@@ -151,7 +151,7 @@ impl<'a> Product<'a> {
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
         let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
         for number in numbers {
-            match state.stopped.iter().any(|(of, _)| *of == number) {
+            match state.is_stopped(number) {
                 true => self.stopped_ends(state, number, &mut nexts),
                 false => self.ends(state, number, &mut nexts),
             }
@@ -254,11 +254,7 @@ impl<'a> Product<'a> {
         let joined = |number: u32| state.joined.contains(&number);
         let mut held = Held::new();
         for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
-            let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
-                Stop::Interrupted(planned) if *of == turn.number => Some(*planned),
-                _ => None,
-            });
-            let planned = planned.unwrap_or(state.world);
+            let planned = state.planned(turn.number);
             let own = self.worlds.held_by(planned, &turn.batch.requests, joined(turn.number));
             held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }

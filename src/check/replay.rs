@@ -7,7 +7,7 @@
 
 use super::outcome::Beside;
 use super::product::Product;
-use super::state::{Move, Next, State, Stop};
+use super::state::{Move, Next, State};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
 use crate::stack::Request;
@@ -75,8 +75,7 @@ impl Product<'_> {
             if too_late(before) || races(before, next) {
                 all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
             }
-            let interrupted = |(_, stop): &(u32, Stop)| matches!(stop, Stop::Interrupted(_));
-            if before.safe.is_empty() && before.stopped.iter().any(interrupted) && next.by != Move::Answer {
+            if before.safe.is_empty() && !before.interrupted.is_empty() && next.by != Move::Answer {
                 all[k].does = Does::Cannot("what was interrupted goes back at once");
             }
             if let Move::Time(number, event) = next.by
@@ -269,10 +268,9 @@ fn too_late(state: &State) -> bool {
 
 /// Whether what is stopped is through all the same, or what was under way turns out not to have begun.
 fn races(before: &State, next: &Next) -> bool {
-    let stopped = |number: u32| before.stopped.iter().any(|(of, _)| *of == number);
     let through = |(request, verdict): &(Request, Verdict)| {
         let of = before.desk.under_way().iter().find(|turn| turn.batch.requests.contains(request));
-        verdict.is_success() && of.is_some_and(|turn| stopped(turn.number))
+        verdict.is_success() && of.is_some_and(|turn| before.is_stopped(turn.number))
     };
     let back = |requests: &SmallVec<[Request; 2]>| {
         let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));

@@ -21,13 +21,15 @@ pub enum Failed {
     Broken,
 }
 
-/// What stops a batch under way.
+/// A batch under way that a safe configuration has interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Stop {
-    /// This undo of one of its requests.
-    GivenUp(Request),
-    /// A safe configuration; it was planned in this world.
-    Interrupted(WorldId),
+pub struct Interrupted {
+    /// The number of the batch.
+    pub number: u32,
+    /// The world in which it was planned.
+    pub planned: WorldId,
+    /// So many undos had given something of it up before.
+    pub given_up: usize,
 }
 
 /// A frame that waits for its confirmation.
@@ -48,8 +50,8 @@ pub struct State {
     pub world: WorldId,
     /// What waits and what is under way.
     pub desk: Desk,
-    /// Batches under way that are stopped, by their numbers.
-    pub stopped: SmallVec<[(u32, Stop); 1]>,
+    /// Batches under way that are interrupted.
+    pub interrupted: SmallVec<[Interrupted; 1]>,
     /// Batches under way that were begun as one, of which some requests were answered since.
     pub joined: SmallVec<[u32; 1]>,
     /// Safe configurations that are being applied, in their order.
@@ -88,11 +90,23 @@ impl State {
     }
 
     /// Undos that give something up.
-    fn undos(&self) -> impl Iterator<Item = &Request> {
-        self.stopped.iter().filter_map(|(_, stop)| match stop {
-            Stop::GivenUp(undo) => Some(undo),
-            Stop::Interrupted(_) => None,
-        })
+    pub fn undos(&self) -> impl Iterator<Item = &Request> {
+        self.desk.under_way().iter().flat_map(|turn| turn.given_up.iter().map(|given_up| &given_up.undo))
+    }
+
+    /// Whether a batch under way is interrupted.
+    pub fn interrupted(&self, number: u32) -> Option<&Interrupted> {
+        self.interrupted.iter().find(|of| of.number == number)
+    }
+
+    /// The world in which a batch under way was planned.
+    pub fn planned(&self, number: u32) -> WorldId {
+        self.interrupted(number).map_or(self.world, |interrupted| interrupted.planned)
+    }
+
+    /// Whether a batch under way is interrupted, or something of it was given up.
+    pub fn is_stopped(&self, number: u32) -> bool {
+        self.interrupted(number).is_some() || self.desk.turn_of(number).is_some_and(|turn| !turn.given_up.is_empty())
     }
 
     /// How many requests are not answered.

@@ -94,8 +94,6 @@ pub(super) struct Engine {
     /// What safe configurations under way could not plan, and what those that have ended touched.
     pub troubles: Vec<(RequestId, Vec<Reason>)>,
     pub touched: crate::transaction::Touched,
-    /// Undos that give up what is under way, with the number of that request; answered with it.
-    pub giving_up: Vec<(RequestId, Request)>,
     /// Commands that wait.
     pub commands: VecDeque<Command>,
     replies: Vec<(Ticket, Reply)>,
@@ -153,7 +151,6 @@ impl Engine {
             safe: VecDeque::new(),
             troubles: Vec::new(),
             touched: crate::transaction::Touched::default(),
-            giving_up: Vec::new(),
             commands: VecDeque::new(),
             replies: Vec::new(),
             given_up: FxHashSet::default(),

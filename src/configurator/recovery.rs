@@ -279,7 +279,6 @@ impl Engine {
         for turn in self.desk.under_way().to_vec() {
             self.desk.over(turn.number);
         }
-        self.giving_up.clear();
         // It may have been taking everything down: what comes from now on begins again.
         self.taking_down = false;
         let seen = self.look();

@@ -8,8 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Group, Planned, Rules, Stopped, Turn, Why, gave_up, given_up_of,
-    settle, take_up,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Rules, Stopped, Turn, Why, settle, take_up,
 };
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
@@ -39,11 +38,10 @@ impl Engine {
     fn take_up(&mut self, number: u32) {
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
-            let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
+            let Some(turn) = self.desk.turn_of(number) else { return };
             let requests = turn.batch.requests.clone();
             // Given up together with one before it, of which it was to be taken up anew.
-            let given_up = |request: &Request| self.giving_up.iter().any(|(of, _)| *of == request.id);
-            if let Some(place) = requests.iter().position(|request| !request.ask.is_undo() && given_up(request)) {
+            if let Some(place) = turn.given_up.iter().map(|given_up| given_up.place).min() {
                 self.cancel_behind(number, place, requests[place]);
                 continue;
             }
@@ -64,7 +62,7 @@ impl Engine {
                 if self.repair_for(&requests[0], at) {
                     continue;
                 }
-                if self.desk.answered(number, 0) {
+                if self.desk.answered(number, 0, None).over {
                     return;
                 }
                 continue;
@@ -77,7 +75,7 @@ impl Engine {
                 }
                 self.forget(requests[0]);
                 group.told.clear();
-                if self.desk.answered(number, 0) {
+                if self.desk.answered(number, 0, None).over {
                     return;
                 }
                 continue;
@@ -150,7 +148,7 @@ impl Engine {
         parts: Vec<PartEnd>,
         planned: Option<(&Planned, &[(usize, u64)], Option<Reason>)>,
     ) {
-        let Some(turn) = self.desk.under_way().iter().find(|turn| turn.number == number) else { return };
+        let Some(turn) = self.desk.turn_of(number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
         let endings: Endings = parts.iter().map(PartEnd::ending).collect();
@@ -187,11 +185,8 @@ impl Engine {
         for (request, frame) in confirm {
             self.await_confirmation(request, frame);
         }
-        // From the last on, so that places stay.
-        for (place, ..) in settled.answers.iter().rev() {
-            self.desk.answered(number, *place);
-        }
-        for (place, verdict, about) in settled.answers {
+        let gone = self.desk.all_answered(number, settled.answers.iter().map(|(place, verdict, _)| (*place, *verdict)));
+        for ((place, verdict, about), gone) in settled.answers.into_iter().zip(gone) {
             let request = requests[place];
             let reason = match about {
                 About::Part(part) => reasons[part].clone(),
@@ -200,7 +195,7 @@ impl Engine {
                 About::Commit => None,
             };
             self.finish(request, verdict, reason.clone());
-            self.answer_giving_up(&request, verdict, reason.as_ref());
+            self.answer_undos(gone, reason.as_ref());
         }
     }
 
@@ -271,15 +266,9 @@ impl Engine {
     /// What is under way is given up by its own undo.
     pub(super) fn give_up_request(&mut self, number: u32, undo: Request) {
         let of_batch = |running: &&mut Running| matches!(&running.purpose, Purpose::Requests(of, _) if *of == number);
-        let requests = match self.desk.under_way().iter().find(|turn| turn.number == number) {
-            Some(turn) => turn.batch.requests.clone(),
-            None => SmallVec::new(),
-        };
-        let Some(place) = given_up_of(&undo, &requests) else {
-            // Another undo of the same step has given it up already.
+        let Some(place) = self.desk.give_up(number, undo) else {
             return self.answer(undo, Verdict::Undone, None);
         };
-        self.giving_up.push((requests[place].id, undo));
         let running = self.running.iter_mut().find(of_batch);
         let part = running.as_ref().and_then(|running| match &running.purpose {
             Purpose::Requests(_, group) => group.places.iter().position(|p| *p == place),
@@ -288,16 +277,19 @@ impl Engine {
         match (running, part) {
             (Some(running), Some(part)) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
             // It stands behind in its batch and has not begun.
-            _ => self.cancel_behind(number, place, requests[place]),
+            _ => {
+                let request = self.desk.turn_of(number).map(|turn| turn.batch.requests[place]);
+                request.into_iter().for_each(|request| self.cancel_behind(number, place, request));
+            }
         }
     }
 
     /// A request of a batch under way is given up before it began.
     fn cancel_behind(&mut self, number: u32, place: usize, request: Request) {
-        self.desk.answered(number, place);
+        let gone = self.desk.answered(number, place, Some(Verdict::Cancelled));
         self.shift_places(number, place);
         self.answer(request, Verdict::Cancelled, Some(Reason::Overtaken));
-        self.answer_giving_up(&request, Some(Verdict::Cancelled), None);
+        self.answer_undos(gone, None);
     }
 
     /// A request was taken out of a batch under way: those behind it have moved up.
@@ -316,23 +308,15 @@ impl Engine {
         }
     }
 
-    /// Answers the undos that gave `request` up.
-    fn answer_giving_up(&mut self, request: &Request, verdict: Option<Verdict>, reason: Option<&Reason>) {
-        let verdict = verdict.unwrap_or(Verdict::Cancelled);
-        let fits = |(of, _): &(RequestId, Request)| *of == request.id && !request.ask.is_undo();
-        while let Some(at) = self.giving_up.iter().position(fits) {
-            let (_, undo) = self.giving_up.remove(at);
-            match gave_up(verdict) {
-                None => {
-                    self.forget(undo);
-                    self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
-                    self.desk.comes_next(undo);
-                }
-                Some(answer) => {
-                    let reason = reason.cloned().filter(|_| answer == Verdict::UndoBroken);
-                    self.answer(undo, answer, reason);
-                }
-            }
+    /// Answers the undos that had given up what is answered; those that came too late are owed again when they begin.
+    pub(super) fn answer_undos(&mut self, gone: Gone, reason: Option<&Reason>) {
+        for (undo, verdict) in gone.undone {
+            let reason = reason.cloned().filter(|_| verdict == Verdict::UndoBroken);
+            self.answer(undo, verdict, reason);
+        }
+        for undo in gone.late {
+            self.forget(undo);
+            self.counts.requests.fetch_add(1, std::sync::atomic::Ordering::AcqRel);
         }
     }
 

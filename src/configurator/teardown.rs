@@ -150,12 +150,13 @@ impl Engine {
             .collect();
         let left: Vec<_> = self.desk.under_way().iter().filter(|turn| !begun.contains(&turn.number)).cloned().collect();
         for turn in left {
-            self.desk.over(turn.number);
             for request in turn.batch.requests {
+                let gone = self.desk.answered(turn.number, 0, Some(request.ask.failed()));
                 match request.why {
                     Why::Asked => self.answer(request, request.ask.failed(), Some(Reason::TakenDown)),
                     _ => self.forget(request),
                 }
+                self.answer_undos(gone, None);
             }
         }
     }

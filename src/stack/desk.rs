@@ -8,6 +8,7 @@ use super::claims::Claims;
 use super::request::{Batch, Request, Requester, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
+use smallvec::SmallVec;
 use std::collections::VecDeque;
 
 /// A batch that has begun, by the number under which it is under way.
@@ -17,6 +18,28 @@ pub struct Turn {
     pub number: u32,
     /// Its requests that are not answered yet, arranged.
     pub batch: Batch,
+    /// Undos that have given up requests of it, in the order in which they came.
+    pub given_up: SmallVec<[GivenUp; 1]>,
+}
+
+/// An undo that has given up a request of a batch under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct GivenUp {
+    /// The place of that request in the batch.
+    pub place: usize,
+    /// The undo.
+    pub undo: Request,
+}
+
+/// What goes with a request of a batch under way that is answered.
+#[derive(Debug, Default)]
+pub struct Gone {
+    /// That was the last of the batch, and it is over.
+    pub over: bool,
+    /// Undos that had given it up, and how they are answered.
+    pub undone: SmallVec<[(Request, Verdict); 1]>,
+    /// Undos that came too late for that: they are the next to begin, before what came later, also of its own batch.
+    pub late: SmallVec<[Request; 1]>,
 }
 
 /// What waits and what is under way.
@@ -143,7 +166,7 @@ impl Desk {
         }?;
         let batch = self.waiting.remove(at)?;
         let number = (0..).find(|n| self.under_way.iter().all(|turn| turn.number != *n))?;
-        let turn = Turn { number, batch };
+        let turn = Turn { number, batch, given_up: SmallVec::new() };
         self.under_way.push(turn.clone());
         Some(turn)
     }
@@ -162,9 +185,17 @@ impl Desk {
         None
     }
 
-    /// An undo that came too late to give something up: it is the next to begin, before what came later, also of its own batch.
-    pub fn comes_next(&mut self, undo: Request) {
-        self.waiting.push_front(Batch::one(undo));
+    /// A batch under way.
+    pub fn turn_of(&self, number: u32) -> Option<&Turn> {
+        self.under_way.iter().find(|turn| turn.number == number)
+    }
+
+    /// An undo gives up what a batch under way asks; its place there. None: another undo of the same step has done so before.
+    pub fn give_up(&mut self, number: u32, undo: Request) -> Option<usize> {
+        let turn = self.under_way.iter_mut().find(|turn| turn.number == number)?;
+        let place = given_up_of(&undo, &turn.batch.requests)?;
+        turn.given_up.push(GivenUp { place, undo });
+        Some(place)
     }
 
     /// A batch that could begin has not done so after all: it is the first that waits, or the last, since it had just come.
@@ -182,24 +213,54 @@ impl Desk {
         }
     }
 
-    /// Every request that waits or is under way.
+    /// Every request that waits, is under way or has given something up.
     pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
-        let waiting = self.waiting.iter_mut();
-        waiting.chain(self.under_way.iter_mut().map(|turn| &mut turn.batch)).flat_map(|batch| &mut batch.requests)
+        let under_way = self.under_way.iter_mut().flat_map(|turn| {
+            turn.batch.requests.iter_mut().chain(turn.given_up.iter_mut().map(|given_up| &mut given_up.undo))
+        });
+        self.waiting.iter_mut().flat_map(|batch| &mut batch.requests).chain(under_way)
     }
 
-    /// The request at a place of a batch under way is answered. True: that was the last of it, and it is over.
-    pub fn answered(&mut self, number: u32, place: usize) -> bool {
-        let Some(at) = self.under_way.iter().position(|turn| turn.number == number) else { return true };
-        let requests = &mut self.under_way[at].batch.requests;
-        if place < requests.len() {
-            requests.remove(place);
+    /// The request at a place of a batch under way is answered so (none: nobody is told).
+    pub fn answered(&mut self, number: u32, place: usize, verdict: Option<Verdict>) -> Gone {
+        let mut gone = Gone { over: true, ..Gone::default() };
+        let Some(at) = self.under_way.iter().position(|turn| turn.number == number) else { return gone };
+        let turn = &mut self.under_way[at];
+        if place < turn.batch.requests.len() {
+            turn.batch.requests.remove(place);
         }
-        let over = requests.is_empty();
-        if over {
+        turn.given_up.retain(|given_up| {
+            if given_up.place == place {
+                match gave_up(verdict.unwrap_or(Verdict::Cancelled)) {
+                    Some(answer) => gone.undone.push((given_up.undo, answer)),
+                    None => gone.late.push(given_up.undo),
+                }
+                return false;
+            }
+            given_up.place -= usize::from(given_up.place > place);
+            true
+        });
+        gone.over = turn.batch.requests.is_empty();
+        if gone.over {
             self.under_way.remove(at);
         }
-        over
+        for undo in gone.late.iter().rev() {
+            self.waiting.push_front(Batch::one(*undo));
+        }
+        gone
+    }
+
+    /// Several requests of a batch under way are answered, in the order of their places.
+    pub fn all_answered(
+        &mut self,
+        number: u32,
+        answers: impl DoubleEndedIterator<Item = (usize, Option<Verdict>)>,
+    ) -> SmallVec<[Gone; 2]> {
+        // From the last on, so that places stay.
+        let mut gone: SmallVec<[Gone; 2]> =
+            answers.rev().map(|(place, verdict)| self.answered(number, place, verdict)).collect();
+        gone.reverse();
+        gone
     }
 
     /// A batch under way is over, whatever of it was not answered.
@@ -224,7 +285,7 @@ pub fn given_up_of(undo: &Request, requests: &[Request]) -> Option<usize> {
 
 /// What an undo is answered that gave up a request which ended so. None: that was through before it could be given up, and
 /// the undo is a request like others, the next to begin.
-pub fn gave_up(verdict: Verdict) -> Option<Verdict> {
+fn gave_up(verdict: Verdict) -> Option<Verdict> {
     match verdict {
         Verdict::Ok => None,
         Verdict::Broken => Some(Verdict::UndoBroken),
