@@ -1,6 +1,7 @@
 //! Whether every way leads down, and what it leaves behind.
 
-use super::explore::{Bound, Edge, Graph};
+use super::bound::Bound;
+use super::explore::{Edge, Graph};
 use super::judge::Traced;
 use super::state::{Failed, State};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};

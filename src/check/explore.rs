@@ -3,10 +3,11 @@
 //! What can be reached without anything failing is followed first, the shortest way first; then what failed applications
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
-use super::Explored;
+use super::bound::Bound;
 use super::outcome::EMPTY;
 use super::product::Product;
 use super::replay::Replay;
+use super::report::Explored;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
 use super::trace::{Happened, Place, TraceStep};
 use super::world::Top;
@@ -36,27 +37,6 @@ pub struct Edge {
     pub again: bool,
     /// It comes, and nobody hears it.
     pub dropped: bool,
-}
-
-/// A bound that cut something off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Bound {
-    /// [`limits::CHECK_TRANSITIONS`].
-    Budget,
-    /// [`limits::CHECK_WAITING`].
-    Waiting,
-    /// [`limits::CHECK_LEAN`].
-    Lean,
-    /// [`limits::CHECK_PILED`].
-    Piled,
-    /// [`limits::CHECK_FRAMES`].
-    Frames,
-    /// [`limits::CHECK_INBOX`].
-    Inbox,
-    /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
-    Forks,
-    /// A coordinator could not be entered.
-    Entered,
 }
 
 /// Everything that was followed.

@@ -6,6 +6,7 @@
 mod alike;
 mod arrive;
 mod beside;
+mod bound;
 mod comes;
 mod configurations;
 mod coordinator;
@@ -25,6 +26,8 @@ mod product;
 mod purity;
 mod reactions;
 pub mod replay;
+mod report;
+mod run;
 mod safety;
 mod shape;
 mod simulated;
@@ -39,232 +42,9 @@ mod verdict;
 mod ways;
 mod world;
 
-use crate::limits;
-use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Findings, StepFault};
-use crate::statechart::Chart;
 pub use drive::{Drive, Happening, Until, drive};
-use explore::Bound;
 pub use follow::{Follower, Known, Seen, Shown};
-use judge::Traced;
-use product::Product;
-use rustc_hash::FxHashSet;
-use serde::Serialize;
-use std::cmp::Reverse;
-use std::collections::BTreeSet;
-use std::ops::Deref;
-use std::sync::Arc;
+pub use report::{Checked, Explored, Report};
+pub use run::{configurations, fault, monitors, run};
 pub use trace::{Answered, Happened, Place, TraceStep};
 pub use verdict::Verdict;
-
-/// Something in which `check` found nothing that refuses it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Checked<T>(Arc<T>);
-
-impl<T> Checked<T> {
-    /// The thing itself, to be shared; no longer known to be checked.
-    pub fn share(&self) -> Arc<T> {
-        self.0.clone()
-    }
-}
-
-impl<T> Deref for Checked<T> {
-    type Target = T;
-    fn deref(&self) -> &T {
-        &self.0
-    }
-}
-
-/// How far the coordinators were followed through events and answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Explored {
-    /// States of coordinators, system, stack and waiting requests together.
-    pub states: usize,
-    /// Events and answers followed from them.
-    pub transitions: usize,
-    /// Whether that was all there is.
-    pub complete: bool,
-    /// States that were met and not followed further, because the budget was used up.
-    pub unfollowed: usize,
-    /// Whether every way was followed to its end on which no request fails.
-    pub without_failure: bool,
-}
-
-impl Explored {
-    /// This and another one, as one.
-    fn and(self, other: Self) -> Self {
-        Self {
-            states: self.states + other.states,
-            transitions: self.transitions + other.transitions,
-            complete: self.complete && other.complete,
-            unfollowed: self.unfollowed + other.unfollowed,
-            without_failure: self.without_failure && other.without_failure,
-        }
-    }
-}
-
-/// What `check` has to say.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Report {
-    /// The deployment, if nothing refuses it.
-    pub checked: Option<Checked<Deployment>>,
-    /// The deployment, if whatever refuses it was found by following its coordinators: fit to be replayed on the simulated
-    /// platform, where the ways to that can be gone, and for nothing else.
-    pub replayed: Option<Checked<Deployment>>,
-    /// Everything found, errors first.
-    pub findings: Findings,
-    /// Of each finding the shortest way to it from the start; empty: it needs none.
-    pub traces: Vec<Vec<TraceStep>>,
-    /// How far the coordinators were followed.
-    pub explored: Explored,
-    /// What was left out: one bound each.
-    pub left: Vec<String>,
-    /// What it comes to.
-    pub verdict: Verdict,
-}
-
-/// Checks a deployment against the component types it may use (those of its libraries and those it declares).
-pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Report {
-    let shared = deployment.into();
-    let deployment = &*shared;
-    let universe = universe::Universe::new(deployment, catalogue);
-    let mut findings = types::check(deployment, catalogue);
-    findings.extend(configurations::check(deployment, &universe));
-    findings.extend(monitors::check(deployment, &universe));
-    findings.extend(simulated::check(deployment, &universe));
-    findings.extend(declared::check(deployment, &universe));
-    let written = deployment.charts();
-    let mut charts = Vec::new();
-    let mut all = 0;
-    for chart in written {
-        let (chart, problems) = crate::statechart::compile(chart);
-        findings.extend(problems);
-        charts.extend(chart);
-        all += 1;
-    }
-    let mut traced: Traced = findings.into_iter().map(|finding| (finding, Vec::new())).collect();
-    let mut explored = Explored::default();
-    let mut left: BTreeSet<String> = BTreeSet::new();
-    let mut replayed = None;
-    if charts.len() == all {
-        let charts: Vec<&Chart> = charts.iter().collect();
-        let mut findings = monitors::events(deployment, &charts);
-        findings.extend(simulated::events(deployment, &charts));
-        let of = |number| beside::view(deployment, &charts, number);
-        let views: Vec<Deployment> = (0..all).filter_map(of).collect();
-        for (view, chart) in views.iter().zip(&charts) {
-            findings.extend(coordinator::check(view, chart));
-            findings.extend(unheard::check(view, chart));
-            findings.extend(purity::check(view));
-        }
-        // Another one may wait for what starts and ends the deployment, and tell the others.
-        beside::forgive_unheard(deployment, &charts, &mut findings);
-        traced.extend(findings.into_iter().map(|finding| (finding, Vec::new())));
-        // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
-        if !traced.iter().any(|(finding, _)| finding.is_error()) {
-            replayed = Some(Checked(shared.clone()));
-            explored = follow(deployment, &views, &charts, catalogue, &mut traced, &mut left);
-            // Where there is an actuator, more is said of it.
-            let said = |finding: &crate::model::Finding| {
-                traced.iter().any(|(f, _)| (f.code, f.origin) == (finding.code, finding.origin))
-            };
-            let unheard: Findings = safety::unheard(deployment, &charts).into_iter().filter(|f| !said(f)).collect();
-            traced.extend(unheard.into_iter().map(|finding| (finding, Vec::new())));
-        }
-    }
-    traced.sort_by_key(|(finding, _)| Reverse(finding.severity));
-    let (findings, traces): (Findings, Vec<_>) = traced.into_iter().unzip();
-    let left: Vec<String> = left.into_iter().collect();
-    let verdict = Verdict::of(&findings, charts.len() == all, left.clone());
-    let checked = (verdict != Verdict::Refused).then(|| Checked(shared.clone()));
-    Report { checked, replayed, findings, traces, explored, left, verdict }
-}
-
-/// Follows the coordinators, those together that have to do with each other. `left` is told what was left out.
-fn follow(
-    deployment: &Deployment,
-    views: &[Deployment],
-    charts: &[&Chart],
-    catalogue: &Catalogue,
-    traced: &mut Traced,
-    left: &mut BTreeSet<String>,
-) -> Explored {
-    let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
-    let all: Vec<usize> = (0..charts.len()).collect();
-    let mut product = Product::new(deployment, views, charts, &all, catalogue);
-    let mut found = ways::ways(&mut product);
-    let mut asked = product.worlds.asked().clone();
-    for numbers in beside::groups(deployment, charts) {
-        // Where all have to do with each other, what was planned for the ways is known already.
-        let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
-        let product = apart.as_mut().unwrap_or(&mut product);
-        for most_waiting in limits::CHECK_WAITING..=limits::CHECK_WAITING_MOST {
-            product.follow_anew(most_waiting);
-            let mut graph = explore::explore(product);
-            // Anew with more of them where they are few: often there never are more at once.
-            let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
-            if easy && graph.bounds.contains_key(&Bound::Waiting) {
-                continue;
-            }
-            found.extend(graph.judge());
-            let verified = !graph.bounds.contains_key(&Bound::Budget) && !graph.bounds.contains_key(&Bound::Entered);
-            let shared = beside::shared(deployment, charts, &numbers, verified);
-            found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-            left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting)));
-            explored = explored.and(graph.explored());
-            asked.extend(product.worlds.asked());
-            break;
-        }
-    }
-    // Said once, of what none of them asks for.
-    let unasked = unasked(deployment, &product, &asked);
-    found.extend(unasked.into_iter().map(|finding| (finding, Vec::new())));
-    found.sort_by_key(|(finding, _)| Reverse(finding.severity));
-    for (finding, way) in found {
-        if !traced.iter().any(|(known, _)| known.code == finding.code && known.message == finding.message) {
-            traced.push((finding, way));
-        }
-    }
-    explored
-}
-
-/// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system
-/// then is not known; what is wrong with them in any system is.
-fn unasked(deployment: &Deployment, product: &Product<'_>, asked: &FxHashSet<ConfigId>) -> Findings {
-    const ANYWHERE: [Code; 4] = [CLASH, PRE_ON_CREATED, POST_ON_DESTROYED, TOUCHES_DESTROYED];
-    let mut findings = Vec::new();
-    for configuration in deployment.configurations.iter().filter(|c| !asked.contains(&c.id)) {
-        if let Err(refusal) = product.worlds.try_anywhere(configuration) {
-            findings.extend(refusal.findings.into_iter().filter(|f| ANYWHERE.contains(&f.code)));
-        }
-    }
-    findings
-}
-
-/// What is wrong with the monitors: names, parts of what ports carry, events that nobody hears. `names`: whether the
-/// components are all known, so that names can be judged.
-pub fn monitors(deployment: &Deployment, catalogue: &Catalogue, names: bool) -> Findings {
-    let mut findings = match names {
-        true => monitors::check(deployment, &universe::Universe::new(deployment, catalogue)),
-        false => Vec::new(),
-    };
-    let written = deployment.charts();
-    let charts: Option<Vec<Chart>> = written.map(|chart| crate::statechart::compile(chart).0).collect();
-    if let Some(charts) = charts {
-        findings.extend(monitors::events(deployment, &charts.iter().collect::<Vec<_>>()));
-    }
-    findings
-}
-
-/// What is wrong with the step of a fault, where the deployment runs on the simulated platform.
-pub fn fault(fault: &StepFault, deployment: &Deployment, catalogue: &Catalogue) -> Findings {
-    simulated::fault(fault, deployment, &universe::Universe::new(deployment, catalogue))
-}
-
-/// What is wrong with some configurations by themselves; names are judged against all that the deployment creates.
-pub fn configurations(deployment: &Deployment, catalogue: &Catalogue, ids: &[ConfigId]) -> Findings {
-    let universe = universe::Universe::new(deployment, catalogue);
-    let mut findings = configurations::some(deployment, &universe, ids);
-    findings.extend(declared::holds(deployment, &universe, ids));
-    findings
-}

@@ -1,8 +1,5 @@
 //! What a check comes to.
 
-use super::explore::Bound;
-use super::state::Failed;
-use crate::limits;
 use crate::model::{Finding, Severity, finding};
 use serde::Serialize;
 
@@ -65,39 +62,5 @@ impl Verdict {
             Self::Warnings if self != Self::Refused => Self::Warnings,
             _ => self,
         }
-    }
-}
-
-impl Bound {
-    /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
-    pub(super) fn told(self, failed: Failed, most_waiting: usize) -> String {
-        let what = match self {
-            Self::Budget => format!("the budget of {} transitions was used up", limits::CHECK_TRANSITIONS),
-            Self::Waiting => {
-                format!("more than {most_waiting} batches of one coordinator that wait at once were not followed")
-            }
-            Self::Lean => {
-                return "behind an undo that failed, only one batch of a coordinator at a time was followed".to_owned();
-            }
-            Self::Piled => format!("more than {} requests that wait were not followed", limits::CHECK_PILED),
-            Self::Frames => {
-                format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)
-            }
-            Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
-            Self::Forks => format!(
-                "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \
-                 followed to its end",
-                limits::CHECK_HANDED,
-                limits::CHECK_FORKS
-            ),
-            Self::Entered => "a coordinator could not be entered".to_owned(),
-        };
-        let behind = match failed {
-            Failed::Nothing => "",
-            Failed::Apply => ", behind a request that failed",
-            Failed::Undo => ", behind an undo that failed",
-            Failed::Broken => ", behind something that broke",
-        };
-        format!("{what}{behind}")
     }
 }

@@ -1,0 +1,214 @@
+//! Starting a configurator, and what others hold of it while its thread runs.
+
+use super::conditions::Conditions;
+use super::control::{Command, Drift, Recovery, TakenDown, View};
+use super::engine::{Engine, Force, Parts};
+use super::inbox::{self, Mail, Post};
+use super::pool::Pool;
+use super::progress::{AnswerSink, ProgressSink};
+use super::request::{Answer, Batch, Full, Reason, Request, Residual};
+use crate::limits;
+use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
+use crate::plan::Context;
+use crate::platform::{Platform, PlatformEvent};
+use crate::stack::{Requester, World};
+use crate::system::System;
+use crate::time::{Clock, Join, Receiver, Time};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// What a configurator is started with.
+pub struct Setup {
+    /// The configurations that may be asked for.
+    pub configurations: Vec<Configuration>,
+    /// Those of them that bring the system to rest when it is taken down by force, in this order.
+    pub rest: Vec<ConfigId>,
+    /// Those of them that an operator may apply, beside those that are safe.
+    pub operator: Vec<ConfigId>,
+    /// The component types.
+    pub catalogue: Catalogue,
+    /// The deployment's activities.
+    pub activities: BTreeSet<Ident>,
+    /// The names under which coordinators ask.
+    pub coordinators: BTreeSet<Requester>,
+    /// Where the components live.
+    pub platform: Arc<dyn Platform>,
+    /// The time.
+    pub clock: Clock,
+    /// Bounds the user may set.
+    pub limits: DeploymentLimits,
+    /// Blocking platform calls made at the same time.
+    pub workers: usize,
+    /// Where answers go.
+    pub answers: AnswerSink,
+    /// Hears what is under way.
+    pub progress: Option<ProgressSink>,
+    /// Who evaluates what configurations stand for, and what settles calls; none: the former counts as true, the latter is
+    /// not known.
+    pub conditions: Option<Arc<dyn Conditions>>,
+}
+
+/// Starts configurators.
+pub struct Configurator;
+
+impl Configurator {
+    /// Starts a configurator on a thread of its own, for a platform on which nothing of the deployment is yet.
+    pub fn start(setup: Setup) -> ConfiguratorHandle {
+        let (post, inbox) = inbox::new(&setup.clock);
+        let safe_in_order = setup.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
+        let configurations: FxHashMap<ConfigId, Configuration> =
+            setup.configurations.into_iter().map(|c| (c.id, c)).collect();
+        let force = Force { safe: safe_in_order, rest: setup.rest };
+        let safe = configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
+        let awaited = configurations.values().filter_map(|c| c.confirm.map(|confirm| confirm.event)).collect();
+        let parts = Parts {
+            clock: setup.clock.clone(),
+            platform: setup.platform.clone(),
+            limits: setup.limits,
+            configurations: Arc::new(configurations),
+            force,
+            operator: setup.operator.into_iter().collect(),
+            context: Context { activities: setup.activities, avoid: BTreeSet::new() },
+            coordinators: setup.coordinators,
+            pool: Pool::new(setup.clock.clone(), setup.platform, post.clone(), setup.workers.min(limits::WORKERS_MOST)),
+            inbox,
+            counts: post.counts.clone(),
+            answers: setup.answers.clone(),
+            progress: setup.progress,
+            conditions: setup.conditions,
+        };
+        let stack = crate::stack::Stack::new(setup.limits.stack);
+        let engine = Engine::new(parts, World::new(System::new(Arc::new(setup.catalogue)), stack));
+        let thread = setup.clock.spawn("configurator", move || engine.live());
+        let inner =
+            Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };
+        ConfiguratorHandle { inner: Arc::new(inner) }
+    }
+}
+
+/// A running configurator. Cheap to clone; when the last clone is dropped it ends.
+#[derive(Clone)]
+pub struct ConfiguratorHandle {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    post: Post,
+    clock: Clock,
+    safe: FxHashSet<ConfigId>,
+    awaited: FxHashSet<EventName>,
+    answers: AnswerSink,
+    thread: Mutex<Option<Join>>,
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        self.post.command(Command::Stop);
+    }
+}
+
+impl ConfiguratorHandle {
+    /// Submits requests; never blocks.
+    ///
+    /// # Errors
+    /// [`Full`] when the queue is full or the configurator has ended; each request has then been answered *failed*.
+    pub fn submit(&self, batch: Batch) -> Result<(), Full> {
+        if batch.requests.is_empty() {
+            return Ok(());
+        }
+        let safe = |request: &&Request| matches!(request.ask, Ask::Apply(id) if self.inner.safe.contains(&id));
+        let safe = batch.requests.iter().filter(safe).count();
+        self.inner.post.batch(batch, safe).map_err(|batch| {
+            let at = self.inner.clock.now();
+            for request in batch.requests {
+                let verdict = request.ask.failed();
+                let reason = Some(Arc::new(Reason::Full));
+                (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
+            }
+            Full
+        })
+    }
+
+    /// Tells what the platform reported; never blocks. Faults and late returns change the picture of the system, a raised
+    /// event may be the confirmation that is waited for.
+    pub fn platform_event(&self, event: &PlatformEvent) {
+        match event {
+            PlatformEvent::Raised { event, .. } => self.event(*event),
+            other => self.inner.post.report(Mail::Platform(other.clone())),
+        }
+    }
+
+    /// Tells that an event was raised (by a component, a monitor, an operator); never blocks. Only events that some
+    /// configuration names as its confirmation matter.
+    pub fn event(&self, event: EventName) {
+        if self.inner.awaited.contains(&event) {
+            self.inner.post.report(Mail::Event(event));
+        }
+    }
+
+    /// Tells that truths of conditions have changed; never blocks.
+    pub fn truths_changed(&self) {
+        self.inner.post.truths();
+    }
+
+    /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.
+    pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<View>> {
+        self.ask(deadline, |reply| Command::View { system, reply })
+    }
+
+    /// The difference between the picture and the platform.
+    pub fn drift(&self, deadline: Time) -> Option<Drift> {
+        self.ask(deadline, |reply| Command::Drift { reply })
+    }
+
+    /// Recovers a broken system; the error is what remains. None: no answer by `deadline`.
+    pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
+        self.ask(deadline, |reply| Command::Recover { direction, reply })
+    }
+
+    /// Pops every frame, newest first, and removes what could not be popped: what a failed bring-up does. What is under
+    /// way gives way. The answer comes out of the receiver.
+    pub fn unwind(&self, deadline: Time) -> Receiver<TakenDown> {
+        self.take_down(false, deadline)
+    }
+
+    /// Applies the `safe` configurations, then removes everything: what a late or incomplete shutdown does.
+    pub fn force_down(&self, deadline: Time) -> Receiver<TakenDown> {
+        self.take_down(true, deadline)
+    }
+
+    fn take_down(&self, forced: bool, deadline: Time) -> Receiver<TakenDown> {
+        let (reply, answer) = self.inner.clock.channel(1);
+        self.inner.post.command(Command::TakeDown { forced, deadline, reply });
+        answer
+    }
+
+    /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
+    /// are down and nothing is there any more, what was in force is forgotten.
+    pub fn down(&self, coordinator: Requester) {
+        self.inner.post.command(Command::Down(coordinator));
+    }
+
+    /// Forgets the stack: the *down* state was reached with an empty system.
+    pub fn discard_stack(&self) {
+        self.inner.post.command(Command::DiscardStack);
+    }
+
+    /// Ends the configurator: what is under way is broken off, what waits is answered *failed*. Waits until it has
+    /// ended, at most until `deadline`; answers whether it has.
+    pub fn stop(&self, deadline: Time) -> bool {
+        self.inner.post.command(Command::Stop);
+        let thread = crate::time::lock(&self.inner.thread).take();
+        thread.is_none_or(|thread| thread.join(deadline).is_ok())
+    }
+
+    fn ask<T>(&self, deadline: Time, command: impl FnOnce(crate::time::Sender<T>) -> Command) -> Option<T> {
+        let (reply, answer) = self.inner.clock.channel(1);
+        if !self.inner.post.command(command(reply)) {
+            return None;
+        }
+        answer.recv_deadline(deadline).ok()
+    }
+}
