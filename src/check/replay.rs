@@ -10,7 +10,7 @@ use super::product::Product;
 use super::state::{Move, Next, State};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
-use crate::stack::Request;
+use crate::stack::{Request, Why};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::time::Duration;
@@ -284,7 +284,14 @@ fn races(before: &State, next: &Next) -> bool {
         };
         next.answers.is_empty() && under_way(&next.state).iter().any(within)
     };
-    next.answers.iter().any(through) || under_way(before).iter().any(|requests| back(requests) || shrinks(requests))
+    // Or nothing of it had, and what came has cancelled it.
+    let cancelled = |requests: &SmallVec<[Request; 2]>| {
+        let of = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
+        let goes_on = under_way(&next.state).iter().flatten().any(of);
+        !goes_on && !next.answers.iter().any(|(request, _)| of(request)) && requests[0].why == Why::Asked
+    };
+    let stops = |requests| back(requests) || shrinks(requests) || cancelled(requests);
+    next.answers.iter().any(through) || under_way(before).iter().any(stops)
 }
 
 /// Whether a move answers all of a batch.

@@ -269,3 +269,31 @@ fn what_asks_without_end_is_followed_up_to_a_bound() {
     assert_eq!(said["explored"]["complete"], false);
     assert!(said["explored"]["states"].as_u64().unwrap() < 100_000, "{}", said["explored"]);
 }
+
+#[test]
+fn what_had_not_begun_when_a_safe_configuration_came_is_no_way_of_a_script() {
+    let small = Small::new(
+        "build = Configuration { create('a', 'Drive') },
+         gain = Configuration { property_set('a.gain', 2.0) },
+         stop = Configuration { safe = true, property_set('a.gain', 0.0) }",
+        "idle = state {},
+         life = state { config = 'build',
+           wait = state {}, up = state {}, high = state { config = 'gain' }, halted = state { config = 'stop' },
+           trans { src = 'initial', tgt = 'wait' },
+           trans { src = 'wait', tgt = 'up', events = { 'build.ok' } },
+           trans { src = 'up', tgt = 'high', events = { 'e_high' } },
+           trans { src = 'high', tgt = 'up', events = { 'e_low', 'gain.failed', 'gain.broken' } },
+           trans { src = 'wait', tgt = 'halted', events = { 'e_stop' } },
+           trans { src = 'halted', tgt = 'up', events = { 'e_reset', 'stop.failed' } } },
+         leaving = state {}, fault = state {},
+         trans { src = 'initial', tgt = 'idle' },
+         trans { src = 'idle', tgt = 'life', events = { 'e_start' } },
+         trans { src = 'life', tgt = 'fault', events = { 'build.failed', 'build.broken' } },
+         trans { src = 'life', tgt = 'leaving', events = { 'e_shutdown' } },
+         trans { src = 'leaving', tgt = 'idle', events = { 'build.undone' } }",
+        "",
+    );
+    // Each way is gone by its script, or told to be none of a script's.
+    let said = small.check();
+    assert!(!said.refused("gain").is_empty(), "{:#}", said.0);
+}
