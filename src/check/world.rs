@@ -436,7 +436,7 @@ impl<'a> Worlds<'a> {
     pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
         self.group(id, requests, &Beside::default())
             .and_then(|group| group.planned)
-            .map_or_else(Vec::new, |planned| planned.steps)
+            .map_or_else(Vec::new, |planned| Arc::unwrap_or_clone(planned.steps))
     }
 
     fn next(&self) -> WorldId {

@@ -46,6 +46,15 @@ impl Engine {
             let room = self.has_room(running);
             let busy = self.busy_before(running);
             let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
+            if let Some(step) = running.machine.next_immediate(&self.world.system, now, &can) {
+                did = true;
+                self.inline(running, step, &mut now);
+                inline += 1;
+                if inline % 64 == 0 {
+                    self.glance();
+                }
+                continue;
+            }
             match running.machine.poll(&mut self.world.system, now, &can) {
                 Poll::Over => {
                     running.over = true;
@@ -100,7 +109,7 @@ impl Engine {
         let outcome = pool::execute(&*self.platform, step, deadline, running.enters_quarantine);
         *at = self.clock.now();
         self.tell(running, number, StepEnd::from(&outcome), Some(at.since(started)));
-        running.machine.on(Input::Ended { step: number, outcome }, &mut self.world.system);
+        running.machine.ended(number, outcome, &mut self.world.system);
         self.steps += 1;
     }
 

@@ -119,7 +119,8 @@ impl Builder<'_, '_, '_> {
     /// Records what a step touches and what it overwrites; `step` is false when its demand is fulfilled without it. The
     /// system is the one before it.
     fn record(&mut self, what: &Step, undo: Option<&Call>, inverse: &Undo, step: bool) {
-        self.footprint.touches.extend(step::touches(what, undo, self.view));
+        let touched = &mut self.footprint.touches;
+        step::touch_each(what, undo, self.view, &mut |touch| touched.push(touch));
         let value = match inverse {
             Undo::One(Step::PropertySet { value, .. }) => Saved::Property(value.clone()),
             Undo::One(Step::PortWrite { value, .. }) => Saved::Port(value.clone()),

@@ -35,6 +35,7 @@ use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// A question that is out, and its answer once that has come.
 #[derive(Debug, Clone, Copy)]
@@ -246,13 +247,16 @@ impl Transaction {
         self.end.expect("it is over")
     }
 
+    /// A step that was begun is back: [`Input::Ended`].
+    pub fn ended(&mut self, step: u32, outcome: Outcome, live: &mut System) {
+        self.doubted |= matches!(outcome, Outcome::Unknown(_));
+        self.in_hand_mut().ended(step, outcome, live);
+    }
+
     /// What happened.
     pub fn on(&mut self, input: Input, live: &mut System) {
         match input {
-            Input::Ended { step, outcome } => {
-                self.doubted |= matches!(outcome, Outcome::Unknown(_));
-                self.in_hand_mut().ended(step, outcome, live);
-            }
+            Input::Ended { step, outcome } => self.ended(step, outcome, live),
             Input::NotBegun(step) => self.in_hand_mut().not_begun(step),
             Input::Seen(seen) => self.seen = Some(seen),
             Input::Told { question, is } => {
@@ -309,6 +313,17 @@ impl Transaction {
         let calls = run.outstanding().filter(|i| matches!(run.list[*i as usize].step, Step::Operation(_)));
         let calls: Vec<u32> = calls.collect();
         self.cancels.extend(calls);
+    }
+
+    /// The step that [`Self::poll`] would let begin, where that is an immediate one and nothing is to be done before: of many
+    /// small steps most are. None: nothing is known by that.
+    pub fn next_immediate(&mut self, live: &System, now: Time, can: &Can<'_>) -> Option<u32> {
+        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
+        if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
+            return None;
+        }
+        let timeout = self.spec.timeout;
+        self.in_hand_mut().next_immediate(live, now, can, timeout)
     }
 
     /// What is to be done next.
@@ -459,7 +474,7 @@ impl Transaction {
             return;
         }
         self.attempts += 1;
-        let mut run = Run::new(way.list.clone(), Time::NEVER);
+        let mut run = Run::new(Arc::new(way.list.clone()), Time::NEVER);
         run.late_from_now = false;
         self.back = Some((run, way));
         self.phase = Phase::Back;
@@ -490,7 +505,7 @@ impl Transaction {
     fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.target = Some(Box::new(target));
         let list = chain(steps);
-        self.back = Some((Run::new(list, Time::NEVER), WayBack::default()));
+        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
         self.phase = Phase::Mending;
     }
 }

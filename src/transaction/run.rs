@@ -11,6 +11,7 @@ use crate::system::{System, Undo, View as _, Violation, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
+use std::sync::Arc;
 
 /// How a step stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +25,7 @@ enum State {
 /// A list of steps and how far it is.
 #[derive(Debug)]
 pub(super) struct Run {
-    pub list: Vec<PlannedStep>,
+    pub list: Arc<Vec<PlannedStep>>,
     state: Vec<State>,
     /// As long as no step is blocking the list's own order serves, from here on.
     at: usize,
@@ -63,7 +64,7 @@ pub(super) struct Late {
 }
 
 impl Run {
-    pub fn new(list: Vec<PlannedStep>, until: Time) -> Self {
+    pub fn new(list: Arc<Vec<PlannedStep>>, until: Time) -> Self {
         Self {
             state: vec![State::Waiting; list.len()],
             done: Vec::with_capacity(list.len()),
@@ -158,13 +159,9 @@ impl Run {
                     if self.out > 0 {
                         return smallvec![];
                     }
-                    let i = at as u32;
-                    if self.gate(i, live, now, timeout) {
-                        self.state[at] = State::Out(live.revision());
-                        self.out += 1;
+                    if let Some(i) = self.immediate(live, now, timeout) {
                         return smallvec![i];
                     }
-                    self.at += 1;
                 }
                 Execution::Brief => {
                     if self.out > 0 || !room {
@@ -178,6 +175,37 @@ impl Run {
             }
         }
         if self.order.is_some() { self.side_by_side(live, now, can, timeout) } else { smallvec![] }
+    }
+
+    /// The immediate step at the present place, which is out from now on. None: it must not begin, and has failed.
+    fn immediate(&mut self, live: &System, now: Time, timeout: std::time::Duration) -> Option<u32> {
+        let i = self.at as u32;
+        if !self.gate(i, live, now, timeout) {
+            return None;
+        }
+        self.state[self.at] = State::Out(live.revision());
+        self.out += 1;
+        Some(i)
+    }
+
+    /// What [`Self::begin`] begins where that is an immediate step in the list's own order, with nothing to be looked at
+    /// before.
+    pub fn next_immediate(
+        &mut self,
+        live: &System,
+        now: Time,
+        can: &Can<'_>,
+        timeout: std::time::Duration,
+    ) -> Option<u32> {
+        let plain = self.order.is_none() && self.out == 0 && self.unread.is_empty() && can.busy.is_empty();
+        if !plain || self.stops() {
+            return None;
+        }
+        while *self.state.get(self.at)? == State::Over {
+            self.at += 1;
+        }
+        let immediate = (can.execution)(&self.list[self.at].step) == Execution::Immediate;
+        if immediate { self.immediate(live, now, timeout) } else { None }
     }
 
     /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
