@@ -45,16 +45,15 @@ impl Engine {
             }
             let room = self.has_room(running);
             let busy = self.busy_before(running);
-            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
-            if let Some(step) = running.machine.next_immediate(&self.world.system, now, &can) {
-                did = true;
-                self.inline(running, step, &mut now);
-                inline += 1;
-                if inline % 64 == 0 {
-                    self.glance();
+            if busy.is_empty() {
+                let begun = self.immediate_ones(running, &execution, &mut now);
+                inline += begun;
+                did |= begun > 0;
+                if begun > 0 {
+                    continue;
                 }
-                continue;
             }
+            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
             match running.machine.poll(&mut self.world.system, now, &can) {
                 Poll::Over => {
                     running.over = true;
@@ -91,6 +90,28 @@ impl Engine {
                 }
             }
         }
+    }
+
+    /// Carries out immediate steps, one after the other, until something else is to be done or somebody is urgent. Answers how
+    /// many.
+    fn immediate_ones(
+        &mut self,
+        running: &mut Running,
+        execution: &impl Fn(&Step) -> Execution,
+        now: &mut Time,
+    ) -> usize {
+        let mut count = 0;
+        while let Some(step) = running.machine.next_immediate(&self.world.system, *now, execution) {
+            self.inline(running, step, now);
+            count += 1;
+            if count % 64 == 0 {
+                self.glance();
+            }
+            if !running.is_safe() && self.urgent() {
+                break;
+            }
+        }
+        count
     }
 
     /// Whether a call that takes time may begin: one worker stays free for each of the others that has none.

@@ -315,17 +315,6 @@ impl Transaction {
         self.cancels.extend(calls);
     }
 
-    /// The step that [`Self::poll`] would let begin, where that is an immediate one and nothing is to be done before: of many
-    /// small steps most are. None: nothing is known by that.
-    pub fn next_immediate(&mut self, live: &System, now: Time, can: &Can<'_>) -> Option<u32> {
-        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
-        if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
-            return None;
-        }
-        let timeout = self.spec.timeout;
-        self.in_hand_mut().next_immediate(live, now, can, timeout)
-    }
-
     /// What is to be done next.
     pub fn poll(&mut self, live: &mut System, now: Time, can: &Can<'_>) -> Poll {
         loop {

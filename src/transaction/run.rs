@@ -2,6 +2,7 @@
 
 use super::messages::Can;
 use super::order::Order;
+use super::{Phase, Transaction};
 use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
 use crate::plan::PlannedStep;
@@ -194,17 +195,17 @@ impl Run {
         &mut self,
         live: &System,
         now: Time,
-        can: &Can<'_>,
+        execution: &impl Fn(&Step) -> Execution,
         timeout: std::time::Duration,
     ) -> Option<u32> {
-        let plain = self.order.is_none() && self.out == 0 && self.unread.is_empty() && can.busy.is_empty();
+        let plain = self.order.is_none() && self.out == 0 && self.unread.is_empty();
         if !plain || self.stops() {
             return None;
         }
         while *self.state.get(self.at)? == State::Over {
             self.at += 1;
         }
-        let immediate = (can.execution)(&self.list[self.at].step) == Execution::Immediate;
+        let immediate = execution(&self.list[self.at].step) == Execution::Immediate;
         if immediate { self.immediate(live, now, timeout) } else { None }
     }
 
@@ -407,6 +408,19 @@ impl Run {
     pub fn leave_unsettled(&mut self, i: u32) {
         self.finish(i);
         self.unsettled.push(i);
+    }
+}
+
+impl Transaction {
+    /// The step that [`Self::poll`] would let begin, where that is an immediate one and nothing is to be done before: of many
+    /// small steps most are. None: nothing is known by that. Not where steps come after those of others ([`Can::busy`]).
+    pub fn next_immediate(&mut self, live: &System, now: Time, execution: &impl Fn(&Step) -> Execution) -> Option<u32> {
+        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
+        if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
+            return None;
+        }
+        let timeout = self.spec.timeout;
+        self.in_hand_mut().next_immediate(live, now, execution, timeout)
     }
 }
 
