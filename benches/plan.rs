@@ -114,7 +114,7 @@ fn switches(c: &mut Criterion) {
         let push = |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let (eight, five) = (switch("eight", 2.0), switch("five", 3.0));
         let first = transaction(&system, &stack, &[push(&eight)], &context).expect("accepted");
-        for s in &first.steps {
+        for s in first.steps.iter() {
             step::apply(&s.step, &mut system).expect("allowed");
         }
         stack.commit(first);

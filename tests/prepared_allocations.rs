@@ -126,7 +126,7 @@ fn a_prepared_switch_allocates_nothing() {
     let plan = |system: &mut System, stack: &mut Stack| {
         let planned = transaction(system, stack, &[push], &Context::default()).unwrap();
         let switch = Switch::new(system, &configuration, &planned).expect("a fixed switch");
-        for planned in &planned.steps {
+        for planned in planned.steps.iter() {
             step::apply(&planned.step, system).unwrap();
         }
         stack.commit(planned);
@@ -137,7 +137,7 @@ fn a_prepared_switch_allocates_nothing() {
     assert!(count(|| first = Some(plan(&mut system, &mut stack))) > 0, "the counter counts");
     let mut switch = first.unwrap();
     let undo = transaction(&system, &stack, &[Op::UndoTop], &Context::default()).unwrap();
-    for planned in &undo.steps {
+    for planned in undo.steps.iter() {
         step::apply(&planned.step, &mut system).unwrap();
     }
     stack.commit(undo);

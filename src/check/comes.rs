@@ -9,6 +9,7 @@ use crate::system::step;
 use crate::transaction::can_fail;
 use smallvec::SmallVec;
 use std::rc::Rc;
+use std::sync::Arc;
 
 impl Worlds<'_> {
     /// What the rest of a batch comes to in a world that is known.
@@ -105,6 +106,6 @@ impl Worlds<'_> {
     pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
         self.group(id, requests, &Beside::default())
             .and_then(|group| group.planned)
-            .map_or_else(Vec::new, |planned| planned.steps)
+            .map_or_else(Vec::new, |planned| Arc::unwrap_or_clone(planned.steps))
     }
 }

@@ -5,14 +5,15 @@
 //! What holds in every case is wrong. What depends on the system it meets (is the component there, in which run state, what
 //! drives the port) is found where it is requested: see `explore`.
 
-use super::universe::{Creation, Universe};
+use super::universe::{Creation, Creations, Universe};
 use crate::limits;
 use crate::model::{
     Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
 };
 use crate::plan::Context;
 use crate::plan::meant::Meant;
-use crate::system::{System, Violation, either};
+use crate::system::{Picture, Violation, either};
+use smallvec::SmallVec;
 
 /// What is wrong with each configuration by itself.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
@@ -32,10 +33,13 @@ pub fn some(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> F
 /// A component of a change, and one of the ways in which it may have been created.
 type Part<'a> = (ComponentName, &'a Creation);
 
+/// A change names two components at most.
+type Parts<'a> = SmallVec<[Part<'a>; 2]>;
+
 /// A combination of such ways, and the violations that a change then has.
 struct Case<'a> {
-    parts: Vec<Part<'a>>,
-    picture: System,
+    parts: Parts<'a>,
+    picture: Picture<'a>,
     found: Vec<Violation>,
 }
 
@@ -59,13 +63,13 @@ impl<'a> Check<'a> {
         }
         for (i, change) in configuration.changes.iter().enumerate() {
             let found = self.change(configuration.id, change);
-            let path = format!("configurations.{}.changes[{i}]", configuration.id);
-            self.findings.extend(found.into_iter().map(|f| f.at(change.origin).path(path.clone())));
+            let path = || format!("configurations.{}.changes[{i}]", configuration.id);
+            self.findings.extend(found.into_iter().map(|f| f.at(change.origin).path(path())));
         }
     }
 
     fn change(&self, id: ConfigId, change: &Change) -> Findings {
-        let (mut findings, mut ways) = (Findings::new(), Vec::new());
+        let (mut findings, mut ways) = (Findings::new(), SmallVec::<[(ComponentName, Creations<'a>); 2]>::new());
         // A create is judged by what is written in it, whatever bore the name before.
         let named =
             if matches!(change.kind, ChangeKind::Create { .. }) { None } else { Some(change.kind.components()) };
@@ -97,17 +101,18 @@ impl<'a> Check<'a> {
 }
 
 /// Every combination of the ways in which the components may have been created; of no components the one of nothing.
-fn combinations<'a>(ways: &[(ComponentName, Vec<&'a Creation>)]) -> Vec<Vec<Part<'a>>> {
-    let mut all: Vec<Vec<Part<'a>>> = vec![Vec::new()];
-    for (component, creations) in ways {
-        let with = |parts: &Vec<Part<'a>>, creation: &&'a Creation| {
-            let mut parts = parts.clone();
-            parts.push((*component, *creation));
-            parts
-        };
-        all = all.iter().flat_map(|parts| creations.iter().map(move |creation| with(parts, creation))).collect();
-    }
-    all
+fn combinations<'a>(ways: &[(ComponentName, Creations<'a>)]) -> impl Iterator<Item = Parts<'a>> {
+    let all: usize = ways.iter().map(|(_, creations)| creations.len()).product();
+    (0..all).map(move |mut number| {
+        // The ways of the last component change fastest.
+        let mut parts: Parts<'a> = SmallVec::new();
+        for (component, creations) in ways.iter().rev() {
+            parts.push((*component, creations[number % creations.len()]));
+            number /= creations.len();
+        }
+        parts.reverse();
+        parts
+    })
 }
 
 /// The violations that hold in every case; where each case has others, the first of each.

@@ -4,11 +4,11 @@ use crate::model::codes::UNKNOWN_COMPONENT;
 use crate::model::finding::did_you_mean;
 use crate::model::{
     Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin,
-    Step, TypeName, Value,
+    TypeName,
 };
-use crate::system::{Member, System, Violation, step};
-use smallvec::SmallVec;
-use std::collections::BTreeMap;
+use crate::system::{Member, Picture, Violation};
+use rustc_hash::FxHashMap;
+use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
 /// A type as which some configurations create a component.
@@ -27,15 +27,18 @@ pub struct Creation {
 /// The components of a deployment, whichever configuration creates them; one name may be created as several types.
 #[derive(Debug, Clone)]
 pub struct Universe {
-    components: BTreeMap<ComponentName, Vec<Creation>>,
-    /// A system of these types with nothing in it.
-    empty: System,
+    components: FxHashMap<ComponentName, SmallVec<[Creation; 1]>>,
+    types: Catalogue,
 }
+
+/// Ways in which a component may have been created.
+pub type Creations<'a> = SmallVec<[&'a Creation; 1]>;
 
 impl Universe {
     /// What the configurations of `deployment` create.
     pub fn new(deployment: &Deployment, catalogue: &Catalogue) -> Self {
-        let mut components: BTreeMap<ComponentName, Vec<Creation>> = BTreeMap::new();
+        let mut components: FxHashMap<ComponentName, SmallVec<[Creation; 1]>> = FxHashMap::default();
+        components.reserve(deployment.configurations.iter().map(|c| c.changes.len()).max().unwrap_or_default());
         for configuration in &deployment.configurations {
             for change in &configuration.changes {
                 let ChangeKind::Create { component, ty, .. } = &change.kind else { continue };
@@ -51,7 +54,7 @@ impl Universe {
                 }
             }
         }
-        Self { components, empty: System::new(Arc::new(catalogue.clone())) }
+        Self { components, types: catalogue.clone() }
     }
 
     /// One component of one type.
@@ -61,19 +64,21 @@ impl Universe {
             Creation { ty: ty.name, description: Some(Arc::new(ty.clone())), origin: ty.origin, by: SmallVec::new() };
         let mut types = Catalogue::new();
         types.insert(ty.clone());
-        let empty = System::new(Arc::new(types));
-        Self { components: BTreeMap::from([(name, vec![creation])]), empty }
+        Self { components: std::iter::once((name, smallvec![creation])).collect(), types }
     }
 
     /// How a component of that name may have been created; empty when none creates it.
     pub fn of(&self, component: ComponentName) -> &[Creation] {
-        self.components.get(&component).map_or(&[], Vec::as_slice)
+        self.components.get(&component).map_or(&[], SmallVec::as_slice)
     }
 
     /// What a component may be while the changes of configuration `id` are made: `old`, before it creates it itself, what
     /// the others create; else what it creates. Where that is nothing, what anyone does.
-    pub fn during(&self, component: ComponentName, id: ConfigId, old: bool) -> Vec<&Creation> {
+    pub fn during(&self, component: ComponentName, id: ConfigId, old: bool) -> Creations<'_> {
         let all = self.of(component);
+        if let [one] = all {
+            return smallvec![one];
+        }
         if !all.iter().any(|creation| creation.by.contains(&id)) {
             return all.iter().collect();
         }
@@ -81,21 +86,20 @@ impl Universe {
             true => creation.by.iter().any(|by| *by != id),
             false => creation.by.contains(&id),
         };
-        let some: Vec<&Creation> = all.iter().filter(wanted).collect();
+        let some: Creations<'_> = all.iter().filter(wanted).collect();
         if some.is_empty() { all.iter().collect() } else { some }
     }
 
     /// A picture of what may be there: these components as these creations make them, and nothing else. One of an unknown
     /// type is left out.
-    pub fn picture(&self, parts: &[(ComponentName, &Creation)]) -> System {
-        let mut system = self.empty.clone();
+    pub fn picture(&self, parts: &[(ComponentName, &Creation)]) -> Picture<'_> {
+        let mut picture = Picture::new(&self.types);
         for (component, creation) in parts {
-            let Some(ty) = &creation.description else { continue };
-            // No precondition looks at what a property holds.
-            let properties = ty.properties.values().map(|p| p.default.clone().unwrap_or(Value::Bool(false))).collect();
-            step::effect(&Step::Create { component: *component, ty: ty.name, activity: None, properties }, &mut system);
+            if let Some(ty) = &creation.description {
+                picture.add(*component, ty.clone());
+            }
         }
-        system
+        picture
     }
 
     /// The operations that undo another one, as the types say.
@@ -109,7 +113,8 @@ impl Universe {
 
     /// The finding that nothing creates a component of that name.
     pub fn unknown(&self, component: ComponentName, at: Origin) -> Finding {
-        let known = self.components.keys().map(ComponentName::as_str);
+        let mut known: Vec<&str> = self.components.keys().map(ComponentName::as_str).collect();
+        known.sort_unstable();
         Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
             .at(at)
             .labelled("no such component")
@@ -125,6 +130,6 @@ impl Universe {
             return None;
         }
         let types = creations.iter().map(|creation| creation.ty).collect();
-        Some(Violation::UnknownMember { what, member, types }.finding(&self.empty).at(at))
+        Some(Violation::UnknownMember { what, member, types }.finding(&Picture::new(&self.types)).at(at))
     }
 }

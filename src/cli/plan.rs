@@ -148,7 +148,7 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
         let Some(configuration) = deployment.configuration(id) else { continue };
         let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
         let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
-        for planned in &transaction.steps {
+        for planned in transaction.steps.iter() {
             step::effect(&planned.step, &mut system);
         }
         planned.push(Planned {
@@ -156,7 +156,7 @@ pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
             asks: vec![Ask::Apply(id)],
             events: Vec::new(),
             state: None,
-            steps: transaction.steps.clone(),
+            steps: transaction.steps.to_vec(),
             result: system.snapshot(),
         });
         stack.commit(transaction);

@@ -45,6 +45,14 @@ impl Engine {
             }
             let room = self.has_room(running);
             let busy = self.busy_before(running);
+            if busy.is_empty() {
+                let begun = self.immediate_ones(running, &execution, &mut now);
+                inline += begun;
+                did |= begun > 0;
+                if begun > 0 {
+                    continue;
+                }
+            }
             let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
             match running.machine.poll(&mut self.world.system, now, &can) {
                 Poll::Over => {
@@ -84,6 +92,28 @@ impl Engine {
         }
     }
 
+    /// Carries out immediate steps, one after the other, until something else is to be done or somebody is urgent. Answers how
+    /// many.
+    fn immediate_ones(
+        &mut self,
+        running: &mut Running,
+        execution: &impl Fn(&Step) -> Execution,
+        now: &mut Time,
+    ) -> usize {
+        let mut count = 0;
+        while let Some(step) = running.machine.next_immediate(&self.world.system, *now, execution) {
+            self.inline(running, step, now);
+            count += 1;
+            if count % 64 == 0 {
+                self.glance();
+            }
+            if !running.is_safe() && self.urgent() {
+                break;
+            }
+        }
+        count
+    }
+
     /// Whether a call that takes time may begin: one worker stays free for each of the others that has none.
     fn has_room(&self, running: &Running) -> bool {
         let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
@@ -100,7 +130,7 @@ impl Engine {
         let outcome = pool::execute(&*self.platform, step, deadline, running.enters_quarantine);
         *at = self.clock.now();
         self.tell(running, number, StepEnd::from(&outcome), Some(at.since(started)));
-        running.machine.on(Input::Ended { step: number, outcome }, &mut self.world.system);
+        running.machine.ended(number, outcome, &mut self.world.system);
         self.steps += 1;
     }
 

@@ -103,6 +103,9 @@ impl Engine {
 
     /// Components for which safe configurations that came before have steps that are not over.
     pub(super) fn busy_before(&self, running: &Running) -> Vec<ComponentName> {
+        if running.after.is_empty() {
+            return Vec::new();
+        }
         let before = self.running.iter().filter(|other| running.after.contains(&other.number));
         before.flat_map(|other| other.machine.open_steps()).flat_map(touch::components).collect()
     }

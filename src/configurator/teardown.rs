@@ -289,7 +289,7 @@ pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
         frame: None,
     };
     Planned {
-        steps,
+        steps: Arc::new(steps),
         of: Vec::new(),
         whole: Vec::new(),
         parts: vec![part],

@@ -5,6 +5,7 @@ use super::monitor::{Condition, SELF};
 use super::names::{ComponentName, Ident, TypeName};
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
+use rustc_hash::FxHashMap;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -254,6 +255,8 @@ impl OperationType {
 #[derive(Debug, Clone, Default)]
 pub struct Catalogue {
     types: BTreeMap<TypeName, Arc<ComponentType>>,
+    /// The same: names in their order are compared letter by letter, and a type is looked up again and again.
+    by_name: FxHashMap<TypeName, Arc<ComponentType>>,
 }
 
 impl Catalogue {
@@ -265,12 +268,13 @@ impl Catalogue {
     /// Adds a type; answers the one it replaced, if the name was taken.
     pub fn insert(&mut self, ty: impl Into<Arc<ComponentType>>) -> Option<Arc<ComponentType>> {
         let ty = ty.into();
+        self.by_name.insert(ty.name, ty.clone());
         self.types.insert(ty.name, ty)
     }
 
     /// The type of that name.
     pub fn get(&self, name: TypeName) -> Option<&Arc<ComponentType>> {
-        self.types.get(&name)
+        self.by_name.get(&name)
     }
 
     /// All types, by name.
@@ -281,6 +285,7 @@ impl Catalogue {
     /// Adds all types of `other`.
     pub fn extend(&mut self, other: &Self) {
         self.types.extend(other.types.iter().map(|(name, ty)| (*name, ty.clone())));
+        self.by_name.extend(other.by_name.iter().map(|(name, ty)| (*name, ty.clone())));
     }
 }
 

@@ -3,7 +3,7 @@
 use super::footprint::{Footprint, Saved};
 use super::{Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order};
 use crate::model::codes;
-use crate::model::{Call, ComponentName, Configuration, Finding, Findings, Origin, Step};
+use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, Findings, Origin, Step, Target};
 use crate::system::{Overlay, Reversibility, Undo, Violation, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -23,13 +23,17 @@ pub(super) struct Builder<'o, 's, 'c> {
 }
 
 pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
+    // What `_default` moves afterwards is mostly what is created.
+    let created = configuration.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Create { .. })).count();
+    let defaulted = configuration.post.iter().any(|entry| entry.target == Target::Default);
+    let moved = if defaulted { 2 * created } else { 0 };
     let mut b = Builder {
         view,
         configuration,
         context,
         stage: Stage::Pre,
         steps: Vec::with_capacity(
-            configuration.changes.len() + 2 * (configuration.pre.len() + configuration.post.len()),
+            configuration.changes.len() + 2 * (configuration.pre.len() + configuration.post.len()) + moved,
         ),
         footprint: Footprint::default(),
         saved: Vec::new(),
@@ -37,6 +41,7 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
         warnings: Vec::new(),
         blamed: FxHashSet::default(),
     };
+    b.footprint.touches.reserve(2 * configuration.changes.len() - created + moved);
     let sorted = conflicts::sort(configuration, &mut b.findings);
     b.blamed.extend(&sorted.disputed);
     lists::apply(&mut b, &configuration.pre, Stage::Pre, &sorted);
@@ -119,7 +124,8 @@ impl Builder<'_, '_, '_> {
     /// Records what a step touches and what it overwrites; `step` is false when its demand is fulfilled without it. The
     /// system is the one before it.
     fn record(&mut self, what: &Step, undo: Option<&Call>, inverse: &Undo, step: bool) {
-        self.footprint.touches.extend(step::touches(what, undo, self.view));
+        let touched = &mut self.footprint.touches;
+        step::touch_each(what, undo, self.view, &mut |touch| touched.push(touch));
         let value = match inverse {
             Undo::One(Step::PropertySet { value, .. }) => Saved::Property(value.clone()),
             Undo::One(Step::PortWrite { value, .. }) => Saved::Port(value.clone()),

@@ -63,7 +63,6 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
     if classes[2].len() + classes[4].len() > 64 {
         b.view.reserve(classes[2].len(), classes[4].len());
     }
-    b.footprint.touches.reserve(classes[2].len() + 2 * classes[4].len());
     let mut waits = Waits::default();
     waits.create.reserve(classes[2].len());
     for i in classes.iter().flatten() {

@@ -95,13 +95,18 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
     b.footprint.touches.reserve(2 * moves.len());
     // The number of the start or stop of each move; a move without one (never running) is waited for by nobody.
     let mut keys: Vec<Option<StepId>> = Vec::with_capacity(moves.len());
+    let mut waits: Vec<StepId> = Vec::new();
     for Move { component, after } in &moves {
         let node = b.view.component(*component).expect("it was just seen");
         let (state, actuator) = (node.state, node.ty.actuator);
         let mut own = None;
         let mut previous: Option<StepId> = None;
         for transition in state.path_to(entry.state) {
-            let mut waits: Vec<StepId> = previous.map_or_else(|| frontier.clone(), |p| vec![p]);
+            waits.clear();
+            match previous {
+                Some(before) => waits.push(before),
+                None => waits.extend_from_slice(frontier),
+            }
             if *transition == key {
                 waits.extend(after.iter().filter_map(|at| keys[*at as usize]));
             }

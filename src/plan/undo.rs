@@ -254,6 +254,13 @@ pub fn undo(
 ) -> Result<(), Vec<Violation>> {
     let first_wave = script.next_wave();
     script.steps.reserve(steps.len());
+    script.of.reserve(steps.len());
+    let count = |kind: fn(&Step) -> bool| steps.iter().filter(|done| kind(&done.step)).count();
+    let made = count(|step| matches!(step, Step::Create { .. }));
+    let connected = count(|step| matches!(step, Step::Connect { .. }));
+    if made + connected > 64 {
+        script.view.reserve(made, connected);
+    }
     let last_wave = steps.last().map_or(0, |s| s.wave);
     let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
     let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();

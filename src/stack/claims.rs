@@ -58,27 +58,33 @@ pub struct Claims {
 impl Claims {
     /// What each configuration claims: the components that it and those of its group name; with `_default` all of its file.
     pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone) -> Self {
+        let most = configurations.clone().map(|configuration| configuration.changes.len()).max().unwrap_or_default();
         let mut numbers: FxHashMap<ComponentName, usize> = FxHashMap::default();
-        for configuration in configurations.clone() {
-            for component in named(configuration) {
-                let next = numbers.len();
-                numbers.entry(component).or_insert(next);
-            }
-        }
+        numbers.reserve(most);
         let mut of: FxHashMap<ConfigId, Claim> = FxHashMap::default();
-        let mut groups: BTreeMap<Ident, Claim> = BTreeMap::new();
         for configuration in configurations.clone() {
             let mut claim = Claim::default();
-            named(configuration).for_each(|component| claim.set(numbers[&component]));
+            for_each_named(configuration, &mut |component| {
+                let next = numbers.len();
+                claim.set(*numbers.entry(component).or_insert(next));
+            });
+            of.insert(configuration.id, claim);
+        }
+        // With `_default` all of the file, whichever names it.
+        for configuration in configurations.clone() {
             let mut states = configuration.pre.iter().chain(configuration.post.iter());
-            if states.any(|entry| entry.target == Target::Default) {
+            if states.any(|entry| entry.target == Target::Default)
+                && let Some(claim) = of.get_mut(&configuration.id)
+            {
                 let scope = configuration.id.prefix();
                 numbers.iter().filter(|(name, _)| name.prefix() == scope).for_each(|(_, at)| claim.set(*at));
             }
-            if let Some(group) = configuration.group {
-                groups.entry(group).or_default().join(&claim);
+        }
+        let mut groups: BTreeMap<Ident, Claim> = BTreeMap::new();
+        for configuration in configurations.clone() {
+            if let (Some(group), Some(claim)) = (configuration.group, of.get(&configuration.id)) {
+                groups.entry(group).or_default().join(claim);
             }
-            of.insert(configuration.id, claim);
         }
         for configuration in configurations {
             if let (Some(group), Some(claim)) = (configuration.group, of.get_mut(&configuration.id)) {
@@ -111,18 +117,21 @@ impl Claims {
     }
 }
 
-/// Components that a configuration names.
-fn named(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
-    let changes = configuration.changes.iter().flat_map(|change| change.kind.components());
-    let entries = configuration.pre.iter().chain(configuration.post.iter());
-    let states = entries.filter_map(|entry| match entry.target {
-        Target::Component(component) => Some(component),
-        Target::Default => None,
-    });
-    changes.chain(states)
+/// Calls `f` with the components that a configuration names; one may come more than once.
+fn for_each_named(configuration: &Configuration, f: &mut impl FnMut(ComponentName)) {
+    for change in &configuration.changes {
+        change.kind.components().into_iter().for_each(&mut *f);
+    }
+    for entry in configuration.pre.iter().chain(configuration.post.iter()) {
+        if let Target::Component(component) = entry.target {
+            f(component);
+        }
+    }
 }
 
 /// Components that a configuration names, each once.
 pub fn components(configuration: &Configuration) -> std::collections::BTreeSet<ComponentName> {
-    named(configuration).collect()
+    let mut components = std::collections::BTreeSet::new();
+    for_each_named(configuration, &mut |component| _ = components.insert(component));
+    components
 }

@@ -70,6 +70,7 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
             Err(refusal) => troubles.push(Reason::Refused(refusal.findings)),
         }
     }
+    let steps = Arc::new(steps);
     let frame = Frame {
         id: FrameId(u64::MAX),
         configuration: configuration.id,
@@ -77,7 +78,7 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
         requester: request.requester,
         at,
         inverse: Inverse::Steps(steps.clone()),
-        footprint,
+        footprint: Arc::new(footprint),
         saved,
         floor: crate::plan::irreversible(&steps).map(str::to_owned),
         parts: std::collections::BTreeSet::new(),

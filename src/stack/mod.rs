@@ -62,8 +62,8 @@ pub struct Buried {
 /// How a frame is taken back.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Inverse {
-    /// By undoing its steps, last first.
-    Steps(Vec<PlannedStep>),
+    /// By undoing its steps, last first. They are those of the plan that it came of.
+    Steps(Arc<Vec<PlannedStep>>),
     /// By this list: several frames squashed into one, or what is left of one.
     List(Vec<Item>),
 }
@@ -85,7 +85,7 @@ pub struct Frame {
     /// What was done, or, squashed, what takes it back.
     pub inverse: Inverse,
     /// What it wrote, demanded, and what its inverse needs.
-    pub footprint: Footprint,
+    pub footprint: Arc<Footprint>,
     /// What its absolute writes overwrote.
     pub saved: Vec<SavedValue>,
     /// Why undo does not pass it, if it does not.

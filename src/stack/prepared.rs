@@ -145,6 +145,8 @@ impl Switch {
         let frame = Arc::make_mut(&mut self.frame);
         (frame.id, frame.requester, frame.at, frame.scope) = (FrameId(u64::MAX), requester, at, scope);
         let Inverse::Steps(steps) = &mut frame.inverse else { return false };
+        // Once it was applied this way they are its own.
+        let steps = Arc::make_mut(steps);
         for (saved, place) in frame.saved.iter_mut().zip(&self.slots).filter(|(saved, _)| saved.step) {
             let held = place.held(saved.slot, system);
             match (&mut saved.value, &mut steps[saved.at as usize].undo) {

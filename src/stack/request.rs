@@ -80,10 +80,17 @@ impl Request {
 
 /// Requests that belong together: raised in one step of a coordinator. They are carried out undos first, then pushes, each
 /// in the order they were raised, and answered in that order.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, PartialEq, Eq, Hash, Default)]
 pub struct Batch {
     /// The requests.
     pub requests: SmallVec<[Request; 2]>,
+}
+
+impl Clone for Batch {
+    fn clone(&self) -> Self {
+        // At once: requests are plain memory.
+        Self { requests: SmallVec::from_slice(&self.requests) }
+    }
 }
 
 impl Batch {

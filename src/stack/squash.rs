@@ -109,7 +109,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         requester: upper.requester,
         at: upper.at,
         inverse: Inverse::List(inverse),
-        footprint: Footprint { touches },
+        footprint: Arc::new(Footprint { touches }),
         saved,
         floor,
         parts,

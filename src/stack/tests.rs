@@ -107,7 +107,7 @@ impl Bench {
     fn ok(&mut self, requests: &[Op<'_>]) -> (Vec<String>, Vec<FrameId>) {
         let transaction = self.ask(requests).unwrap_or_else(|r| panic!("{r:?}"));
         let steps = transaction.steps.iter().map(|s| s.step.to_string()).collect();
-        for s in &transaction.steps {
+        for s in transaction.steps.iter() {
             step::apply(&s.step, &mut self.system).unwrap();
         }
         (steps, self.stack.commit(transaction))

@@ -56,7 +56,7 @@ pub struct Part {
 #[derive(Debug, Clone)]
 pub struct Planned {
     /// What is done, in an order in which it may happen; `wave` and `after` tell what may happen in parallel.
-    pub steps: Vec<PlannedStep>,
+    pub steps: Arc<Vec<PlannedStep>>,
     /// Of each of them the place in `whole`; empty: they are the whole.
     pub of: Vec<u32>,
     /// All steps, one operation after the other, where `steps` are the net of them; else empty.
@@ -110,6 +110,8 @@ pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Con
 /// A plan in the making.
 pub(super) struct Work<'o, 's, 'k> {
     script: Script<'o, 's>,
+    /// Steps of a push that came first: as long as nothing follows, they are the whole plan, and stand in no script.
+    lone: Option<Arc<Vec<PlannedStep>>>,
     /// The frames as they are after the operations so far; those that are pushed have numbers from the top of the range.
     pub(super) frames: Vec<Arc<Frame>>,
     stack: &'k Stack,
@@ -124,6 +126,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     pub(super) fn new(view: &'o mut Overlay<'s>, stack: &'k Stack) -> Self {
         Self {
             script: Script::new(view),
+            lone: None,
             frames: stack.frames.clone(),
             stack,
             warnings: Vec::new(),
@@ -140,7 +143,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     }
 
     fn place(&self) -> u32 {
-        u32::try_from(self.script.steps.len()).expect("fewer steps than that")
+        let steps = self.lone.as_ref().map_or(self.script.steps.len(), |lone| lone.len());
+        u32::try_from(steps).expect("fewer steps than that")
     }
 
     /// Adds an operation.
@@ -148,6 +152,9 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     /// # Errors
     /// [`Refusal`]; what is in the making is then of no further use.
     pub(super) fn add(&mut self, op: &Op<'_>, context: &Context) -> Result<(), Refusal> {
+        if let Some(lone) = self.lone.take() {
+            self.script.append(lone.iter().cloned());
+        }
         let from = self.place();
         let mut edits = Edits::default();
         let (mut pushes, mut holds, mut on_failure, mut frame) = (None, false, OnFailure::default(), None);
@@ -243,7 +250,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let Plan { configuration: id, group, steps, footprint, saved, warnings, .. } = plan;
         let floor = crate::plan::irreversible(&steps).map(str::to_owned);
         self.warnings.extend(warnings);
-        self.script.append(steps.iter().cloned());
+        let steps = Arc::new(steps);
+        if self.parts.is_empty() && !self.replaced && self.script.steps.is_empty() {
+            self.lone = Some(steps.clone());
+        } else {
+            self.script.append(steps.iter().cloned());
+        }
         let number = FrameId(u64::MAX - self.pushed.len() as u64);
         self.pushed.push(number);
         let frame = Arc::new(Frame {
@@ -253,7 +265,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             requester,
             at,
             inverse: Inverse::Steps(steps),
-            footprint,
+            footprint: Arc::new(footprint),
             saved,
             floor,
             parts: std::collections::BTreeSet::new(),
@@ -307,7 +319,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
     pub(super) fn finish(self, system: &System, held: &[FrameId]) -> Result<Planned, Refusal> {
-        let Self { mut script, frames, warnings, popped, parts, pushed, stack, replaced } = self;
+        let Self { mut script, lone, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
         let undone = parts.iter().any(|part| part.pushes.is_none());
         let mixed = replaced || undone && parts.iter().any(|part| part.pushes.is_some());
@@ -328,8 +340,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         }
         let revision = system.revision();
         let (steps, of, whole) = match net {
-            Some((steps, of)) => (steps, of, whole),
-            None => (whole, Vec::new(), Vec::new()),
+            Some((steps, of)) => (Arc::new(steps), of, whole),
+            None => (lone.unwrap_or_else(|| Arc::new(whole)), Vec::new(), Vec::new()),
         };
         Ok(Planned { steps, of, whole, parts, revision, warnings, popped })
     }

@@ -4,7 +4,7 @@
 //! ([`Node::born`](super::Node::born)).
 
 use super::step::{move_allowed, sample_allowed, value_allowed};
-use super::{Slot, System, Violation};
+use super::{Slot, System, View, Violation};
 use crate::model::{Step, Value};
 use petgraph::stable_graph::NodeIndex;
 
@@ -58,6 +58,20 @@ impl Place {
             other => return super::step::precondition(other, system),
         }
         found
+    }
+
+    /// Whether a step may happen there whose value is known to be allowed there (types do not change): what is left of
+    /// [`Self::precondition`] is what the system can change.
+    pub fn allows(self, step: &Step, system: &System) -> bool {
+        let Some(node) = system.node_at(self.node) else { return false };
+        match step {
+            Step::State { transition, .. } => transition.allowed_in(node.state),
+            Step::PropertySet { .. } => {
+                node.ty.properties.values().nth(self.at).is_some_and(|p| p.tunable.allows(node.state))
+            }
+            Step::PortWrite { port, .. } => system.driven(*port).links == 0,
+            other => super::step::precondition(other, system).is_empty(),
+        }
     }
 
     /// Does to the picture what [`effect`](super::step::effect) does. Its precondition holds.

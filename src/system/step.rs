@@ -3,7 +3,7 @@
 //! The three stand together, one kind of step after the other, because each is the other two's specification (design §4).
 //! What it touches stands beside them, in [`touch`](super::touch).
 
-pub use super::touch::{absolute, components, touches};
+pub use super::touch::{absolute, components, touch_each, touches};
 use super::violation::brief;
 use super::{Driven, Member, Node, View, ViewMut, Violation};
 use crate::model::{
@@ -187,11 +187,14 @@ pub fn reversibility(step: &Step, undo: &Undo) -> Reversibility {
 ///
 /// What moves because of a value (a gain, a reference) cannot be known.
 pub fn moves(step: &Step, view: &impl View) -> bool {
-    let Some(ty) = view.component(step.component()).map(|node| &node.ty) else { return false };
+    // Looked up only for what may move at all.
+    let ty = || view.component(step.component()).map(|node| &node.ty);
     match step {
-        Step::State { transition: Transition::Start, .. } => ty.moves.start,
-        Step::State { transition: Transition::Stop, .. } => ty.moves.stop,
-        Step::Operation(call) => ty.operations.get(&call.operation.member).is_some_and(|o| o.moves),
+        Step::State { transition: Transition::Start, .. } => ty().is_some_and(|ty| ty.moves.start),
+        Step::State { transition: Transition::Stop, .. } => ty().is_some_and(|ty| ty.moves.stop),
+        Step::Operation(call) => {
+            ty().is_some_and(|ty| ty.operations.get(&call.operation.member).is_some_and(|o| o.moves))
+        }
         Step::State { transition: Transition::Configure | Transition::Cleanup, .. }
         | Step::Create { .. }
         | Step::Destroy { .. }

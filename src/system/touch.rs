@@ -104,19 +104,29 @@ pub type Touches = SmallVec<[Touch; 2]>;
 /// What `before` does not know (a component that an earlier step of a list makes) counts as the most that it can be: a
 /// property as bound to run states, an in-port as the data port of its only connection.
 pub fn touches(step: &Step, undo: Option<&Call>, before: &impl View) -> Touches {
+    let mut touches = Touches::new();
+    touch_each(step, undo, before, &mut |touch| touches.push(touch));
+    touches
+}
+
+/// The same, one after the other: a touch is large, and a plan has many.
+#[inline]
+pub fn touch_each(step: &Step, undo: Option<&Call>, before: &impl View, each: &mut impl FnMut(Touch)) {
     match step {
-        Step::State { component, .. } => smallvec![Touch::new(Slot::State(*component), Access::Write)],
+        Step::State { component, .. } => each(Touch::new(Slot::State(*component), Access::Write)),
         Step::Create { component, .. } | Step::Destroy { component } => {
-            smallvec![Touch::new(Slot::Component(*component), Access::Write)]
+            each(Touch::new(Slot::Component(*component), Access::Write));
         }
-        Step::Connect { from, to, policy } => link(*from, *to, *policy, before),
-        Step::Disconnect { from, to } => link(*from, *to, before.link(*from, *to).unwrap_or_default(), before),
+        Step::Connect { from, to, policy } => link(*from, *to, *policy, before, each),
+        Step::Disconnect { from, to } => {
+            link(*from, *to, before.link(*from, *to).unwrap_or_default(), before, each);
+        }
         Step::PropertySet { property, .. } => {
             let declared = before.component(property.component).and_then(|n| n.property(property.member));
             let bound = declared.is_none_or(|(_, p)| p.tunable != Tunable::Always);
-            absolute_write(Slot::Property(*property), bound.then_some(Slot::State(property.component)))
+            absolute_write(Slot::Property(*property), bound.then_some(Slot::State(property.component)), each);
         }
-        Step::PortWrite { port, .. } => absolute_write(Slot::Port(*port), Some(Slot::Drive(*port))),
+        Step::PortWrite { port, .. } => absolute_write(Slot::Port(*port), Some(Slot::Drive(*port)), each),
         Step::Operation(call) => {
             let of = call.operation;
             let declared = || before.component(of.component).and_then(|n| n.ty.operations.get(&of.member));
@@ -126,22 +136,24 @@ pub fn touches(step: &Step, undo: Option<&Call>, before: &impl View) -> Touches 
                 (None, _) => None,
             };
             let called = std::iter::once(of).chain(inverse.filter(|inverse| *inverse != of));
-            called.map(|operation| Touch::new(Slot::Operation(operation), Access::Write)).collect()
+            called.for_each(|operation| each(Touch::new(Slot::Operation(operation), Access::Write)));
         }
     }
 }
 
-fn link(from: MemberRef, to: MemberRef, policy: Policy, before: &impl View) -> Touches {
-    let event = before.component(to.component).and_then(|n| n.port(to.member)).is_some_and(|(_, p)| p.is_event());
-    let access = if policy == Policy::Data && !event { Access::Write } else { Access::Join };
-    smallvec![Touch::new(Slot::Link(from, to), Access::Write), Touch::new(Slot::Drive(to), access)]
+fn link(from: MemberRef, to: MemberRef, policy: Policy, before: &impl View, each: &mut impl FnMut(Touch)) {
+    let event = || before.component(to.component).and_then(|n| n.port(to.member)).is_some_and(|(_, p)| p.is_event());
+    let access = if policy == Policy::Data && !event() { Access::Write } else { Access::Join };
+    each(Touch::new(Slot::Link(from, to), Access::Write));
+    each(Touch::new(Slot::Drive(to), access));
 }
 
 /// A write whose inverse needs that `needs` is as it was.
-fn absolute_write(slot: Slot, needs: Option<Slot>) -> Touches {
-    let mut touches: Touches = smallvec![Touch::new(slot, Access::Write)];
-    touches.extend(needs.map(|needed| Touch { slot: needed, access: Access::Need, serves: Some(slot) }));
-    touches
+fn absolute_write(slot: Slot, needs: Option<Slot>, each: &mut impl FnMut(Touch)) {
+    each(Touch::new(slot, Access::Write));
+    if let Some(needed) = needs {
+        each(Touch { slot: needed, access: Access::Need, serves: Some(slot) });
+    }
 }
 
 /// The slot of an absolute write.

@@ -96,7 +96,7 @@ impl Transaction {
         }
         let mut ends: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
         let mut followers: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
-        for (i, step) in (0..).zip(&forward.list) {
+        for (i, step) in (0..).zip(forward.list.iter()) {
             for before in &step.after {
                 followers[*before as usize].push(i);
             }

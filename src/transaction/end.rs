@@ -383,7 +383,7 @@ impl Transaction {
                 .collect();
             crate::stack::Frame {
                 inverse: Inverse::List(items),
-                footprint: Footprint { touches },
+                footprint: Arc::new(Footprint { touches }),
                 saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
                 floor: irreversible.map(|step| format!("`{step}` cannot be undone")),
                 partial: true,

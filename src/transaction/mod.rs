@@ -37,6 +37,7 @@ use back::{WayBack, chain};
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// A question that is out, and its answer once that has come.
 #[derive(Debug, Clone, Copy)]
@@ -248,13 +249,16 @@ impl Transaction {
         self.end.expect("it is over")
     }
 
+    /// A step that was begun is back: [`Input::Ended`].
+    pub fn ended(&mut self, step: u32, outcome: Outcome, live: &mut System) {
+        self.doubted |= matches!(outcome, Outcome::Unknown(_));
+        self.in_hand_mut().ended(step, outcome, live);
+    }
+
     /// What happened.
     pub fn on(&mut self, input: Input, live: &mut System) {
         match input {
-            Input::Ended { step, outcome } => {
-                self.doubted |= matches!(outcome, Outcome::Unknown(_));
-                self.in_hand_mut().ended(step, outcome, live);
-            }
+            Input::Ended { step, outcome } => self.ended(step, outcome, live),
             Input::NotBegun(step) => self.in_hand_mut().not_begun(step),
             Input::Seen(seen) => self.seen = Some(seen),
             Input::Told { question, is } => {
@@ -461,7 +465,7 @@ impl Transaction {
             return;
         }
         self.attempts += 1;
-        let mut run = Run::new(way.list.clone(), Time::NEVER);
+        let mut run = Run::new(Arc::new(way.list.clone()), Time::NEVER);
         run.late_from_now = false;
         self.back = Some((run, way));
         self.phase = Phase::Back;
@@ -492,7 +496,7 @@ impl Transaction {
     fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.target = Some(Box::new(target));
         let list = chain(steps);
-        self.back = Some((Run::new(list, Time::NEVER), WayBack::default()));
+        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
         self.phase = Phase::Mending;
     }
 }

@@ -2,6 +2,7 @@
 
 use super::messages::Can;
 use super::order::Order;
+use super::{Phase, Transaction};
 use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
 use crate::plan::PlannedStep;
@@ -11,6 +12,7 @@ use crate::system::{System, Undo, View as _, Violation, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
+use std::sync::Arc;
 
 /// How a step stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +26,7 @@ enum State {
 /// A list of steps and how far it is.
 #[derive(Debug)]
 pub(super) struct Run {
-    pub list: Vec<PlannedStep>,
+    pub list: Arc<Vec<PlannedStep>>,
     state: Vec<State>,
     /// As long as no step is blocking the list's own order serves, from here on.
     at: usize,
@@ -63,7 +65,7 @@ pub(super) struct Late {
 }
 
 impl Run {
-    pub fn new(list: Vec<PlannedStep>, until: Time) -> Self {
+    pub fn new(list: Arc<Vec<PlannedStep>>, until: Time) -> Self {
         Self {
             state: vec![State::Waiting; list.len()],
             done: Vec::with_capacity(list.len()),
@@ -158,13 +160,9 @@ impl Run {
                     if self.out > 0 {
                         return smallvec![];
                     }
-                    let i = at as u32;
-                    if self.gate(i, live, now, timeout) {
-                        self.state[at] = State::Out(live.revision());
-                        self.out += 1;
+                    if let Some(i) = self.immediate(live, now, timeout) {
                         return smallvec![i];
                     }
-                    self.at += 1;
                 }
                 Execution::Brief => {
                     if self.out > 0 || !room {
@@ -178,6 +176,37 @@ impl Run {
             }
         }
         if self.order.is_some() { self.side_by_side(live, now, can, timeout) } else { smallvec![] }
+    }
+
+    /// The immediate step at the present place, which is out from now on. None: it must not begin, and has failed.
+    fn immediate(&mut self, live: &System, now: Time, timeout: std::time::Duration) -> Option<u32> {
+        let i = self.at as u32;
+        if !self.gate(i, live, now, timeout) {
+            return None;
+        }
+        self.state[self.at] = State::Out(live.revision());
+        self.out += 1;
+        Some(i)
+    }
+
+    /// What [`Self::begin`] begins where that is an immediate step in the list's own order, with nothing to be looked at
+    /// before.
+    pub fn next_immediate(
+        &mut self,
+        live: &System,
+        now: Time,
+        execution: &impl Fn(&Step) -> Execution,
+        timeout: std::time::Duration,
+    ) -> Option<u32> {
+        let plain = self.order.is_none() && self.out == 0 && self.unread.is_empty();
+        if !plain || self.stops() {
+            return None;
+        }
+        while *self.state.get(self.at)? == State::Over {
+            self.at += 1;
+        }
+        let immediate = execution(&self.list[self.at].step) == Execution::Immediate;
+        if immediate { self.immediate(live, now, timeout) } else { None }
     }
 
     /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
@@ -379,6 +408,19 @@ impl Run {
     pub fn leave_unsettled(&mut self, i: u32) {
         self.finish(i);
         self.unsettled.push(i);
+    }
+}
+
+impl Transaction {
+    /// The step that [`Self::poll`] would let begin, where that is an immediate one and nothing is to be done before: of many
+    /// small steps most are. None: nothing is known by that. Not where steps come after those of others ([`Can::busy`]).
+    pub fn next_immediate(&mut self, live: &System, now: Time, execution: &impl Fn(&Step) -> Execution) -> Option<u32> {
+        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
+        if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
+            return None;
+        }
+        let timeout = self.spec.timeout;
+        self.in_hand_mut().next_immediate(live, now, execution, timeout)
     }
 }
 

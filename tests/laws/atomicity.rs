@@ -130,7 +130,7 @@ proptest! {
         for gene in first {
             let conf = read(gene, &system);
             let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
-            for s in &push.steps {
+            for s in push.steps.iter() {
                 step::apply(&s.step, &mut system).unwrap();
             }
             stack.commit(push);
@@ -180,7 +180,7 @@ proptest! {
         let mut system = bench.model;
         while !stack.is_empty() {
             let pop = transaction(&system, &stack, &[Op::UndoTop], &context()).unwrap();
-            for s in &pop.steps {
+            for s in pop.steps.iter() {
                 step::apply(&s.step, &mut system).unwrap();
             }
             stack.commit(pop);

@@ -209,7 +209,7 @@ proptest! {
         let mut stack = Stack::new(8);
         let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { return Ok(()) };
         let after = every_order(&before, &push.steps, seed);
-        for s in &push.steps {
+        for s in push.steps.iter() {
             step::apply(&s.step, &mut system).unwrap();
         }
         prop_assert_eq!(&system.snapshot(), &after.is);

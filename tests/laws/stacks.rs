@@ -29,7 +29,7 @@ impl Both {
     }
 
     pub fn execute(&mut self, transaction: Planned) -> Vec<FrameId> {
-        for s in &transaction.steps {
+        for s in transaction.steps.iter() {
             step::apply(&s.step, &mut self.system)
                 .unwrap_or_else(|v| panic!("{}: {v:?} in {:?}", s.step, show(&transaction.steps)));
         }
@@ -180,7 +180,7 @@ proptest! {
         steps += push.steps.len();
         prop_assert!(net.steps.len() <= steps);
         let mut seen = std::collections::BTreeSet::new();
-        for s in &net.steps {
+        for s in net.steps.iter() {
             if let Step::PropertySet { property, .. } = &s.step {
                 let created = net.steps.iter().any(|o| matches!(o.step, Step::Create { component, .. } if component == property.component));
                 prop_assert!(created || seen.insert(*property), "written twice: {:?}", show(&net.steps));
