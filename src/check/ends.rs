@@ -161,6 +161,7 @@ impl Product<'_> {
             !over
         });
         next.joined.retain(|of| *of != number);
+        next.placed.retain(|of| *of != number);
         // From the last on, so that places stay.
         for (place, _) in given.iter().rev() {
             next.desk.answered(number, *place);
@@ -194,6 +195,8 @@ impl Product<'_> {
                     false => next.stopped.push((number, Stop::GivenUp(undo))),
                 }
             }
+            // The rest of it begins before whatever waits.
+            self.takes_place(&mut next, number);
         }
         for undo in late.into_iter().rev() {
             next.desk.comes_next(undo);
@@ -234,10 +237,10 @@ impl Product<'_> {
                 Stop::Interrupted(planned) => interrupted = Some(*planned),
             }
         }
+        // What came at the same moment may have been told first; and what came when it was on its way back, too late.
+        let some = if self.tells_all { 0 } else { given_up.len() };
+        given_up.append(&mut late);
         if let Some(planned) = interrupted.filter(|planned| self.worlds.top(*planned).is_none()) {
-            // What came at the same moment may have been told first; and what came when it was on its way back, too late.
-            let some = if self.tells_all { 0 } else { given_up.len() };
-            given_up.append(&mut late);
             for count in some..=given_up.len() {
                 self.interrupted_ends(state, number, &requests, planned, &given_up[..count], nexts);
             }

@@ -14,7 +14,7 @@ use super::coordinator::outside_events;
 use super::members::{Member, hears_loss, members};
 use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, Stop, index};
-use super::world::{Beside, Comes, EMPTY, Held, Went, Worlds};
+use super::world::{Beside, Comes, EMPTY, Held, Went, WorldId, Worlds};
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
@@ -112,6 +112,7 @@ impl<'a> Product<'a> {
             desk: Desk::default(),
             stopped: SmallVec::new(),
             joined: SmallVec::new(),
+            placed: SmallVec::new(),
             safe: SmallVec::new(),
             due: SmallVec::new(),
             telling: SmallVec::new(),
@@ -253,18 +254,37 @@ impl<'a> Product<'a> {
         let joined = |number: u32| state.joined.contains(&number);
         let mut held = Held::new();
         for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
-            let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
-                Stop::Interrupted(planned) if *of == turn.number => Some(*planned),
-                _ => None,
-            });
-            let planned = planned.unwrap_or(state.world);
+            let planned = Self::planned_in(state, turn.number);
             let own = self.worlds.held_by(planned, &turn.batch.requests, joined(turn.number));
             held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
         held.sort_unstable();
         held.dedup();
-        Beside { held, joined: number.is_some_and(joined) }
+        let placed = number.is_some_and(|number| state.placed.contains(&number));
+        Beside { held, joined: number.is_some_and(joined), placed }
+    }
+
+    /// The world in which a batch under way was planned.
+    fn planned_in(state: &State, number: u32) -> WorldId {
+        let planned = state.stopped.iter().find_map(|(of, stop)| match stop {
+            Stop::Interrupted(planned) if *of == number => Some(*planned),
+            _ => None,
+        });
+        planned.unwrap_or(state.world)
+    }
+
+    /// Frames that undos under way are about, also those of which it is known that they stay: no later undo by leaving the
+    /// same state is about them.
+    pub(super) fn frames_left(&mut self, state: &State) -> Held {
+        let mut left = self.beside(state, None).held;
+        for turn in state.desk.under_way() {
+            let planned = Self::planned_in(state, turn.number);
+            let joined = state.joined.contains(&turn.number);
+            let stay = self.worlds.staying(planned, &turn.batch.requests, joined);
+            left.extend(stay.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
+        }
+        left
     }
 
     /// Whether all of them are down, with nothing left to be answered or heard.

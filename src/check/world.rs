@@ -105,6 +105,8 @@ pub struct Beside {
     pub held: Held,
     /// The batch was begun as one, and some of it were answered since.
     pub joined: bool,
+    /// Its pushes have taken their place.
+    pub placed: bool,
 }
 
 /// What a safe configuration comes to.
@@ -252,7 +254,7 @@ impl<'a> Worlds<'a> {
 
     /// The first requests of a batch, as the stack decides.
     pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
-        let rules = Rules { held: &beside.held, joined: beside.joined, ..self.rules() };
+        let rules = Rules { held: &beside.held, joined: beside.joined, placed: beside.placed, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 
@@ -265,6 +267,7 @@ impl<'a> Worlds<'a> {
             busy: false,
             held: &[],
             joined: false,
+            placed: false,
         }
     }
 

@@ -141,6 +141,9 @@ impl Transaction {
             after.sort_unstable();
             after.dedup();
             let overwritten = late.is_some_and(|(_, revision)| self.touched.overwrote(&original.step, revision));
+            if late.is_some() {
+                heed.came_late(&original.step);
+            }
             let before = way.list.len();
             let mut left_out = overwritten;
             for back in self.steps_back(i, part).iter().filter(|_| !overwritten) {
@@ -337,6 +340,9 @@ impl Transaction {
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
             let step = &forward.list[*i as usize].step;
             let late = self.late_beside(*i, &theirs);
+            if late.is_some() {
+                heed.came_late(step);
+            }
             if late.is_some_and(|(_, revision)| theirs.overwrote(step, revision)) {
                 continue;
             }

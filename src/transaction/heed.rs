@@ -156,6 +156,14 @@ impl<'t> Heed<'t> {
         Self { touched, doomed, remade: FxHashSet::default() }
     }
 
+    /// A step that came in late goes back by itself, or stays since it was overwritten: what it made is then not there to be
+    /// taken away, and what comes after it on the way is about what was there before.
+    pub fn came_late(&mut self, step: &Step) {
+        if let Step::Create { component, .. } = step {
+            self.doomed.remove(component);
+        }
+    }
+
     /// What is done for a step back, the next on the way. Empty: it is superseded.
     pub fn instead_of(&mut self, back: &Step, view: &impl View) -> SmallVec<[Step; 2]> {
         if self.touched.is_empty() {
