@@ -307,3 +307,63 @@ fn of_what_it_interrupted_that_is_broken_of_which_something_is_left() {
         rig.each_answered_once();
     }
 }
+
+/// `A` running, which is undone and made anew, with the making still out when safe configurations come.
+fn made_anew() -> (Rig, davit::model::Snapshot) {
+    let mut all = vec![
+        configuration("other", "", "create B", ""),
+        configuration("make", "", "create A", "A:running"),
+        configuration("low", "", "", "A:stopped"),
+        configuration("both", "", "set B.k 1", "A:stopped"),
+    ];
+    all[2].safe = true;
+    all[3].safe = true;
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("other"), ["other.ok"]);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let before = rig.see();
+    let of = [("create A", 0.5), ("property_set B.k", 1.0)];
+    let of = of.map(|(step, seconds)| (StepPattern::new(step), Duration::from_secs_f64(seconds))).to_vec();
+    rig.platform.set_delays(Delays { of, ..Delays::default() });
+    rig.submit("make.undo make");
+    rig.wait(0.2);
+    assert!(!rig.see().components.contains_key(&name("A")));
+    (rig, before)
+}
+
+#[test]
+fn what_was_made_anew_meanwhile_comes_back_as_it_wants_it() {
+    let (rig, before) = made_anew();
+    rig.submit("low");
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[2..], ["low.ok", "make.undo.failed", "make.failed"]);
+    assert_eq!(rig.frames(), ["other", "make", "low"]);
+    assert_eq!(
+        rig.see().components[&name("A")].state,
+        RunState::Stopped,
+        "what came late is gone, and this is as before"
+    );
+    assert_eq!(rig.ask("low.undo"), ["low.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
+
+#[test]
+fn a_second_one_finds_what_was_made_anew_meanwhile_as_the_first_wants_it() {
+    let (rig, before) = made_anew();
+    rig.submit_as("both", coordinator("c1")).unwrap();
+    // What was out is back, and the first not there yet.
+    rig.wait(0.6);
+    assert!(rig.see().components.contains_key(&name("A")));
+    rig.submit_as("low", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    let held = rig.see();
+    assert_eq!(held.components[&name("A")].state, RunState::Stopped);
+    assert_eq!(rig.ask_as("low.undo", coordinator("c2")), ["low.undone"]);
+    assert_eq!(rig.see(), held, "the first is still in force");
+    assert_eq!(rig.ask_as("both.undo", coordinator("c1")), ["both.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
