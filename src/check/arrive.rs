@@ -222,6 +222,9 @@ impl Product<'_> {
         }
         for request in arrival.safe {
             self.owed(&mut state, &request);
+            if let Some(world) = self.worlds.get(state.world) {
+                world.note_gone(&request, state.safe.iter(), state.desk.requests_mut());
+            }
             state.safe.push(request);
         }
         self.begin(&mut state);

@@ -82,6 +82,11 @@ impl Worlds<'_> {
         self.ids(id).get(usize::from(place)).copied()
     }
 
+    /// Whether frames have been squashed.
+    pub fn is_piled_up(&self, id: WorldId) -> bool {
+        self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
+    }
+
     /// Whether a frame of this configuration is in force, in whatever shape.
     pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
         self.get(id).is_some_and(|world| world.stack.is_in_force(configuration))

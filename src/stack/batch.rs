@@ -215,7 +215,8 @@ fn resolve<'a>(
                 // since it is safe, stands above.
                 (_, Some(scope)) => {
                     let of = |f: &&std::sync::Arc<super::Frame>| {
-                        f.scope == Some(scope) && f.configuration == id && f.requester == request.requester
+                        let of = (f.scope, f.configuration, f.requester);
+                        !request.gone && of == (Some(scope), id, request.requester)
                     };
                     work.frames.iter().find(of)
                 }

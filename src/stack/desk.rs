@@ -182,10 +182,10 @@ impl Desk {
         }
     }
 
-    /// Every request that waits or is under way.
+    /// Every request that is under way or waits, in that order.
     pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
-        let waiting = self.waiting.iter_mut();
-        waiting.chain(self.under_way.iter_mut().map(|turn| &mut turn.batch)).flat_map(|batch| &mut batch.requests)
+        let under_way = self.under_way.iter_mut().map(|turn| &mut turn.batch);
+        under_way.chain(&mut self.waiting).flat_map(|batch| &mut batch.requests)
     }
 
     /// The request at a place of a batch under way is answered. True: that was the last of it, and it is over.

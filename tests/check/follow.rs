@@ -8,7 +8,8 @@ use davit::statechart::{Chart, compile};
 use std::sync::Arc;
 
 /// Follows a story, one line of it after the other: `event e_start`; `operator one.undo`; `drive: one.ok`, an answer to whom;
-/// `rests A,B | base by drive 1, …` how coordinators and frames stand then, with everything under way left out.
+/// `rests root.up | base by drive 1 | work by drive` how coordinators and frames stand then, and what is not answered, with the
+/// components left out that this is about.
 #[track_caller]
 fn follow(small: &Small, story: &[&str]) {
     let read = small.read();
@@ -20,7 +21,11 @@ fn follow(small: &Small, story: &[&str]) {
             ("event", name) => follower.see(Seen::Event(EventName::new(name).unwrap())),
             ("operator", name) => {
                 let id = |name: &str| ConfigId::new(name).unwrap();
-                let ask = name.strip_suffix(".undo").map_or_else(|| Ask::Apply(id(name)), |name| Ask::UndoOf(id(name)));
+                let ask = match name.strip_suffix(".undo") {
+                    Some(name) => Ask::UndoOf(id(name)),
+                    None if name == "undo" => Ask::Undo,
+                    None => Ask::Apply(id(name)),
+                };
                 follower.see(Seen::Operator { ask, force: true })
             }
             ("rests", rest) => {
@@ -34,7 +39,7 @@ fn follow(small: &Small, story: &[&str]) {
                 let shown = Shown {
                     leaves: list(leaves),
                     system: Snapshot::default(),
-                    frames: frames.split(", ").map(frame).collect(),
+                    frames: frames.split(", ").filter(|one| !one.is_empty()).map(frame).collect(),
                     open: list(open),
                 };
                 follower.rests(&shown).map(|_| ())
@@ -53,6 +58,9 @@ fn follow(small: &Small, story: &[&str]) {
     }
 }
 
+/// While this is under way only coordinators and frames are compared.
+const REST: &str = "operator undo";
+
 /// An operator's undo holds the frame with which another one would be squashed; but the push began before it.
 #[test]
 fn a_push_keeps_the_place_that_it_found_when_it_began() {
@@ -67,7 +75,12 @@ fn a_push_keeps_the_place_that_it_found_when_it_began() {
         trans { src = \"up\", tgt = \"idle\", events = { \"e_shutdown\" } },";
     let small = Small::several(configurations, &[("drive", states)], "limits: { stack: 2 }\n");
     let begun = ["event e_start", "drive: base.ok", "operator first.undo", "drive: first.ok"];
-    let ends = ["drive: second.ok", "operator: first.undone", "rests root.up | base by drive 1, second by drive 1 | "];
+    let ends = [
+        "drive: second.ok",
+        "operator: first.undone",
+        REST,
+        "rests root.up | base by drive 1, second by drive 1 | undo by operator",
+    ];
     follow(&small, &[&begun[..], &ends[..]].concat());
     // Undone first, it makes no difference.
     follow(&small, &[&begun[..], &["operator: first.undone", "drive: second.ok"]].concat());
@@ -93,7 +106,8 @@ fn what_is_interrupted_and_given_up_at_once_is_cancelled_also_where_nothing_is_k
         trans { src = \"leaving\", tgt = \"idle\", events = { \"e_shutdown\" } },";
     let small = Small::several(configurations, &[("one", one), ("two", two)], "");
     // `other` is not cancelled: it came when `stop` was there, and the undo with it.
-    let story = ["event e_start", "one: bad.broken", "event e_work", "event e_stop", "one: stop.ok"];
+    let rests = "rests root.stopping, root.leaving |  | other by two, stop by one, work by two, work.undo by two";
+    let story = ["event e_start", "one: bad.broken", "event e_work", "event e_stop", rests, "one: stop.ok"];
     let ends = ["two: work.cancelled", "two: work.undone", "two: other.failed"];
     follow(&small, &[&story[..], &ends[..]].concat());
 }
@@ -125,4 +139,57 @@ fn an_undo_of_a_later_visit_is_not_about_a_frame_that_stays() {
     let rests =
         "rests root.again | base by drive 1, hold by drive 1, hold by drive 1 | hold.undo by drive, make by drive";
     follow(&small, &[&twice[..], &waits[..], &[rests]].concat());
+}
+
+/// The frame of a visit is undone by name; leaving the state is not about that of the next visit, which is there before.
+#[test]
+fn leaving_a_state_whose_frame_is_gone_leaves_the_next_visits_frame_alone() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" } },
+        hold = Configuration { safe = true, post_conf_state = { \"a:stopped\" } },";
+    let states = "idle = state {}, up = state { entry = \"base\" },
+        still = state { config = \"hold\", as_is = state {}, freed = state { entry = \"hold.undo\" },
+            trans { src = \"initial\", tgt = \"as_is\" },
+            trans { src = \"as_is\", tgt = \"freed\", events = { \"e_free\" } },
+        },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"still\", events = { \"e_still\" } },
+        trans { src = \"still\", tgt = \"still\", events = { \"e_again\" } },
+        trans { src = \"still\", tgt = \"idle\", events = { \"e_shutdown\" } },";
+    let small = Small::several(configurations, &[("drive", states)], "");
+    let first = ["event e_start", "drive: base.ok", "event e_still", "drive: hold.ok"];
+    let freed = ["event e_free", "drive: hold.undone"];
+    let again = |verdict: &'static str| ["event e_again", "drive: hold.ok", verdict, REST];
+    let rests = "rests root.still.as_is | base by drive 1, hold by drive 1 | undo by operator";
+    follow(&small, &[&first[..], &freed[..], &again("drive: hold.undone")[..], &[rests]].concat());
+    // Not freed, it is about the first visit's frame, and the next one's stands in its way.
+    let both = "rests root.still.as_is | base by drive 1, hold by drive 1, hold by drive 1 | undo by operator";
+    follow(&small, &[&first[..], &again("drive: hold.undo.failed")[..], &[both]].concat());
+    // The last one's goes when that is left.
+    let left =
+        ["event e_again", "drive: hold.ok", "drive: hold.undone", "event e_shutdown", "drive: hold.undone", REST];
+    let rests = "rests root.idle | base by drive 1 | undo by operator";
+    follow(&small, &[&first[..], &freed[..], &left[..], &[rests]].concat());
+}
+
+/// Frames that look alike are not taken for each other, however often the same was there before: the one that is being undone is
+/// not squashed.
+#[test]
+fn a_frame_that_is_held_is_not_mistaken_for_one_like_it() {
+    let configurations = "make = Configuration { create(\"b\", \"Drive\") },
+        hold = Configuration { safe = true, post_conf_state = { \"a:stopped\" } },";
+    let states =
+        "idle = state {}, up = state { config = \"hold\", entry = \"hold\", exit = \"hold.undo\" }, out = state { entry = { \"hold\", \"make\" } },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"up\", events = { \"e_again\" } },
+        trans { src = \"up\", tgt = \"out\", events = { \"e_out\" } },
+        trans { src = \"out\", tgt = \"up\", events = { \"e_back\" } },
+        trans { src = \"up\", tgt = \"idle\", events = { \"e_shutdown\" } },";
+    let small = Small::several(configurations, &[("drive", states)], "limits: { stack: 3 }\n");
+    let (ok, undone) = ("drive: hold.ok", "drive: hold.undone");
+    let again = ["event e_again", ok, ok, undone, undone];
+    let held = ["event e_out", ok, "event e_back", ok, ok];
+    let rests = "rests root.up | hold by drive 1, hold by drive 1, hold by drive 1, hold by drive 1 | hold.undo by drive, hold.undo by drive, make by drive";
+    follow(&small, &[&["event e_start", ok, ok], &again[..], &again[..], &held[..], &[rests]].concat());
 }
