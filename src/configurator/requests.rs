@@ -210,7 +210,10 @@ impl Engine {
                 // Interrupted with the others, whatever it would have come to after them.
                 Some(reason) if told.place > first && told.verdict.is_some() => {
                     let request = &requests[told.place];
-                    self.world.stays(request, &[]);
+                    // What was refused was about a frame that stays already, and not about that of a later visit.
+                    if group.stay.iter().all(|(place, _)| *place != told.place) {
+                        self.world.stays(request, &[]);
+                    }
                     answers.push((told.place, Some(request.ask.failed()), Some(reason.clone())));
                 }
                 _ => answers.push((told.place, told.verdict, told.reason)),

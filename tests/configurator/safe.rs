@@ -421,3 +421,34 @@ fn leaving_a_state_whose_frame_is_gone_does_not_undo_that_of_the_next_visit() {
     assert_eq!(rig.see().components[&name("A")].state, RunState::Running);
     rig.in_step();
 }
+
+#[test]
+fn an_undo_that_is_refused_and_interrupted_is_not_about_the_next_visit() {
+    let mut all = vec![
+        configuration("make", "", "create A", "A:running"),
+        configuration("gain", "", "set A.k 7", ""),
+        configuration("more", "", "create B", ""),
+        configuration("low", "", "", "A:stopped"),
+    ];
+    all[3].safe = true;
+    let rig = Rig::new(all);
+    let of = |number: u64, ask: Ask| Request::new(RequestId(number), ask, coordinator(COORDINATOR));
+    let by_state = |number: u64, ask: Ask| Request { scope: Some(Scope(7)), ..of(number, ask) };
+    assert_eq!((rig.ask("make"), rig.ask("gain")), (vec!["make.ok".to_owned()], vec!["gain.ok".to_owned()]));
+    rig.handle.submit(Batch::one(by_state(1001, Ask::Apply(id("low"))))).unwrap();
+    rig.wait(1.0);
+    assert_eq!(rig.ask("low"), ["low.ok"], "it stands in the way of leaving the state");
+    rig.platform.set_delays(slow("create", 0.5));
+    let (gain, more) = (of(1002, Ask::UndoOf(id("gain"))), of(1004, Ask::Apply(id("more"))));
+    rig.handle.submit([gain, by_state(1003, Ask::UndoOf(id("low"))), more].into_iter().collect()).unwrap();
+    rig.wait(0.2);
+    // The state is entered again while that is under way.
+    rig.handle.submit(Batch::one(by_state(1005, Ask::Apply(id("low"))))).unwrap();
+    rig.wait(5.0);
+    assert_eq!(rig.events()[4..], ["low.ok", "gain.undo.failed", "low.undo.failed", "more.failed"]);
+    assert_eq!(rig.frames(), ["make", "gain", "low", "low", "low"]);
+    rig.handle.submit(Batch::one(by_state(1006, Ask::UndoOf(id("low"))))).unwrap();
+    rig.wait(5.0);
+    assert_eq!(rig.frames(), ["make", "gain", "low", "low"], "that of the second visit goes with it");
+    rig.in_step();
+}
