@@ -5,10 +5,15 @@ use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
+use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
 use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
+
+/// Whether a push is refused because the stack is full.
+fn is_for_room(why: &Findings) -> bool {
+    why.iter().any(|finding| finding.code == codes::STACK_FULL)
+}
 
 impl Product<'_> {
     /// A coordinator hears an event, and comes to rest again.
@@ -141,7 +146,10 @@ impl Product<'_> {
                     {
                         let mut waits = state.clone();
                         let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
-                        those.rev().for_each(|(_, number)| waits.desk.put_back(*number, last));
+                        for (_, number) in those.rev() {
+                            waits.desk.put_back(*number, last);
+                            waits.placed.retain(|of| of != number);
+                        }
                         states.push(self.take_in(waits, batch.clone()));
                     }
                 }
@@ -185,8 +193,8 @@ impl Product<'_> {
             self.owed(&mut state, request);
             if *verdict == Verdict::UndoFailed {
                 state.stayed = true;
-                let held = self.beside(&state, None).held;
-                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &held);
+                let left = self.frames_left(&state);
+                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &left);
                 self.go(&mut state, &went);
             }
             self.due(&mut state, *request, *verdict);
@@ -205,6 +213,9 @@ impl Product<'_> {
         }
         for request in arrival.safe {
             self.owed(&mut state, &request);
+            if let Some(world) = self.worlds.get(state.world) {
+                world.note_gone(&request, state.safe.iter(), state.desk.requests_mut());
+            }
             state.safe.push(request);
         }
         self.begin(&mut state);
@@ -277,6 +288,7 @@ impl Product<'_> {
                 for request in &turn.batch.requests {
                     self.owed(state, request);
                 }
+                self.takes_place(state, turn.number);
                 continue;
             }
             state.desk.over(turn.number);
@@ -291,6 +303,17 @@ impl Product<'_> {
                 state.unconfirmed.clear();
                 state.lost.clear();
             }
+        }
+    }
+
+    /// A batch under way begins, or the rest of it: a push takes its place on the stack then, or finds none.
+    pub(super) fn takes_place(&mut self, state: &mut State, number: u32) {
+        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
+        let Some(requests) = turn.map(|turn| turn.batch.requests.clone()) else { return };
+        if self.worlds.is_tight(state.world, &requests)
+            && !self.comes(state, number, &requests).refused.iter().any(|(_, why)| is_for_room(why))
+        {
+            state.placed.push(number);
         }
     }
 

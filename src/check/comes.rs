@@ -25,7 +25,7 @@ impl Worlds<'_> {
 
     /// The first requests of a batch, as the stack decides.
     pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
-        let rules = Rules { held: &beside.held, joined: beside.joined, ..self.rules() };
+        let rules = Rules { held: &beside.held, joined: beside.joined, placed: beside.placed, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 

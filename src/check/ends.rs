@@ -106,6 +106,7 @@ impl Product<'_> {
         self.go(&mut next, went);
         next.interrupted.retain(|of| of.number != number);
         next.joined.retain(|of| *of != number);
+        next.placed.retain(|of| *of != number);
         let gone = next.desk.all_answered(number, given.iter().copied());
         let mut answers = Answers::new();
         for ((place, verdict), gone) in given.iter().zip(gone) {
@@ -121,6 +122,8 @@ impl Product<'_> {
         {
             self.cancel_behind(&mut next, number, place);
         }
+        // The rest of it begins before whatever waits.
+        self.takes_place(&mut next, number);
         for next in self.lands(next) {
             self.tell(next, answers.clone(), *class, nexts);
         }
@@ -148,7 +151,7 @@ impl Product<'_> {
         }
         // In the order in which they came.
         let turn = state.desk.turn_of(number);
-        let mut given_up: SmallVec<[usize; 1]> =
+        let given_up: SmallVec<[usize; 1]> =
             turn.iter().flat_map(|turn| &turn.given_up).map(|given_up| given_up.place).collect();
         let interrupted = state.interrupted(number);
         let before = interrupted.map_or(given_up.len(), |interrupted| interrupted.given_up.min(given_up.len()));
@@ -161,7 +164,6 @@ impl Product<'_> {
             }
             return;
         }
-        given_up.truncate(before);
         if let Some(top) = self.worlds.top(state.world) {
             let (ask, cancelled) = (requests[0].ask, given_up.contains(&0).then_some(Verdict::Cancelled));
             // What is interrupted is not carried out; an undo of what is not there is done without.

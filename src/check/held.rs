@@ -21,6 +21,19 @@ impl Worlds<'_> {
         held
     }
 
+    /// The frames that undos of a batch under way are about and that stay, since these are refused.
+    pub fn staying(&self, id: WorldId, requests: &[Request], joined: bool) -> Held {
+        let group = self.group(id, &plain(requests), &Beside { joined, ..Beside::default() });
+        group.iter().flat_map(|group| &group.stay).map(|(_, frame)| *frame).collect()
+    }
+
+    /// Whether these may be refused for want of room on the stack.
+    pub fn is_tight(&self, id: WorldId, requests: &[Request]) -> bool {
+        let pushes = requests.iter().filter(|request| !request.ask.is_undo()).count();
+        let by = requests.first().map(|request| request.requester);
+        by.zip(self.get(id)).is_some_and(|(by, world)| pushes > 0 && !world.stack.has_room(by, pushes))
+    }
+
     /// A frame of the world `from` in the world `to`, in which it lies below others.
     pub fn below(&self, from: WorldId, to: WorldId, frame: FrameId) -> Option<FrameId> {
         let (from, to) = (self.get(from)?, self.get(to)?);
@@ -68,6 +81,11 @@ impl Worlds<'_> {
     /// The number of the frame that counts at that place.
     pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
         self.ids(id).get(usize::from(place)).copied()
+    }
+
+    /// Whether frames have been squashed.
+    pub fn is_piled_up(&self, id: WorldId) -> bool {
+        self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
     }
 
     /// Whether a frame of this configuration is in force, in whatever shape.

@@ -43,6 +43,8 @@ pub struct Beside {
     pub held: Held,
     /// The batch was begun as one, and some of it were answered since.
     pub joined: bool,
+    /// Its pushes have taken their place.
+    pub placed: bool,
 }
 
 /// What the first requests of a batch come to.

@@ -113,6 +113,7 @@ impl<'a> Product<'a> {
             desk: Desk::default(),
             interrupted: SmallVec::new(),
             joined: SmallVec::new(),
+            placed: SmallVec::new(),
             safe: SmallVec::new(),
             due: SmallVec::new(),
             telling: SmallVec::new(),
@@ -261,7 +262,21 @@ impl<'a> Product<'a> {
         held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
         held.sort_unstable();
         held.dedup();
-        Beside { held, joined: number.is_some_and(joined) }
+        let placed = number.is_some_and(|number| state.placed.contains(&number));
+        Beside { held, joined: number.is_some_and(joined), placed }
+    }
+
+    /// Frames that undos under way are about, also those of which it is known that they stay: no later undo by leaving the
+    /// same state is about them.
+    pub(super) fn frames_left(&mut self, state: &State) -> Held {
+        let mut left = self.beside(state, None).held;
+        for turn in state.desk.under_way() {
+            let planned = state.planned(turn.number);
+            let joined = state.joined.contains(&turn.number);
+            let stay = self.worlds.staying(planned, &turn.batch.requests, joined);
+            left.extend(stay.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
+        }
+        left
     }
 
     /// Whether all of them are down, with nothing left to be answered or heard.

@@ -18,7 +18,8 @@ pub struct Undone {
     pub ids: Option<FxHashSet<ConfigId>>,
     /// Those who undo whatever is their newest.
     pub bare: FxHashSet<Requester>,
-    /// Whether the order of frames counts also where nothing can tell it.
+    /// Whether the order of frames counts also where nothing can tell it, and their numbers: then a frame has its number for
+    /// good, whatever worlds it is met in.
     pub in_order: bool,
 }
 

@@ -54,6 +54,9 @@ pub struct State {
     pub interrupted: SmallVec<[Interrupted; 1]>,
     /// Batches under way that were begun as one, of which some requests were answered since.
     pub joined: SmallVec<[u32; 1]>,
+    /// Batches under way whose pushes found their place only where frames can be squashed: what others hold on to since does
+    /// not take it away.
+    pub placed: SmallVec<[u32; 1]>,
     /// Safe configurations that are being applied, in their order.
     pub safe: SmallVec<[Request; 1]>,
     /// Answers on their way.

@@ -175,6 +175,7 @@ impl<'a> Worlds<'a> {
             busy: false,
             held: &[],
             joined: false,
+            placed: false,
         }
     }
 
@@ -230,11 +231,6 @@ impl<'a> Worlds<'a> {
             rest = &rest[group.takes.max(1).min(rest.len())..];
         }
         true
-    }
-
-    /// Whether frames have been squashed.
-    pub fn is_piled_up(&self, id: WorldId) -> bool {
-        self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
     }
 
     /// The number of a world of the caller's own.
@@ -312,7 +308,10 @@ impl<'a> Worlds<'a> {
         counted.hash(&mut hasher);
         let hash = hasher.finish();
         let same = |id: &&WorldId| match &self.worlds[**id as usize] {
-            Known::Exact(exact) => exact.counted == counted && same_system(&exact.world.system, &world.system),
+            Known::Exact(exact) => {
+                let same = exact.counted == counted && (!self.shapes.undone.in_order || exact.ids == ids);
+                same && same_system(&exact.world.system, &world.system)
+            }
             Known::Top(_) => false,
         };
         if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {

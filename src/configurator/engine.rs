@@ -8,7 +8,7 @@ use super::looks::{Observing, SuspectLook};
 use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
-use super::running::Running;
+use super::running::{Purpose, Running};
 use super::switches::Fast;
 use crate::model::{
     Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, Snapshot, Verdict,
@@ -315,7 +315,14 @@ impl Engine {
             let reason = (verdict != Verdict::Undone).then_some(reason);
             self.answer(request, verdict, reason);
         }
-        self.safe.extend(arrival.safe);
+        for safe in arrival.safe {
+            let applied = self.running.iter().filter_map(|running| match &running.purpose {
+                Purpose::Safe(safe) => Some(&safe.0),
+                _ => None,
+            });
+            self.world.note_gone(&safe, self.safe.iter().chain(applied), self.desk.requests_mut());
+            self.safe.push_back(safe);
+        }
         for (number, request) in arrival.given_up {
             self.owe(request);
             self.give_up_request(number, request);

@@ -56,6 +56,7 @@ impl Engine {
                 busy,
                 held: &held,
                 joined: false,
+                placed: false,
             };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs {

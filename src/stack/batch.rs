@@ -32,6 +32,8 @@ pub struct Rules<'a> {
     pub held: &'a [FrameId],
     /// Undos and pushes of the batch were begun together, though not all of them may be left: some were answered since.
     pub joined: bool,
+    /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
+    pub placed: bool,
 }
 
 /// A request of a batch that is answered.
@@ -114,7 +116,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             }
         }
         if !group.places.is_empty() {
-            match work.finish(&world.system, rules.held) {
+            match work.finish(&world.system, (!rules.placed).then_some(rules.held)) {
                 Err(refusal) => {
                     let place = group.places[refusal.request.min(group.places.len() - 1)];
                     refused.push(no(place, &requests[place], Reason::Refused(refusal.findings)));
@@ -218,7 +220,8 @@ fn resolve<'a>(
                 // since it is safe, stands above.
                 (_, Some(scope)) => {
                     let of = |f: &&std::sync::Arc<super::Frame>| {
-                        f.scope == Some(scope) && f.configuration == id && f.requester == request.requester
+                        let of = (f.scope, f.configuration, f.requester);
+                        !request.gone && of == (Some(scope), id, request.requester)
                     };
                     work.frames.iter().find(of)
                 }

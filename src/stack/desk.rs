@@ -213,12 +213,12 @@ impl Desk {
         }
     }
 
-    /// Every request that waits, is under way or has given something up.
+    /// Every request that is under way, has given something up or waits, in that order.
     pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
         let under_way = self.under_way.iter_mut().flat_map(|turn| {
             turn.batch.requests.iter_mut().chain(turn.given_up.iter_mut().map(|given_up| &mut given_up.undo))
         });
-        self.waiting.iter_mut().flat_map(|batch| &mut batch.requests).chain(under_way)
+        under_way.chain(self.waiting.iter_mut().flat_map(|batch| &mut batch.requests))
     }
 
     /// The request at a place of a batch under way is answered so (none: nobody is told).

@@ -168,6 +168,11 @@ impl Stack {
         &self.frames
     }
 
+    /// Whether so many more frames of a requester are within its bound.
+    pub fn has_room(&self, by: Requester, more: usize) -> bool {
+        self.frames.iter().filter(|frame| frame.requester == by).count() + more <= self.bound
+    }
+
     /// How many frames there are.
     pub fn len(&self) -> usize {
         self.frames.len()

@@ -63,6 +63,8 @@ pub struct Request {
     pub force: bool,
     /// Raised in the same step as a `safe` configuration: nothing of it may move.
     pub still: bool,
+    /// It undoes by leaving a state whose frame of that visit was gone when a later visit's came: it undoes nothing.
+    pub gone: bool,
     /// The connection through which an operator asks: its requests begin one after the other. 0: one that waits for no other.
     pub line: u32,
     /// Why it is there.
@@ -74,7 +76,18 @@ pub struct Request {
 impl Request {
     /// What `requester` asks.
     pub fn new(id: RequestId, ask: Ask, requester: Requester) -> Self {
-        Self { id, ask, requester, scope: None, force: false, still: false, line: 0, why: Why::Asked, tag: (0, 0) }
+        Self {
+            id,
+            ask,
+            requester,
+            scope: None,
+            force: false,
+            still: false,
+            gone: false,
+            line: 0,
+            why: Why::Asked,
+            tag: (0, 0),
+        }
     }
 }
 

@@ -92,7 +92,10 @@ pub fn settle(requests: &[Request], group: &Group, endings: &[Ending], stopped: 
         settled.answers.push(match told.verdict {
             // Whatever it would have come to after them.
             Some(_) if behind => {
-                settled.stay.push((told.place, None));
+                // What was refused was about a frame that stays already, and not about that of a later visit.
+                if group.stay.iter().all(|(place, _)| *place != told.place) {
+                    settled.stay.push((told.place, None));
+                }
                 (told.place, Some(requests[told.place].ask.failed()), About::Interrupted)
             }
             verdict => (told.place, verdict, About::Told(at)),

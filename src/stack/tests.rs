@@ -366,6 +366,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
         held: &[],
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
+        placed: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -397,6 +398,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         held: &[],
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
+        placed: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };

@@ -104,7 +104,7 @@ pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Con
     for (i, op) in ops.iter().enumerate() {
         work.add(op, context).map_err(|refusal| Refusal { request: i, ..refusal })?;
     }
-    work.finish(system, &[])
+    work.finish(system, Some(&[]))
 }
 
 /// A plan in the making.
@@ -314,11 +314,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         Ok(())
     }
 
-    /// Ends the plan: the net of what is undone and pushed, and room on the stack, where `held` frames are not squashed.
+    /// Ends the plan: the net of what is undone and pushed, and room on the stack, where `held` frames are not squashed; none:
+    /// its place was taken when it began.
     ///
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
-    pub(super) fn finish(self, system: &System, held: &[FrameId]) -> Result<Planned, Refusal> {
+    pub(super) fn finish(self, system: &System, held: Option<&[FrameId]>) -> Result<Planned, Refusal> {
         let Self { mut script, lone, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
         let undone = parts.iter().any(|part| part.pushes.is_none());
@@ -327,8 +328,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let whole = script.finish().map_err(|found| drifted(&found))?;
         let net = end.and_then(|end| shorter(system, &end, &whole));
         let waiting = parts.iter().filter(|part| part.edits.waits).filter_map(|part| part.edits.push.as_ref());
-        let busy: Vec<FrameId> = held.iter().copied().chain(waiting.map(|frame| frame.id)).collect();
-        for id in &pushed {
+        let busy: Vec<FrameId> = held.into_iter().flatten().copied().chain(waiting.map(|frame| frame.id)).collect();
+        for id in pushed.iter().filter(|_| held.is_some()) {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
             let own = frames.iter().filter(|f| f.requester == frame.requester).count();
             if own > stack.bound && !squash::possible(&frames, frame.requester, &busy) {

@@ -77,10 +77,32 @@ impl World {
         let (Ask::UndoOf(id), Some(_)) = (undo.ask, undo.scope) else { return None };
         let fits = |frame: &&Arc<super::Frame>| {
             let of = (frame.scope, frame.configuration, frame.requester);
-            of == (undo.scope, id, undo.requester) && !held.contains(&frame.id)
+            !undo.gone && of == (undo.scope, id, undo.requester) && !held.contains(&frame.id)
         };
         // A safe configuration of a later visit may be there already: visits are left in their order.
         self.stack.frames().iter().find(fits).map(|frame| frame.id)
+    }
+
+    /// A safe configuration comes that a state brings with it. Undos by leaving that state that came before (`undos`, oldest
+    /// first) are about earlier visits: those whose frame is gone already undo nothing, and not what comes now. `coming`: safe
+    /// configurations that came before, and whose frames are not there yet.
+    pub fn note_gone<'r>(
+        &self,
+        safe: &Request,
+        coming: impl Iterator<Item = &'r Request>,
+        undos: impl Iterator<Item = &'r mut Request>,
+    ) {
+        let (Ask::Apply(id), Some(_)) = (safe.ask, safe.scope) else { return };
+        let same = |ask: Ask, request: &Request| {
+            (request.ask, request.scope, request.requester) == (ask, safe.scope, safe.requester)
+        };
+        let visits =
+            self.stack.frames().iter().filter(|frame| {
+                (frame.scope, frame.configuration, frame.requester) == (safe.scope, id, safe.requester)
+            });
+        let there = visits.count() + coming.filter(|request| same(Ask::Apply(id), request)).count();
+        let undos = undos.filter(|undo| same(Ask::UndoOf(id), undo) && !undo.gone);
+        undos.skip(there).for_each(|undo| undo.gone = true);
     }
 
     /// An undo by leaving a state was not carried out: its frame stays, and is one like others. Frames that are being undone

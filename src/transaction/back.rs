@@ -10,7 +10,7 @@ use crate::stack::Reason;
 use crate::system::touch::components;
 use crate::system::{Overlay, Reversibility, System, Undo, View as _, diff, step};
 use rustc_hash::FxHashSet;
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 /// A step that stands alone in its wave and before which so many others stand.
 fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> PlannedStep {
@@ -50,6 +50,8 @@ pub(super) struct WayBack {
     pub superseded: Vec<u32>,
     /// Something that a safe configuration wrote is brought back first.
     pub restores: bool,
+    /// Something goes on to where safe configurations want it.
+    pub brings: bool,
     /// Steps of the forward list of whose several steps back some are left out for that reason.
     pub left_out: Vec<u32>,
 }
@@ -141,14 +143,20 @@ impl Transaction {
             after.sort_unstable();
             after.dedup();
             let overwritten = late.is_some_and(|(_, revision)| self.touched.overwrote(&original.step, revision));
+            if late.is_some() {
+                heed.came_late(&original.step);
+            }
             let before = way.list.len();
             let mut left_out = overwritten;
             for back in self.steps_back(i, part).iter().filter(|_| !overwritten) {
-                let goes = if late.is_some() { smallvec![back.clone()] } else { heed.instead_of(back, &view) };
+                let goes = match late {
+                    Some(_) => Heed::instead_of_late(back, &view),
+                    None => heed.instead_of(back, &view),
+                };
                 left_out |= goes.is_empty();
                 let last = goes.len().saturating_sub(1);
                 for (at, back) in goes.into_iter().enumerate() {
-                    if late.is_none() && !self.may_move(i) && step::moves(&back, &view) {
+                    if (late.is_none() || at < last) && !self.may_move(i) && step::moves(&back, &view) {
                         way.withheld = Some(back);
                         return way;
                     }
@@ -337,12 +345,18 @@ impl Transaction {
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
             let step = &forward.list[*i as usize].step;
             let late = self.late_beside(*i, &theirs);
+            if late.is_some() {
+                heed.came_late(step);
+            }
             if late.is_some_and(|(_, revision)| theirs.overwrote(step, revision)) {
                 continue;
             }
             for back in late.map_or_else(|| self.undo_of(*i, 0), |(undo, _)| undo).steps() {
                 // What came in late goes back to what safe ones had led to.
-                let goes = if late.is_some() { smallvec![back.clone()] } else { heed.instead_of(back, &*picture) };
+                let goes = match late {
+                    Some(_) => Heed::instead_of_late(back, &*picture),
+                    None => heed.instead_of(back, &*picture),
+                };
                 for back in goes {
                     let _ = step::apply(&back, picture);
                 }

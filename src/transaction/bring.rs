@@ -30,6 +30,7 @@ impl Transaction {
                     break;
                 }
                 way.add_behind(step);
+                way.brings = true;
             }
         }
     }

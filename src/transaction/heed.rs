@@ -145,6 +145,14 @@ pub(super) fn height(state: RunState) -> u8 {
     }
 }
 
+/// A component goes away that may have been brought up meanwhile.
+fn away(component: ComponentName, back: &Step, view: &impl View) -> SmallVec<[Step; 2]> {
+    let Some(node) = view.component(component) else { return smallvec![] };
+    let down = node.state.path_to(Wanted::Unconfigured).iter();
+    let down = down.map(|transition| Step::State { component, transition: *transition });
+    down.chain([back.clone()]).collect()
+}
+
 impl<'t> Heed<'t> {
     /// A way back that begins; it takes away again what `made` has made.
     pub fn new<'s>(touched: &'t Touched, made: impl Iterator<Item = &'s Step>) -> Self {
@@ -154,6 +162,22 @@ impl<'t> Heed<'t> {
         });
         let doomed = if touched.is_empty() { FxHashSet::default() } else { created.collect() };
         Self { touched, doomed, remade: FxHashSet::default() }
+    }
+
+    /// A step that came in late goes back by itself, or stays since it was overwritten: what it made is then not there to be
+    /// taken away, and what comes after it on the way is about what was there before.
+    pub fn came_late(&mut self, step: &Step) {
+        if let Step::Create { component, .. } = step {
+            self.doomed.remove(component);
+        }
+    }
+
+    /// What is done for a step back of what came in late.
+    pub fn instead_of_late(back: &Step, view: &impl View) -> SmallVec<[Step; 2]> {
+        match back {
+            Step::Destroy { component } => away(*component, back, view),
+            _ => smallvec![back.clone()],
+        }
     }
 
     /// What is done for a step back, the next on the way. Empty: it is superseded.
@@ -178,13 +202,7 @@ impl<'t> Heed<'t> {
                 let (component, ty, activity) = (*component, *ty, *activity);
                 smallvec![Step::Create { component, ty, activity, properties }]
             }
-            Step::Destroy { component } if self.doomed.remove(component) => {
-                let Some(node) = view.component(*component) else { return smallvec![] };
-                // It may have been brought up meanwhile.
-                let down = node.state.path_to(Wanted::Unconfigured).iter();
-                let down = down.map(|transition| Step::State { component: *component, transition: *transition });
-                down.chain([back.clone()]).collect()
-            }
+            Step::Destroy { component } if self.doomed.remove(component) => away(*component, back, view),
             _ => {
                 let about = components(back);
                 if about.iter().any(missing) {

@@ -441,9 +441,9 @@ impl Transaction {
             self.phase = Phase::LookingAgain;
             return;
         }
-        let mut failed = self.back.is_none();
+        let (mut failed, mut whole) = (self.back.is_none(), false);
         if let Some((run, way)) = self.back.take() {
-            failed = self.took_back(&run, &way);
+            (failed, whole) = (self.took_back(&run, &way), back::whole(&run));
         }
         let part = self.failed_part();
         if self.between.is_none() && part > 0 {
@@ -453,7 +453,8 @@ impl Transaction {
         let way = self.way_back(part, live);
         self.withheld.clone_from(&way.withheld);
         self.taken_back.extend(way.superseded.iter().copied());
-        failed |= way.restores;
+        // A safe configuration that came during its last step may want more of what that has brought back.
+        failed |= way.restores || whole && way.brings;
         self.late_back.clear();
         let again = self.interrupted || self.attempts < 2;
         if way.list.is_empty() || !(failed && again) || self.attempts > 8 {

@@ -8,6 +8,7 @@ mod advice;
 mod asked;
 mod beside;
 mod demands;
+mod follow;
 mod product;
 mod support;
 mod verdicts;

@@ -1,6 +1,8 @@
 //! A deployment of a drive or two, and what `check` says of it.
 
 use crate::demo::Demo;
+use davit::lang::LoadOptions;
+use davit::runtime::Libraries;
 use serde_json::Value;
 
 const DEPLOYMENT: &str = "davit: 1
@@ -64,6 +66,13 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
         );
         demo.write("small.yaml", &text);
         Self { demo }
+    }
+
+    /// The deployment, not checked.
+    pub fn read(&self) -> davit::app::Read {
+        let path = self.demo.path("small.yaml");
+        davit::app::read(&path, &LoadOptions::default(), &Libraries::default())
+            .unwrap_or_else(|_| panic!("it is readable"))
     }
 
     /// What `check` says.

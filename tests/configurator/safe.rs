@@ -2,8 +2,9 @@
 
 use crate::rig::*;
 use davit::configurator::Requester;
-use davit::model::{Configuration, RunState, Value, Verdict};
+use davit::model::{Ask, Configuration, RequestId, RunState, Value, Verdict};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, StepPattern};
+use davit::stack::{Batch, Request, Scope};
 use std::time::Duration;
 
 fn up() -> Rig {
@@ -306,4 +307,148 @@ fn of_what_it_interrupted_that_is_broken_of_which_something_is_left() {
         rig.in_step();
         rig.each_answered_once();
     }
+}
+
+/// `A` running, which is undone and made anew, with the making still out when safe configurations come.
+fn made_anew() -> (Rig, davit::model::Snapshot) {
+    let mut all = vec![
+        configuration("other", "", "create B", ""),
+        configuration("make", "", "create A", "A:running"),
+        configuration("low", "A:stopped", "write B.u 1", ""),
+        configuration("both", "", "set B.k 1", "A:stopped"),
+    ];
+    all[2].safe = true;
+    all[3].safe = true;
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("other"), ["other.ok"]);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let before = rig.see();
+    let of = [("create A", 0.5), ("property_set B.k", 1.0), ("port_write B.u", 1.0)];
+    let of = of.map(|(step, seconds)| (StepPattern::new(step), Duration::from_secs_f64(seconds))).to_vec();
+    rig.platform.set_delays(Delays { of, ..Delays::default() });
+    rig.submit("make.undo make");
+    rig.wait(0.2);
+    assert!(!rig.see().components.contains_key(&name("A")));
+    (rig, before)
+}
+
+#[test]
+fn what_was_made_anew_meanwhile_comes_back_as_it_wants_it() {
+    let (rig, before) = made_anew();
+    rig.submit("low");
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[2..], ["low.ok", "make.undo.failed", "make.failed"]);
+    assert_eq!(rig.frames(), ["other", "make", "low"]);
+    assert_eq!(
+        rig.see().components[&name("A")].state,
+        RunState::Stopped,
+        "what came late is gone, and this is as before"
+    );
+    assert_eq!(rig.ask("low.undo"), ["low.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
+
+#[test]
+fn a_second_one_finds_what_was_made_anew_meanwhile_as_the_first_wants_it() {
+    let (rig, before) = made_anew();
+    rig.submit_as("both", coordinator("c1")).unwrap();
+    // What was out is back, and the first not there yet: the second one brings it up, and it goes away all the same.
+    rig.wait(0.6);
+    assert!(rig.see().components.contains_key(&name("A")));
+    rig.submit_as("low", coordinator("c2")).unwrap();
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[2..], ["both.ok", "low.ok", "make.undo.failed", "make.failed"]);
+    assert_eq!(rig.frames(), ["other", "make", "both", "low"]);
+    assert_eq!(rig.see().components[&name("A")].state, RunState::Stopped);
+    assert_eq!(rig.ask_as("low.undo", coordinator("c2")), ["low.undone"]);
+    assert_eq!(rig.see().components[&name("A")].state, RunState::Stopped, "the first is still in force");
+    assert_eq!(rig.ask_as("both.undo", coordinator("c1")), ["both.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+    rig.each_answered_once();
+}
+
+#[test]
+fn what_the_last_step_back_brings_back_goes_on_to_where_a_later_one_wants_it() {
+    let mut all = vec![
+        configuration("make", "", "create A; create B", ""),
+        configuration("drop", "", "destroy A; create C", ""),
+        configuration("calm", "", "set B.k 1", ""),
+        configuration("low", "", "", "A:stopped"),
+    ];
+    all[2].safe = true;
+    all[3].safe = true;
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let before = rig.see();
+    rig.platform.set_delays(slow("create", 0.5));
+    rig.submit("drop");
+    rig.wait(0.2);
+    rig.submit("calm");
+    // `C` is there and gone again, and `A` on its way back.
+    rig.wait(0.5);
+    assert_eq!(rig.see().components.len(), 1);
+    rig.submit("low");
+    rig.wait(50.0);
+    rig.platform.set_delays(Delays::default());
+    assert_eq!(rig.events()[1..], ["calm.ok", "low.ok", "drop.failed"]);
+    assert_eq!(rig.see().components[&name("A")].state, RunState::Stopped);
+    assert_eq!(rig.ask("low.undo calm.undo"), ["low.undone", "calm.undone"]);
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+}
+
+#[test]
+fn leaving_a_state_whose_frame_is_gone_does_not_undo_that_of_the_next_visit() {
+    let rig = wanted_higher();
+    let by_state = |id: u64, ask: Ask| Request {
+        scope: Some(Scope(7)),
+        ..Request::new(RequestId(id), ask, coordinator(COORDINATOR))
+    };
+    let hold = |at: u64| by_state(at, Ask::Apply(id("hold_up")));
+    rig.handle.submit(Batch::one(hold(1001))).unwrap();
+    rig.wait(1.0);
+    assert_eq!(rig.ask("hold_up.undo"), ["hold_up.undone"]);
+    // The state is left and entered again in one step: what is safe goes first.
+    let leave = by_state(1002, Ask::UndoOf(id("hold_up")));
+    rig.handle.submit([leave, hold(1003)].into_iter().collect()).unwrap();
+    rig.wait(1.0);
+    assert_eq!(rig.events()[1..], ["hold_up.ok", "hold_up.undone", "hold_up.ok", "hold_up.undone"]);
+    assert_eq!(rig.frames(), ["make", "hold_up"]);
+    assert_eq!(rig.see().components[&name("A")].state, RunState::Running);
+    rig.in_step();
+}
+
+#[test]
+fn an_undo_that_is_refused_and_interrupted_is_not_about_the_next_visit() {
+    let mut all = vec![
+        configuration("make", "", "create A", "A:running"),
+        configuration("gain", "", "set A.k 7", ""),
+        configuration("more", "", "create B", ""),
+        configuration("low", "", "", "A:stopped"),
+    ];
+    all[3].safe = true;
+    let rig = Rig::new(all);
+    let of = |number: u64, ask: Ask| Request::new(RequestId(number), ask, coordinator(COORDINATOR));
+    let by_state = |number: u64, ask: Ask| Request { scope: Some(Scope(7)), ..of(number, ask) };
+    assert_eq!((rig.ask("make"), rig.ask("gain")), (vec!["make.ok".to_owned()], vec!["gain.ok".to_owned()]));
+    rig.handle.submit(Batch::one(by_state(1001, Ask::Apply(id("low"))))).unwrap();
+    rig.wait(1.0);
+    assert_eq!(rig.ask("low"), ["low.ok"], "it stands in the way of leaving the state");
+    rig.platform.set_delays(slow("create", 0.5));
+    let (gain, more) = (of(1002, Ask::UndoOf(id("gain"))), of(1004, Ask::Apply(id("more"))));
+    rig.handle.submit([gain, by_state(1003, Ask::UndoOf(id("low"))), more].into_iter().collect()).unwrap();
+    rig.wait(0.2);
+    // The state is entered again while that is under way.
+    rig.handle.submit(Batch::one(by_state(1005, Ask::Apply(id("low"))))).unwrap();
+    rig.wait(5.0);
+    assert_eq!(rig.events()[4..], ["low.ok", "gain.undo.failed", "low.undo.failed", "more.failed"]);
+    assert_eq!(rig.frames(), ["make", "gain", "low", "low", "low"]);
+    rig.handle.submit(Batch::one(by_state(1006, Ask::UndoOf(id("low"))))).unwrap();
+    rig.wait(5.0);
+    assert_eq!(rig.frames(), ["make", "gain", "low", "low"], "that of the second visit goes with it");
+    rig.in_step();
 }

@@ -265,3 +265,24 @@ fn the_progress_tells_what_happened_and_how_long_it_took() {
     });
     assert!(answered);
 }
+
+#[test]
+fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
+    let armed = Arc::new(AtomicBool::new(false));
+    let arm = armed.clone();
+    let mut all = scenario();
+    all.push(configuration("fresh", "", "create D", ""));
+    let rig = Rig::with(all, Options::default(), move |inner| Arc::new(Treacherous { inner, armed }));
+    for word in ["make", "wire"] {
+        assert_eq!(rig.ask(word), [format!("{word}.ok")]);
+    }
+    // When the second frame is popped.
+    arm.store(true, Ordering::SeqCst);
+    let deadline = rig.clock.now() + Duration::from_secs(30);
+    let told = rig.handle.unwind(deadline).recv_deadline(deadline);
+    assert!(told.is_err(), "nobody is left to tell it: {told:?}");
+    assert_eq!(rig.ask("fresh"), ["fresh.ok"]);
+    assert!(rig.see().components.contains_key(&name("D")));
+    rig.in_step();
+    rig.each_answered_once();
+}
