@@ -230,13 +230,14 @@ fn imports_follow_the_table() {
 }
 
 /// Which file of a room needs which other one, by what they name after `super::`. What its `mod.rs` hands on is the file's
-/// that has it; what it has itself makes a circle with whoever needs that.
-fn needs(room: &str) -> BTreeMap<String, BTreeSet<String>> {
+/// that has it; what it has itself makes a circle with whoever needs that, unless it `has` the room's one type.
+fn needs(room: &str, has: bool) -> BTreeMap<String, BTreeSet<String>> {
     let prefix = format!("src/{room}/");
     let files: Vec<(String, String)> = (sources("src").into_iter())
         .filter_map(|(file, text)| Some((file.strip_prefix(&prefix)?.strip_suffix(".rs")?.to_owned(), text)))
         .filter(|(file, _)| !file.contains('/'))
         .collect();
+    let is_left_out = |file: &str| has && file == "mod";
     let names: BTreeSet<&String> = files.iter().map(|(file, _)| file).collect();
     let contents = files.iter().find(|(file, _)| file == "mod").map(|(_, text)| code_lines(text).join("\n"));
     let contents = contents.expect("a room has a table of contents");
@@ -264,13 +265,19 @@ fn needs(room: &str) -> BTreeMap<String, BTreeSet<String>> {
             needs.collect()
         }
     };
-    files.iter().map(|(file, text)| (file.clone(), of(file, text))).collect()
+    let mut needs: BTreeMap<String, BTreeSet<String>> = files
+        .iter()
+        .filter(|(file, _)| !is_left_out(file))
+        .map(|(file, text)| (file.clone(), of(file, text)))
+        .collect();
+    needs.values_mut().for_each(|needs| needs.retain(|name| !is_left_out(name)));
+    needs
 }
 
 #[test]
 fn no_files_go_round_in_a_circle() {
-    for room in ["check", "configurator", "stack", "transaction"] {
-        let mut needs = needs(room);
+    for (room, has) in [("check", false), ("configurator", false), ("stack", true), ("transaction", true)] {
+        let mut needs = needs(room, has);
         assert!(
             needs.len() > 4 && needs.values().any(|needs| !needs.is_empty()),
             "`{room}` was not understood: {needs:?}"

@@ -2,8 +2,9 @@
 //! before the failure is finished.
 
 use super::Transaction;
-use super::heed::{Heed, Touched};
+use super::heed::Heed;
 use super::run::Run;
+use super::touched::Touched;
 use crate::model::{Cause, OnFailure, Origin, RunState, Step};
 use crate::plan::{PlannedStep, Stage, StepId};
 use crate::stack::Reason;

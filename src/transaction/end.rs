@@ -1,12 +1,15 @@
 //! How a transaction ends: what was done is compared with what is there, and what is left is named.
 
+use super::back::{WayBack, chain};
 use super::heed::Heed;
+use super::run::Run;
 use super::{Can, Phase, Transaction};
 use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
 use crate::system::{System, Undo, View as _, diff, moves_any, step, touch};
+use crate::time::Time;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
@@ -206,6 +209,14 @@ impl Transaction {
             }
         }
         self.judge(part, &wanted, whole, observed, live, can);
+    }
+
+    /// Mends the difference between what is there and what should be.
+    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
+        self.target = Some(Box::new(target));
+        let list = chain(steps);
+        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
+        self.phase = Phase::Mending;
     }
 
     /// Notes what may have happened and can still be taken back: not what was called of a component that is gone.

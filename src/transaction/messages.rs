@@ -1,6 +1,6 @@
 //! What goes into a transaction and comes out of it.
 
-use super::Touched;
+use super::touched::Touched;
 use crate::model::{ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
 use crate::time::Time;
 use smallvec::SmallVec;

@@ -6,7 +6,7 @@
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
 //! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
-//! was applied stands. `back`: the way back; `heed`: what it leaves to safe
+//! was applied stands. `back`: the way back; `touched`, `heed`: what it leaves to safe
 //! configurations; `bring`: where it goes on for them. `end`: what comes of each part; `endings`: what may. `messages`: what goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
@@ -22,18 +22,19 @@ mod order;
 mod run;
 mod settle;
 mod stand;
+mod touched;
 
 pub use end::{BrokenPart, End, PartEnd};
 pub use endings::{Stopping, can_fail, endings};
-pub use heed::Touched;
 pub use messages::{Can, Input, Poll, Question, Spec};
+pub use touched::Touched;
 
 use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
 use crate::time::Time;
-use back::{WayBack, chain};
+use back::WayBack;
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -491,13 +492,5 @@ impl Transaction {
         own.sort_unstable();
         own.dedup();
         own
-    }
-
-    /// Mends the difference between what is there and what should be.
-    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
-        self.target = Some(Box::new(target));
-        let list = chain(steps);
-        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
-        self.phase = Phase::Mending;
     }
 }

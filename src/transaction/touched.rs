@@ -1,0 +1,106 @@
+//! What safe configurations touched.
+
+use crate::model::{ComponentName, MemberRef, RunState, Step, Value, Wanted};
+use crate::system::touch::{Slot, components};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// What safe configurations touched: the way back of what they interrupted leaves that alone.
+#[derive(Debug, Clone, Default)]
+pub struct Touched {
+    pub(super) slots: FxHashSet<Slot>,
+    /// At which revision of the model what touches a slot was planned last.
+    pub(super) planned: FxHashMap<Slot, u64>,
+    /// At which revision of the model a step of theirs was done last.
+    pub(super) done: FxHashMap<Slot, u64>,
+    pub(super) properties: FxHashMap<MemberRef, Value>,
+    pub(super) ports: FxHashMap<MemberRef, Option<Value>>,
+    pub(super) states: FxHashMap<ComponentName, RunState>,
+}
+
+/// What a step is about, where each thing is one: what it writes, makes, takes away, links or calls.
+pub(super) fn slot(step: &Step) -> Slot {
+    match step {
+        Step::State { component, .. } => Slot::State(*component),
+        Step::Create { component, .. } | Step::Destroy { component } => Slot::Component(*component),
+        Step::Connect { from, to, .. } | Step::Disconnect { from, to } => Slot::Link(*from, *to),
+        Step::PropertySet { property, .. } => Slot::Property(*property),
+        Step::PortWrite { port, .. } => Slot::Port(*port),
+        Step::Operation(call) => Slot::Operation(call.operation),
+    }
+}
+
+impl Touched {
+    /// `step` is one of theirs, or what it leads to was demanded. Of several the last tells what is wanted.
+    pub fn add(&mut self, step: &Step) {
+        self.slots.insert(slot(step));
+        match step {
+            Step::State { component, transition } => {
+                self.states.insert(*component, transition.target());
+            }
+            Step::PropertySet { property, value } => {
+                self.properties.insert(*property, value.clone());
+            }
+            Step::PortWrite { port, value } => {
+                self.ports.insert(*port, value.clone());
+            }
+            _ => {}
+        }
+    }
+
+    /// The run state of `component` was demanded.
+    pub fn add_state(&mut self, component: ComponentName, wanted: Wanted) {
+        self.slots.insert(Slot::State(component));
+        self.states.insert(component, wanted.into());
+    }
+
+    /// It was all planned on the model of this revision.
+    pub fn planned_at(&mut self, revision: u64) {
+        self.planned = self.slots.iter().map(|slot| (*slot, revision)).collect();
+    }
+
+    /// `step` was done; the model has been at `revision` since.
+    pub fn did(&mut self, step: &Step, revision: u64) {
+        let last = self.done.entry(slot(step)).or_default();
+        *last = revision.max(*last);
+    }
+
+    /// Takes `other` in, which came later.
+    pub fn join(&mut self, other: Self) {
+        self.slots.extend(other.slots);
+        for (mine, theirs) in [(&mut self.done, other.done), (&mut self.planned, other.planned)] {
+            for (slot, revision) in theirs {
+                let last = mine.entry(slot).or_default();
+                *last = revision.max(*last);
+            }
+        }
+        self.properties.extend(other.properties);
+        self.ports.extend(other.ports);
+        self.states.extend(other.states);
+    }
+
+    /// The run state that is wanted of `component`, if one is.
+    pub fn wants(&self, component: ComponentName) -> Option<RunState> {
+        self.states.get(&component).copied()
+    }
+
+    /// Whether nothing was.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Whether `step` would change something touched.
+    pub fn has(&self, step: &Step) -> bool {
+        let gone = |component: &ComponentName| self.slots.contains(&Slot::Component(*component));
+        self.slots.contains(&slot(step)) || components(step).iter().any(gone)
+    }
+
+    /// Whether what touches the same was planned when `step` had come in at that revision: then it is not late.
+    pub fn knew(&self, step: &Step, revision: u64) -> bool {
+        self.planned.get(&slot(step)).is_some_and(|planned| *planned > revision)
+    }
+
+    /// Whether `step`, which came in late and made the model `revision`, was overwritten by a step of theirs after that.
+    pub fn overwrote(&self, step: &Step, revision: u64) -> bool {
+        self.done.get(&slot(step)).is_some_and(|done| *done > revision)
+    }
+}
