@@ -282,7 +282,7 @@ impl Product<'_> {
         if !state.safe.is_empty() {
             return;
         }
-        while let Some(turn) = state.desk.turn(&self.worlds.claims) {
+        while let Some(turn) = state.desk.turn(&self.worlds.claims).cloned() {
             let first = turn.batch.requests[0];
             if first.why != Why::Down {
                 for request in &turn.batch.requests {

@@ -194,9 +194,9 @@ impl Engine {
             }
             let mut did = self.serve_safe();
             if !self.running.iter().any(Running::is_safe) {
-                while let Some(turn) = self.desk.turn(&self.claims) {
+                while let Some(number) = self.desk.turn(&self.claims).map(|turn| turn.number) {
                     did = true;
-                    self.begin(turn);
+                    self.begin(number);
                     if self.urgent() {
                         break;
                     }

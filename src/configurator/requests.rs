@@ -8,7 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Rules, Stopped, Turn, Why, settle, take_up,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Rules, Stopped, Why, settle, take_up,
 };
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
@@ -17,21 +17,23 @@ use std::sync::Arc;
 
 impl Engine {
     /// A batch begins.
-    pub(super) fn begin(&mut self, turn: Turn) {
-        for request in &turn.batch.requests {
+    pub(super) fn begin(&mut self, number: u32) {
+        let Some(turn) = self.desk.turn_of(number) else { return };
+        let requests: SmallVec<[Request; 2]> = SmallVec::from_slice(&turn.batch.requests);
+        for request in &requests {
             self.owe(*request);
         }
         if !self.suspects.is_empty() {
             self.settle_suspects();
         }
-        if let [request] = turn.batch.requests[..]
+        if let [request] = requests[..]
             && self.running.is_empty()
             && request.why == Why::Asked
-            && self.handle_fast(turn.number, request) != Fared::Not
+            && self.handle_fast(number, request) != Fared::Not
         {
             return;
         }
-        self.take_up(turn.number);
+        self.take_up(number);
     }
 
     /// The rest of a batch under way is taken up.

@@ -19,7 +19,7 @@ pub struct Turn {
     /// Its requests that are not answered yet, arranged.
     pub batch: Batch,
     /// Undos that have given up requests of it, in the order in which they came.
-    pub given_up: SmallVec<[GivenUp; 1]>,
+    pub given_up: Vec<GivenUp>,
 }
 
 /// An undo that has given up a request of a batch under way.
@@ -157,7 +157,7 @@ impl Desk {
     }
 
     /// The next batch that may begin; it is under way from now on.
-    pub fn turn(&mut self, claims: &Claims) -> Option<Turn> {
+    pub fn turn(&mut self, claims: &Claims) -> Option<&Turn> {
         let at = if self.under_way.is_empty() {
             // Whatever else waits came later.
             (!self.waiting.is_empty()).then_some(0)
@@ -166,9 +166,8 @@ impl Desk {
         }?;
         let batch = self.waiting.remove(at)?;
         let number = (0..).find(|n| self.under_way.iter().all(|turn| turn.number != *n))?;
-        let turn = Turn { number, batch, given_up: SmallVec::new() };
-        self.under_way.push(turn.clone());
-        Some(turn)
+        self.under_way.push(Turn { number, batch, given_up: Vec::new() });
+        self.under_way.last()
     }
 
     fn free(&self, claims: &Claims) -> Option<usize> {
@@ -229,7 +228,7 @@ impl Desk {
         if place < turn.batch.requests.len() {
             turn.batch.requests.remove(place);
         }
-        turn.given_up.retain(|given_up| {
+        turn.given_up.retain_mut(|given_up| {
             if given_up.place == place {
                 match gave_up(verdict.unwrap_or(Verdict::Cancelled)) {
                     Some(answer) => gone.undone.push((given_up.undo, answer)),

@@ -410,3 +410,37 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
     world.stays(&undo, &[]);
     assert_eq!(world.of_visit(&undo), Some(ids[1]), "what stays of the first is a frame like others");
 }
+
+#[test]
+fn what_has_given_up_a_request_goes_with_its_answer() {
+    let configuration = |id: &str| {
+        let mut configuration = conf(id, None, &[], Vec::new(), &[]);
+        configuration.changes.clear();
+        configuration
+    };
+    let all = [configuration("a"), configuration("b"), configuration("c")];
+    let claims = super::claims::Claims::new(all.iter());
+    let request = |ask| super::Request::new(RequestId(0), ask, Requester::Operator);
+    let (apply, undo) = (|n: usize| request(Ask::Apply(all[n].id)), |n: usize| request(Ask::UndoOf(all[n].id)));
+    let under_way = || {
+        let mut desk = super::Desk::default();
+        let _ = desk.arrive((0..3).map(apply).collect(), |_| false, &claims);
+        let number = desk.turn(&claims).expect("nothing is in its way").number;
+        assert_eq!([1, 2, 1].map(|n| desk.give_up(number, undo(n))), [Some(1), Some(2), Some(1)]);
+        (desk, number)
+    };
+    // Done before they came: they begin next, in the order of what they take back.
+    let (mut desk, number) = under_way();
+    let gone = desk.all_answered(number, (0..3).map(|place| (place, Some(Verdict::Ok))));
+    assert!(gone.iter().all(|gone| gone.undone.is_empty()) && gone[0].over && !gone[2].over);
+    let waiting: Vec<_> = desk.waiting().map(|batch| batch.requests[0].ask).collect();
+    assert_eq!(waiting, [undo(1).ask, undo(1).ask, undo(2).ask]);
+    // One of them was cancelled, and what had given it up is answered with it; the places of the others move up.
+    let (mut desk, number) = under_way();
+    let gone = desk.answered(number, 1, Some(Verdict::Cancelled));
+    assert_eq!(gone.undone[..], [(undo(1), Verdict::Undone), (undo(1), Verdict::Undone)]);
+    assert_eq!(desk.turn_of(number).unwrap().given_up[0].place, 1);
+    let gone = desk.answered(number, 1, Some(Verdict::Broken));
+    assert_eq!((gone.undone[..].to_vec(), gone.over), (vec![(undo(2), Verdict::UndoBroken)], false));
+    assert!(desk.answered(number, 0, Some(Verdict::Ok)).over && desk.is_empty());
+}
