@@ -10,7 +10,7 @@ use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Broken, Edits, FrameId, HandOver, Inverse, Op, Residual, transaction};
+use crate::stack::{Broken, Edits, FrameId, HandOver, Inverse, Op, Residual, keeps_still, transaction};
 use crate::system::{self, System, View as _, step};
 use crate::transaction::{PartEnd, Spec, Transaction};
 use std::sync::Arc;
@@ -118,8 +118,10 @@ impl Engine {
     /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone.
     fn recover_back(&mut self) -> Result<(), Arc<Residual>> {
         let some = !self.world.broken.is_empty() || self.world.stack.frames().iter().any(|frame| frame.partial);
+        // An operator asks for it, without force.
+        let still = self.world.stack.safe().next().is_some();
         while !self.world.broken.is_empty() {
-            self.repair(self.world.broken.len() - 1, true)?;
+            self.repair(self.world.broken.len() - 1, !still)?;
         }
         while let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() {
             // A person has decided that what cannot be undone may stay.
@@ -128,6 +130,9 @@ impl Engine {
             }
             let planned = transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.context)
                 .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
+            if let Some(moving) = planned.steps.iter().find(|planned| still && planned.moves) {
+                return Err(Arc::new(Residual::of(Reason::Moves(moving.step.clone()))));
+            }
             let edits = planned.parts[0].edits.clone();
             let spec = self.spec(&planned, true);
             match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
@@ -156,7 +161,7 @@ impl Engine {
 
     /// Mends what a request is about to undo. False: it was answered, since that does not go.
     pub(super) fn repair_for(&mut self, request: &Request, at: usize) -> bool {
-        match self.repair(at, true) {
+        match self.repair(at, !keeps_still(&self.world, request)) {
             Ok(()) => true,
             Err(residual) => {
                 self.answer(*request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
@@ -172,6 +177,7 @@ impl Engine {
         let mut wanted = self.world.system.clone();
         let _ = wanted.adopt(&components, &broken.expected);
         let mut observed = self.read(&components);
+        let mut withheld = None;
         if observed {
             self.note_quarantine();
             let steps = system::diff(&self.world.system, &wanted);
@@ -179,6 +185,9 @@ impl Engine {
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
             let moves = system::diff::moves_any(&steps, &self.world.system);
+            if moves && !asked && self.world.stack.safe().next().is_some() {
+                withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
+            }
             if !steps.is_empty() && (asked || !moves) {
                 let list = in_order(&self.world.system, steps).unwrap_or_default();
                 let plan = own_plan(list, &self.world.system);
@@ -210,6 +219,7 @@ impl Engine {
             faulted,
             quarantined: self.world.quarantined.clone(),
             observed,
+            withheld: withheld.or_else(|| broken.residual.withheld.clone()),
             ..(*broken.residual).clone()
         });
         self.world.broken.insert(at.min(self.world.broken.len()), Broken { residual: residual.clone(), ..broken });

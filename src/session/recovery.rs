@@ -159,7 +159,7 @@ impl Session {
         Some(Recovered {
             recovered: residual.is_none(),
             was_broken,
-            why: residual.as_ref().map(|residual| residual.cause.to_string()),
+            why: residual.as_ref().map(|residual| residual.why()),
             residual: residual.map(|residual| Difference::of_residual(&residual)).unwrap_or_default(),
         })
     }

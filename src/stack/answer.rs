@@ -291,7 +291,17 @@ impl fmt::Display for Reason {
     }
 }
 
+fn unasked(step: &Step) -> String {
+    format!("not done unasked, since it moves: `{step}`")
+}
+
 impl Residual {
+    /// What it began with, and what keeps it from going back.
+    pub fn why(&self) -> String {
+        let withheld = self.withheld.as_ref().map(|step| format!("; {}", unasked(step)));
+        format!("{}{}", self.cause, withheld.unwrap_or_default())
+    }
+
     fn finding(&self, code: crate::model::Code) -> Finding {
         Finding::error(code, self.to_string()).help(WAY_OUT)
     }
@@ -304,7 +314,7 @@ impl fmt::Display for Residual {
             write!(f, "; done and not taken back: {}", list(&self.left))?;
         }
         if let Some(step) = &self.withheld {
-            write!(f, "; not done unasked, since it moves: `{step}`")?;
+            write!(f, "; {}", unasked(step))?;
         }
         if !self.difference.is_empty() {
             let seen = if self.observed { "what differs" } else { "what differs, as far as is known" };

@@ -307,6 +307,13 @@ fn foreign(frames: &[std::sync::Arc<super::Frame>], request: &Request) -> Option
     if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
 }
 
+/// Whether nothing may move for a request, since a safe configuration is in force: only what a coordinator asks for in a
+/// later step may, or what is forced.
+pub fn keeps_still(world: &World, request: &Request) -> bool {
+    let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
+    request.still || foreign && !request.force && world.stack.safe().next().is_some()
+}
+
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would
 /// move that nobody may move.
 fn forbidden(
@@ -328,14 +335,9 @@ fn forbidden(
         let may = of.is_some_and(|configuration| configuration.on_failure == OnFailure::Rollback);
         matches!(request.why, Why::Unconfirmed(..)) && !may
     };
-    let safe = world.stack.safe().next().is_some();
-    let still = |request: &Request| {
-        request.still
-            || safe && (request.requester == Requester::Operator || request.why != Why::Asked) && !request.force
-    };
     for (part, place) in group.places.iter().enumerate() {
         let unasked = unasked(part, &requests[*place]);
-        if !unasked && !still(&requests[*place]) {
+        if !unasked && !keeps_still(world, &requests[*place]) {
             continue;
         }
         let steps = planned.steps.iter().enumerate();

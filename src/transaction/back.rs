@@ -113,7 +113,9 @@ impl Transaction {
         for (step, undo, revision) in &self.late_back {
             let theirs = self.touched.has(step) && !self.touched.knew(step, *revision);
             if theirs && !self.touched.overwrote(step, *revision) {
-                for back in undo.steps() {
+                // What they want, and nothing else, may move for it.
+                let goes = |back: &&Step| self.touched.wants_step(back) || !step::moves(back, live);
+                for back in undo.steps().iter().filter(goes) {
                     if step::apply(back, &mut view).is_ok() {
                         way.add(back.clone(), 0, SmallVec::new(), None, None);
                         way.restores = true;
@@ -157,7 +159,9 @@ impl Transaction {
                 left_out |= goes.is_empty();
                 let last = goes.len().saturating_sub(1);
                 for (at, back) in goes.into_iter().enumerate() {
-                    if (late.is_none() || at < last) && !self.may_move(i) && step::moves(&back, &view) {
+                    // What came in late goes back where safe configurations want that; nothing else of it moves either.
+                    let wanted = late.is_some() && at == last && self.touched.wants_step(&back);
+                    if !wanted && !self.may_move(i) && step::moves(&back, &view) {
                         way.withheld = Some(back);
                         return way;
                     }

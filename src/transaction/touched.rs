@@ -83,6 +83,14 @@ impl Touched {
         self.states.get(&component).copied()
     }
 
+    /// Whether `step` brings about what is wanted: a run state that was demanded, or what one of theirs writes, calls or makes.
+    pub fn wants_step(&self, step: &Step) -> bool {
+        match step {
+            Step::State { component, transition } => self.wants(*component) == Some(transition.target()),
+            other => self.has(other),
+        }
+    }
+
     /// Whether nothing was.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()

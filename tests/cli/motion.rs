@@ -14,6 +14,8 @@ types:
       dn: { effect: { undo: up }, moves: true }
       open: { effect: { undo: close } }
       close: { effect: { undo: open } }
+  M:
+    moves: [start, stop]
 configurations: [conf.lua]
 coordinator: coordinator.lua
 deploy:   { event: e_start, up: up, within_s: 5 }
@@ -27,6 +29,12 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   lift  = Configuration { operation_call("a.up") },
   open  = Configuration { operation_call("a.open") },
   tried = Configuration { confirm = { event = "e_conf", within = 1.0 }, operation_call("a.up") },
+  build = Configuration { create("c", "M"), post_conf_state = { "c:stopped" } },
+  go    = Configuration { post_conf_state = { "c:running" } },
+  halt  = Configuration { post_conf_state = { "c:stopped" } },
+  both  = Configuration { operation_call("a.up"), operation_call("b.open") },
+  safe  = Configuration { safe = true, property_set("b.k", 9) },
+  rest  = Configuration { safe = true, post_conf_state = { "c:stopped" } },
   meant = Configuration { confirm = { event = "e_conf", within = 1.0 }, on_failure = "rollback", operation_call("a.up") },
 }
 "#;
@@ -124,4 +132,46 @@ fn drift_tells_of_what_is_unknown_and_of_who_has_not_come_back() {
         do {quarantined} assert(f and f.how == 'quarantined') end
         wait(10) assert(#drift() == 0)"
     ));
+}
+
+/// Interrupted by a safe configuration nothing goes back that moves, also where it came in only after that.
+#[test]
+fn what_moves_and_was_under_way_when_a_safe_configuration_came_stays() {
+    let log = run("fault('operation_call a.up', 'slow', 1, 0.8) apply('lift', {force = true}) wait(0.4)
+        apply('safe') wait_answer('safe.ok', 0.1) wait_answer('lift.broken', 5)
+        local f = stack()[2] assert(f.configuration == 'lift' and f.partial)
+        undo('safe') wait_answer('safe.undone', 1) undo('lift') wait_answer('lift.undone', 1) assert(#stack() == 1)");
+    assert_eq!(steps(&log, "lift.broken"), ["operation_call a.up"]);
+    assert_eq!(steps(&log, "lift.undone"), ["operation_call a.dn"]);
+    // What was being stopped is not started again.
+    let log = run("apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)
+        fault('stop c', 'slow', 1, 0.8) apply('halt', {force = true}) wait(0.4)
+        apply('safe') wait_answer('safe.ok', 0.1) wait_answer('halt.broken', 5) assert(state('c') == 'stopped')");
+    assert_eq!(steps(&log, "halt.broken"), ["stop c"]);
+}
+
+/// What came in late goes back where the safe configuration wants that.
+#[test]
+fn what_starts_late_is_stopped_where_a_safe_configuration_wants_it_stopped() {
+    let log = run("apply('build', {force = true}) wait_answer('build.ok', 1)
+        fault('start c', 'slow', 1, 0.8) apply('go', {force = true}) wait(0.4)
+        apply('rest') wait_answer('rest.ok', 0.1) wait_answer('go.failed', 5) assert(state('c') == 'stopped')");
+    assert_eq!(steps(&log, "go.failed"), ["start c", "undo: stop c"]);
+}
+
+/// While a safe configuration is in force, who recovers moves nothing.
+#[test]
+fn recovering_moves_nothing_while_a_safe_configuration_is_in_force() {
+    run("apply('build', {force = true}) wait_answer('build.ok', 1)
+        fault('start c', 'lie') apply('go', {force = true}) wait_answer('go.ok', 1) wait(8)
+        apply('safe') wait_answer('safe.ok', 1)
+        local ok, why = pcall(recover, 'back')
+        assert(not ok and tostring(why):find('start c', 1, true), tostring(why)) assert(state('c') == 'stopped')
+        undo('safe') wait_answer('safe.undone', 1) recover('back') assert(state('c') == 'running')");
+    let log = run("fault('operation_call b.open', 'slow', 1, 0.8) apply('both', {force = true}) wait(0.4)
+        apply('safe') wait_answer('safe.ok', 0.1) wait_answer('both.broken', 5)
+        local ok, why = pcall(recover, 'back')
+        assert(not ok and tostring(why):find('a.dn', 1, true), tostring(why))
+        undo('safe') wait_answer('safe.undone', 1) recover('back') assert(#stack() == 1)");
+    assert!(!steps(&log, "both.broken").contains(&"operation_call a.dn".to_owned()), "{log}");
 }
