@@ -90,6 +90,18 @@ impl Transaction {
         self.phase = Phase::Over;
     }
 
+    /// The components it is about: also those of what takes its steps back, which may be a call of another, and of what was
+    /// left out of the net and may have to be finished.
+    pub(super) fn own(&self) -> Vec<ComponentName> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let all = forward.list.iter().chain(&self.planned.whole);
+        let steps = all.flat_map(|planned| std::iter::once(&planned.step).chain(planned.undo.steps()));
+        let mut own: Vec<ComponentName> = steps.flat_map(touch::components).collect();
+        own.sort_unstable();
+        own.dedup();
+        own
+    }
+
     fn hung(&self, can: &Can<'_>) -> Vec<ComponentName> {
         let own = self.own();
         can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()

@@ -483,16 +483,6 @@ impl Transaction {
         failures.map(|i| self.part_of(i)).chain(self.fallen).chain(self.given_up.iter().copied()).min().unwrap_or(0)
     }
 
-    /// The components it is about.
-    fn own(&self) -> Vec<ComponentName> {
-        let forward = self.forward.as_ref().expect("it was carried out");
-        let mut own: Vec<ComponentName> =
-            forward.list.iter().flat_map(|planned| crate::system::touch::components(&planned.step)).collect();
-        own.sort_unstable();
-        own.dedup();
-        own
-    }
-
     /// Mends the difference between what is there and what should be.
     fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.target = Some(Box::new(target));
