@@ -272,7 +272,8 @@ impl Transaction {
                 if matches!(self.phase, Phase::Forward | Phase::Standing) {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
                     self.given_up.push(part);
-                    self.asked_back = true;
+                    // What a safe configuration has interrupted moves for no undo of the same request.
+                    self.asked_back |= !self.interrupted;
                     self.cancel();
                 }
             }
@@ -350,6 +351,11 @@ impl Transaction {
                 Phase::Stopping => {
                     let run = self.in_hand();
                     if self.held || run.out > 0 {
+                        return Poll::Wait;
+                    }
+                    // What was being looked at when a safe configuration came is no news after the way back from there.
+                    if std::mem::take(&mut self.reading) && self.seen.take().is_none() {
+                        self.reading = true;
                         return Poll::Wait;
                     }
                     self.turn_back(live);
