@@ -369,10 +369,10 @@ impl Transaction {
         }
     }
 
-    /// The steps from one system to the other that are about its own components.
+    /// The steps from one system to the other that are about its own components: what others have done meanwhile is theirs.
     pub(super) fn own_difference(&self, from: &System, to: &System) -> Vec<Step> {
         let own = self.own();
-        let about = |step: &Step| components(step).iter().all(|component| own.contains(component));
+        let about = |step: &Step| components(step).iter().any(|component| own.contains(component));
         diff(from, to).into_iter().filter(about).collect()
     }
 
@@ -432,7 +432,7 @@ impl Transaction {
                 add(way, planned.step.clone(), Some(*place));
             }
         }
-        for step in diff(&view, between) {
+        for step in self.own_difference(&view, between) {
             add(way, step, None);
         }
     }

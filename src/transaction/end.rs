@@ -8,7 +8,7 @@ use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
-use crate::system::{System, Undo, View as _, diff, moves_any, step, touch};
+use crate::system::{System, Undo, View as _, moves_any, step, touch};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -93,6 +93,18 @@ impl Transaction {
         self.phase = Phase::Over;
     }
 
+    /// The components it is about: also those of what takes its steps back, which may be a call of another, and of what was
+    /// left out of the net and may have to be finished.
+    pub(super) fn own(&self) -> Vec<ComponentName> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let all = forward.list.iter().chain(&self.planned.whole);
+        let steps = all.flat_map(|planned| std::iter::once(&planned.step).chain(planned.undo.steps()));
+        let mut own: Vec<ComponentName> = steps.flat_map(touch::components).collect();
+        own.sort_unstable();
+        own.dedup();
+        own
+    }
+
     fn hung(&self, can: &Can<'_>) -> Vec<ComponentName> {
         let own = self.own();
         can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()
@@ -157,10 +169,14 @@ impl Transaction {
         let whole = self.mends(part) && self.perhaps.is_empty() && remaining.iter().all(plain);
         let origin = self.origin.as_ref().filter(|_| self.interrupted);
         match (&self.between, origin, whole) {
-            (Some(between), _, true) => wanted = between.as_ref().clone(),
+            (Some(between), _, true) => {
+                for step in self.own_difference(&wanted, between) {
+                    let _ = step::apply(&step, &mut wanted);
+                }
+            }
             // What safe configurations touched is theirs.
             (None, Some(origin), true) => {
-                for step in self.own_difference(live, origin).iter().filter(|step| !self.touched.has(step)) {
+                for step in self.own_difference(&wanted, origin).iter().filter(|step| !self.touched.has(step)) {
                     let _ = step::apply(step, &mut wanted);
                 }
             }
@@ -199,7 +215,7 @@ impl Transaction {
         if observed && self.phase == Phase::Looking && self.mends(part) {
             let asked =
                 self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
-            let steps = diff(live, &wanted);
+            let steps = self.own_difference(live, &wanted);
             let steps: Vec<Step> = steps
                 .into_iter()
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
@@ -243,7 +259,7 @@ impl Transaction {
         let open = forward.unsettled.iter().filter(|i| !self.taken_back.contains(i));
         let mut unsettled: Vec<Step> = open.map(|i| forward.list[*i as usize].step.clone()).collect();
         unsettled.append(&mut self.unsettled);
-        let difference = diff(wanted, live);
+        let difference = self.own_difference(wanted, live);
         let mut faulted: Vec<ComponentName> = Vec::new();
         let own = self.own();
         for node in own.iter().filter_map(|name| live.component(*name)) {
@@ -343,7 +359,8 @@ impl Transaction {
         // What is left of the failed part itself is told with that.
         let mut stands = live.clone();
         self.take_back(&self.remaining(part), part, &mut stands);
-        let differs: FxHashSet<ComponentName> = diff(&stands, between).iter().flat_map(touch::components).collect();
+        let differs: FxHashSet<ComponentName> =
+            self.own_difference(&stands, between).iter().flat_map(touch::components).collect();
         let differs =
             before().filter(|(_, planned)| touch::components(&planned.step).iter().any(|c| differs.contains(c)));
         missing.extend(differs.map(|(place, _)| self.planned.part_of(Some(place))));

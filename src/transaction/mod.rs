@@ -273,7 +273,8 @@ impl Transaction {
                 if matches!(self.phase, Phase::Forward | Phase::Standing) {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
                     self.given_up.push(part);
-                    self.asked_back = true;
+                    // What a safe configuration has interrupted moves for no undo of the same request.
+                    self.asked_back |= !self.interrupted;
                     self.cancel();
                 }
             }
@@ -351,6 +352,11 @@ impl Transaction {
                 Phase::Stopping => {
                     let run = self.in_hand();
                     if self.held || run.out > 0 {
+                        return Poll::Wait;
+                    }
+                    // What was being looked at when a safe configuration came is no news after the way back from there.
+                    if std::mem::take(&mut self.reading) && self.seen.take().is_none() {
+                        self.reading = true;
                         return Poll::Wait;
                     }
                     self.turn_back(live);
@@ -482,15 +488,5 @@ impl Transaction {
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());
         // One that was given up is not to blame for one before it that failed.
         failures.map(|i| self.part_of(i)).chain(self.fallen).chain(self.given_up.iter().copied()).min().unwrap_or(0)
-    }
-
-    /// The components it is about.
-    fn own(&self) -> Vec<ComponentName> {
-        let forward = self.forward.as_ref().expect("it was carried out");
-        let mut own: Vec<ComponentName> =
-            forward.list.iter().flat_map(|planned| crate::system::touch::components(&planned.step)).collect();
-        own.sort_unstable();
-        own.dedup();
-        own
     }
 }

@@ -73,6 +73,43 @@ fn what_nobody_can_settle_is_broken_and_says_so() {
     assert_eq!(rig.ask("eight"), ["eight.ok"]);
 }
 
+/// `engage`: a call of A that a call of B takes back, and a property of C.
+fn engage() -> Configuration {
+    let call = |operation: &str| Call { operation: member(operation), args: vec![] };
+    let mut engage = configuration("engage", "", "set C.k 2", "");
+    let kind = ChangeKind::OperationCall { call: call("A.open"), undo: Some(call("B.close")) };
+    engage.changes.push(Change { kind, origin: Origin::NONE });
+    engage
+}
+
+#[test]
+fn a_component_that_only_takes_something_back_is_there_after_its_call_has_hung() {
+    let rig = up_with(vec![engage()]);
+    let before = rig.see();
+    let hang = Fault::Hang { returns: Some(Duration::from_secs(5)) };
+    rig.platform.set_faults(Faults::new([
+        FaultRule::on("property_set C.k", Fault::Fail).times(1),
+        FaultRule::on("operation_call B.close", hang).times(1),
+    ]));
+    rig.submit("engage");
+    rig.wait(3.0);
+    assert_eq!(rig.events()[3..], ["engage.broken"]);
+    let residual = rig.view().broken.clone().expect("nobody knows of the call");
+    assert_eq!(residual.unsettled.len(), 1, "{residual}");
+    assert_eq!(residual.quarantined, [name("B")], "{residual}");
+    // When it returns, nothing of B is taken for too much.
+    rig.wait(10.0);
+    assert!(rig.view().quarantined.is_empty(), "it came back");
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+    let deadline = rig.clock.now() + Duration::from_secs(20);
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.see(), before);
+    assert_eq!(rig.frames(), ["make", "wire", "run"]);
+    assert_eq!(rig.ask("engage"), ["engage.ok"]);
+    rig.each_answered_once();
+}
+
 #[test]
 fn a_platform_that_cannot_be_read_leaves_it_broken_and_unobserved() {
     let rig = up_with(vec![]);

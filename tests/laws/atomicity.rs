@@ -4,13 +4,18 @@
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
-use davit::model::{Cause, Execution, Outcome, Step};
+use davit::model::{
+    Catalogue, Cause, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Execution, Origin,
+    Outcome, Step, TypeName,
+};
 use davit::plan::PlannedStep;
 use davit::stack::{Op, Planned, Stack, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use davit::transaction::{Can, Input, PartEnd, Poll, Spec, Touched, Transaction};
 use proptest::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A machine, the model it works on, and a platform that does what it is told but for the steps it fails.
@@ -24,8 +29,10 @@ pub struct Bench {
     pub moved_back: Vec<Step>,
     /// How many steps were taken back.
     pub back: usize,
-    /// What comes in a turn of its own.
-    pub comes: Option<(usize, Input)>,
+    /// What comes in a turn of its own, one right after the other.
+    pub comes: Option<(usize, Vec<Input>)>,
+    /// What another transaction does in a turn.
+    pub beside: Option<(usize, Step)>,
     /// Nobody knows whether the steps that fail were done.
     pub unknown: bool,
     /// Nobody answers who is asked how things are.
@@ -43,6 +50,7 @@ impl Bench {
             moved_back: Vec::new(),
             back: 0,
             comes: None,
+            beside: None,
             unknown: false,
             blind: false,
         }
@@ -67,9 +75,13 @@ impl Bench {
         let blocking = |_: &Step| Execution::Blocking;
         for turn in 0usize.. {
             assert!(turn < 10_000, "it ends");
-            if let Some((_, input)) = self.comes.take_if(|(at, _)| *at == turn) {
-                released = !matches!(input, Input::Interrupt(_));
+            for input in self.comes.take_if(|(at, _)| *at == turn).into_iter().flat_map(|(_, inputs)| inputs) {
+                released &= !matches!(input, Input::Interrupt(_));
                 machine.on(input, &mut self.model);
+            }
+            if let Some((_, step)) = self.beside.take_if(|(at, _)| *at == turn) {
+                step::apply(&step, &mut self.model).expect("what is nobody else's");
+                step::apply(&step, &mut self.platform).expect("what is nobody else's");
             }
             let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[], busy: &[] };
             match machine.poll(&mut self.model, Time::default(), &can) {
@@ -86,7 +98,7 @@ impl Bench {
                 }
                 Poll::Wait => {
                     assert!(!out.is_empty(), "it waits for something");
-                    let at = self.picks[turn % self.picks.len()] as usize % out.len();
+                    let at = self.picks[self.asked % self.picks.len()] as usize % out.len();
                     let number = out.remove(at);
                     self.asked += 1;
                     let fails = self.fails.contains(&self.asked);
@@ -187,4 +199,68 @@ proptest! {
         }
         prop_assert!(system.is_empty());
     }
+}
+
+/// A configuration that creates plain components.
+fn creates(id: &str, components: &[&str]) -> Configuration {
+    let change = |component: &&str| {
+        let (component, ty) = (ComponentName::new(component).unwrap(), TypeName::new("Node").unwrap());
+        let kind = ChangeKind::Create { component, ty, activity: None, properties: BTreeMap::new() };
+        Change { kind, origin: Origin::NONE }
+    };
+    Configuration { changes: components.iter().map(change).collect(), ..Configuration::new(ConfigId::new(id).unwrap()) }
+}
+
+/// A system with a component, and what undoes that and creates two others.
+fn undo_and_push() -> (System, Planned) {
+    let mut catalogue = Catalogue::new();
+    assert!(catalogue.insert(ComponentType::new("Node", "Nothing.")).is_none());
+    let mut system = System::new(Arc::new(catalogue));
+    let mut stack = Stack::new(8);
+    let push = transaction(&system, &stack, &[operator(&creates("first", &["a"]))], &context()).unwrap();
+    push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
+    stack.commit(push);
+    let second = creates("second", &["b", "c"]);
+    let planned = transaction(&system, &stack, &[Op::UndoTop, operator(&second)], &context()).unwrap();
+    (system, planned)
+}
+
+#[test]
+fn what_was_read_before_an_interruption_is_no_news_after_it() {
+    let (system, planned) = undo_and_push();
+    let mut came = 0;
+    for (fail, at) in (1..6).flat_map(|fail| (0..20).map(move |at| (fail, at))) {
+        let mut bench = Bench::new(&system, vec![fail], vec![0]);
+        bench.comes = Some((at, vec![Input::Interrupt(ConfigId::new("halt").unwrap())]));
+        let ends = bench.drive(planned.clone());
+        assert_eq!(bench.model.snapshot(), bench.platform.snapshot(), "failure {fail}, interrupted at {at}: {ends:?}");
+        came += usize::from(bench.comes.is_none());
+    }
+    assert!(came > 20, "{came}");
+}
+
+#[test]
+fn what_another_transaction_does_meanwhile_is_not_taken_back() {
+    let (system, planned) = undo_and_push();
+    let third = creates("third", &["z"]);
+    let push = transaction(&system, &Stack::new(8), &[operator(&third)], &context()).unwrap();
+    let other = &push.steps[0].step;
+    let mut came = 0;
+    for (fails, at) in [vec![2], vec![3], vec![2, 4], vec![3, 5]].iter().flat_map(|f| (0..20).map(move |at| (f, at))) {
+        let mut alone = Bench::new(&system, fails.clone(), vec![0]);
+        let ends = alone.drive(planned.clone());
+        let mut bench = Bench::new(&system, fails.clone(), vec![0]);
+        bench.beside = Some((at, other.clone()));
+        let beside = bench.drive(planned.clone());
+        if bench.beside.is_some() {
+            continue;
+        }
+        came += 1;
+        let endings = |ends: &[PartEnd]| ends.iter().map(PartEnd::ending).collect::<Vec<_>>();
+        assert_eq!(endings(&ends), endings(&beside), "failures {fails:?}, beside at {at}: {beside:?}");
+        let mut there = alone.model;
+        step::apply(other, &mut there).unwrap();
+        assert_eq!(there.snapshot(), bench.model.snapshot(), "failures {fails:?}, beside at {at}: {beside:?}");
+    }
+    assert!(came > 20, "{came}");
 }

@@ -48,7 +48,7 @@ fn a_transaction_ends_as_check_follows_it() {
         };
         let mut bench = Bench::new(&system, fails, picks);
         (bench.unknown, bench.blind) = (unknown, blind);
-        bench.comes = comes.map(|at| (at, input));
+        bench.comes = comes.map(|at| (at, vec![input]));
         let ends: Endings = bench.drive(planned).iter().map(PartEnd::ending).collect();
         // Over before that came, it ended as if nothing had been to come.
         let came = comes.is_some() && bench.comes.is_none();

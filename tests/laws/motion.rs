@@ -4,10 +4,10 @@ use crate::atomicity::Bench;
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
-use davit::model::{Catalogue, OnFailure};
+use davit::model::{Catalogue, ConfigId, OnFailure};
 use davit::stack::{Op, Stack, transaction};
 use davit::system::{System, step};
-use davit::transaction::PartEnd;
+use davit::transaction::{Input, PartEnd};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::cell::Cell;
@@ -75,4 +75,52 @@ fn no_automatic_rollback_moves_anything() {
     let (rollbacks, withheld, moved) = (rollbacks.get(), withheld.get(), moved.get());
     let enough = crate::cases() as usize / 10;
     assert!(rollbacks >= enough && withheld >= enough / 4 && moved >= enough / 8, "{rollbacks} {withheld} {moved}");
+}
+
+#[test]
+fn an_undo_of_what_was_interrupted_moves_nothing_more_on_its_way_back() {
+    let (came, withheld) = (Cell::new(0), Cell::new(0));
+    let cases = (
+        generate::types(),
+        generate::configs(2..6),
+        any::<bool>(),
+        1usize..10,
+        prop::option::of(1usize..6),
+        prop::collection::vec(any::<u8>(), 24),
+    );
+    let mut runner = TestRunner::new(settings());
+    let ran = runner.run(&cases, |(types, genes, rollback, at, fail, picks)| {
+        let mut system = System::new(moving(&generate::catalogue(&types, false)));
+        let mut stack = Stack::new(8);
+        let (last, first) = genes.split_last().unwrap();
+        for gene in first {
+            let conf = read(gene, &system);
+            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
+            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
+            stack.commit(push);
+        }
+        let mut conf = read(last, &system);
+        if rollback {
+            conf.on_failure = OnFailure::Rollback;
+        }
+        let Ok(planned) = transaction(&system, &stack, &[operator(&conf)], &context()) else { return Ok(()) };
+        // Interrupted alone, and with the undo right after that.
+        let halt = Input::Interrupt(ConfigId::new("halt").unwrap());
+        let [(alone, _), (undone, ends)] = [vec![halt.clone()], vec![halt, Input::GiveUp { part: 0 }]].map(|inputs| {
+            let mut bench = Bench::new(&system, fail.into_iter().collect(), picks.clone());
+            bench.unknown = fail.is_some();
+            bench.comes = Some((at, inputs));
+            let ends = bench.drive(planned.clone());
+            (bench, ends)
+        });
+        prop_assert_eq!(&alone.moved_back, &undone.moved_back);
+        let both = undone.comes.is_none();
+        let held_back = ends.iter().any(|end| matches!(end, PartEnd::Broken(of) if of.residual.withheld.is_some()));
+        came.set(came.get() + usize::from(both));
+        withheld.set(withheld.get() + usize::from(both && held_back));
+        Ok(())
+    });
+    ran.unwrap_or_else(|failed| panic!("{failed}"));
+    let (came, withheld, enough) = (came.get(), withheld.get(), crate::cases() as usize / 10);
+    assert!(came >= enough && withheld >= enough / 4, "{came} {withheld}");
 }
