@@ -174,9 +174,14 @@ impl Engine {
     fn repair(&mut self, at: usize, asked: bool) -> Result<(), Arc<Residual>> {
         let broken = self.world.broken.remove(at);
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
-        let mut wanted = self.world.system.clone();
-        let _ = wanted.adopt(&components, &broken.expected);
+        // Anew whenever it was waited for an answer: others go on meanwhile.
+        let as_expected = |system: &System| {
+            let mut wanted = system.clone();
+            let _ = wanted.adopt(&components, &broken.expected);
+            wanted
+        };
         let mut observed = self.read(&components);
+        let mut wanted = as_expected(&self.world.system);
         let mut withheld = None;
         if observed {
             self.note_quarantine();
@@ -194,6 +199,7 @@ impl Engine {
                 let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
                 let _ = self.carry_out(Transaction::new(plan, spec));
                 observed = self.read(&components);
+                wanted = as_expected(&self.world.system);
             }
         }
         // A call that is out still may happen yet.
