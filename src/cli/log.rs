@@ -59,17 +59,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             for reason in entry["reasons"].as_array().into_iter().flatten() {
                 line.push_str(&format!("\n{:>12}           {}", "", text(reason)));
             }
-            if steps {
-                for step in entry["steps"].as_array().into_iter().flatten() {
-                    let took = step["took_us"].as_f64().map_or_else(String::new, duration);
-                    let outcome = match text(&step["outcome"]) {
-                        "done" => String::new(),
-                        other => format!("  {}", out.paint(Style::Bad, other)),
-                    };
-                    line.push_str(&format!("\n{:>12}           {took:>10}  {}{outcome}", "", text(&step["step"])));
-                }
-            }
-            line
+            line + &if steps { below(out, entry) } else { String::new() }
         }
         "lost" => {
             let mut line = format!("lost       {}", out.paint(Style::Bad, text(&entry["event"])));
@@ -95,11 +85,28 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             entry["seconds"].as_f64().unwrap_or_default()
         ),
         "said" => format!("{:<10} {}", text(&entry["by"]), text(&entry["text"])),
-        "recovered" => out.paint(Style::Good, "recovered"),
+        "recovered" => {
+            let number = entry["steps"].as_array().map_or(0, Vec::len);
+            let line = format!("{}  {}", out.paint(Style::Good, "recovered"), count(number, "step"));
+            line + &if steps { below(out, entry) } else { String::new() }
+        }
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),
     };
     format!("{:>12.6}  {what}\n", entry["at"].as_f64().unwrap_or_default())
+}
+
+/// The steps of an entry, one line each.
+fn below(out: &Output, entry: &Json) -> String {
+    let line = |step: &Json| {
+        let took = step["took_us"].as_f64().map_or_else(String::new, duration);
+        let outcome = match text(&step["outcome"]) {
+            "done" => String::new(),
+            other => format!("  {}", out.paint(Style::Bad, other)),
+        };
+        format!("\n{:>12}           {took:>10}  {}{outcome}", "", text(&step["step"]))
+    };
+    entry["steps"].as_array().into_iter().flatten().map(line).collect()
 }
 
 /// `3 steps`, `1 step`.

@@ -102,7 +102,7 @@ impl Progress {
                 self.line(format!("{time}  {}  {event}", out.paint(Style::Bad, "lost")));
                 reasons.iter().for_each(|reason| self.line(format!("                 {reason}")));
             }
-            Happening::Recovered => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
+            Happening::Recovered { .. } => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::teardown::own_plan;
 use crate::limits;
-use crate::model::{ComponentName, RunState, Snapshot, Step, Verdict};
+use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
 use crate::stack::{Broken, Edits, FrameId, HandOver, Inverse, Op, Residual, keeps_still, transaction};
 use crate::system::{self, System, View as _, step};
@@ -121,7 +121,7 @@ impl Engine {
         // An operator asks for it, without force.
         let still = self.world.stack.safe().next().is_some();
         while !self.world.broken.is_empty() {
-            self.repair(self.world.broken.len() - 1, !still)?;
+            self.repair(self.world.broken.len() - 1, !still, RequestId(0))?;
         }
         while let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() {
             // A person has decided that what cannot be undone may stay.
@@ -147,7 +147,7 @@ impl Engine {
                 Some(PartEnd::Broken(part)) => {
                     let residual = part.residual.clone();
                     let ask = crate::model::Ask::UndoOf(frame.configuration);
-                    self.left_broken(&Request::new(crate::model::RequestId(0), ask, frame.requester), *part);
+                    self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part);
                     return Err(residual);
                 }
                 Some(PartEnd::Cancelled | PartEnd::Anew) => return Err(Arc::new(Residual::of(Reason::Busy))),
@@ -161,7 +161,7 @@ impl Engine {
 
     /// Mends what a request is about to undo. False: it was answered, since that does not go.
     pub(super) fn repair_for(&mut self, request: &Request, at: usize) -> bool {
-        match self.repair(at, !keeps_still(&self.world, request)) {
+        match self.repair(at, !keeps_still(&self.world, request), request.id) {
             Ok(()) => true,
             Err(residual) => {
                 self.answer(*request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
@@ -170,8 +170,9 @@ impl Engine {
         }
     }
 
-    /// Brings what is broken to where the model has it. What is unsettled is accepted by that. `asked`: it may move.
-    fn repair(&mut self, at: usize, asked: bool) -> Result<(), Arc<Residual>> {
+    /// Brings what is broken to where the model has it. What is unsettled is accepted by that. `asked`: it may move;
+    /// `serves`: the request that its steps are told with.
+    fn repair(&mut self, at: usize, asked: bool, serves: RequestId) -> Result<(), Arc<Residual>> {
         let broken = self.world.broken.remove(at);
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         // Anew whenever it was waited for an answer: others go on meanwhile.
@@ -197,7 +198,7 @@ impl Engine {
                 let list = in_order(&self.world.system, steps).unwrap_or_default();
                 let plan = own_plan(list, &self.world.system);
                 let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
-                let _ = self.carry_out(Transaction::new(plan, spec));
+                let _ = self.carry_out_for(serves, Transaction::new(plan, spec));
                 observed = self.read(&components);
                 wanted = as_expected(&self.world.system);
             }
@@ -266,7 +267,7 @@ impl Engine {
         self.note_quarantine();
         let mut at = 0;
         while at < self.world.broken.len() {
-            if self.world.broken[at].mendable && self.repair(at, false).is_ok() {
+            if self.world.broken[at].mendable && self.repair(at, false, RequestId(0)).is_ok() {
                 if let Some(progress) = &self.progress {
                     progress(&Progress::Recovered);
                 }

@@ -182,8 +182,13 @@ impl Engine {
 
     /// Carries something of one's own out, while everything else goes on.
     pub(super) fn carry_out(&mut self, machine: Transaction) -> Transaction {
+        self.carry_out_for(RequestId(0), machine)
+    }
+
+    /// The same, with the steps told among those of a request.
+    pub(super) fn carry_out_for(&mut self, request: RequestId, machine: Transaction) -> Transaction {
         let number = self.number();
-        self.running.push(Running::new(number, machine, Purpose::Own, SmallVec::new()));
+        self.running.push(Running::new(number, machine, Purpose::Own, SmallVec::from_iter([request])));
         self.complete(number).machine
     }
 

@@ -85,7 +85,10 @@ pub enum Happening {
         reasons: Vec<String>,
     },
     /// A broken system is whole again.
-    Recovered,
+    Recovered {
+        /// The steps that nobody's request stands for and that were carried out since the last time.
+        steps: Vec<StepTime>,
+    },
     /// Something had to be forced, or was left over.
     Forced {
         /// What.

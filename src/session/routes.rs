@@ -185,7 +185,10 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             }
         }
         Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
-        Progress::Recovered => hub.note(Happening::Recovered),
+        Progress::Recovered => {
+            let steps = lock(steps).remove(&RequestId(0)).unwrap_or_default();
+            hub.note(Happening::Recovered { steps });
+        }
         Progress::Started(_) | Progress::Answered(_) => {}
     }
 }

@@ -168,10 +168,17 @@ fn recovering_moves_nothing_while_a_safe_configuration_is_in_force() {
         local ok, why = pcall(recover, 'back')
         assert(not ok and tostring(why):find('start c', 1, true), tostring(why)) assert(state('c') == 'stopped')
         undo('safe') wait_answer('safe.undone', 1) recover('back') assert(state('c') == 'running')");
+    // What is mended before something is undone is told with that.
+    let log = run("apply('build', {force = true}) wait_answer('build.ok', 1)
+        fault('start c', 'lie') apply('go', {force = true}) wait_answer('go.ok', 1) wait(8)
+        undo('go') wait_answer('go.undone', 1) assert(state('c') == 'stopped')");
+    assert_eq!(steps(&log, "go.undone"), ["start c", "stop c"]);
     let log = run("fault('operation_call b.open', 'slow', 1, 0.8) apply('both', {force = true}) wait(0.4)
         apply('safe') wait_answer('safe.ok', 0.1) wait_answer('both.broken', 5)
         local ok, why = pcall(recover, 'back')
         assert(not ok and tostring(why):find('a.dn', 1, true), tostring(why))
         undo('safe') wait_answer('safe.undone', 1) recover('back') assert(#stack() == 1)");
+    let recovered = log.lines().find(|line| line.contains("\"recovered\"")).unwrap_or_else(|| panic!("{log}"));
+    assert!(recovered.contains("operation_call a.dn"), "{recovered}");
     assert!(!steps(&log, "both.broken").contains(&"operation_call a.dn".to_owned()), "{log}");
 }
