@@ -19,6 +19,7 @@ use crate::system::View;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::rc::Rc;
+use std::time::Duration;
 
 /// Findings with the ways to them; empty: there is none to tell.
 pub type Traced = Vec<(Finding, Vec<TraceStep>)>;
@@ -59,7 +60,8 @@ impl Graph<'_, '_> {
             }
             let mut trace = self.trace(at);
             if let Some(last) = trace.last_mut() {
-                last.replay.then = Some(request.ask.failed().event(request.ask));
+                let within = self.runs_out(at, &request).unwrap_or_default();
+                last.replay.then = Some((request.ask.failed().event(request.ask), within));
             }
             let finding = self.refused(at, &request, &reasons);
             // The reasons are findings of their own, each at its place.
@@ -95,7 +97,15 @@ impl Graph<'_, '_> {
         let others: Vec<Requester> = blamed.into_iter().filter(|by| !own || *by != Requester::Operator).collect();
         let maker = self.maker(number, state, ask);
         let mut finding = if others.is_empty() {
-            let message = format!("`{ask}` is refused when it is asked for: {why}");
+            let message = match (self.runs_out(at, request), ask) {
+                (Some(within), Ask::UndoOf(id)) => {
+                    format!(
+                        "`{id}` cannot be taken back when it is not confirmed within {} s: {why}",
+                        within.as_secs_f64()
+                    )
+                }
+                _ => format!("`{ask}` is refused when it is asked for: {why}"),
+            };
             let shared = by_operator || maker.is_some() || self.shares(number, ask) || !member.chart.is_pure();
             let severity = if shared { class.min(Severity::Warning) } else { class };
             Finding::new(severity, COORD_REQUEST_REFUSED, message)
@@ -107,7 +117,12 @@ impl Graph<'_, '_> {
             );
             Finding::new(class.min(Severity::Warning), COORD_REFUSED_BY_OTHER, message)
         };
-        if let Some(site) = self.site(number, request) {
+        let confirmed = |id| self.product.worlds.configuration(id).filter(|_| self.runs_out(at, request).is_some());
+        if let Ask::UndoOf(id) = ask
+            && let Some(configuration) = confirmed(id)
+        {
+            finding = finding.at(configuration.origin).labelled("waits for its confirmation");
+        } else if let Some(site) = self.site(number, request) {
             finding = finding.at(site.origin).labelled("asked for here").path(place(member.chart, site.when));
         }
         for reason in reasons.iter().filter(|reason| reason.origin.is_some()).take(3) {
@@ -127,6 +142,17 @@ impl Graph<'_, '_> {
                 "give each coordinator components of its own, or let one ask the other by an event".to_owned()
             }
         })
+    }
+
+    /// Within what time a confirmation was to come, where a request takes back what was not confirmed.
+    fn runs_out(&self, at: u32, request: &Request) -> Option<Duration> {
+        let state = &self.states[at as usize];
+        let Ask::UndoOf(id) = request.ask else { return None };
+        let of = (Ask::Apply(id), request.requester);
+        let waits = state.unconfirmed.iter().any(|waits| (waits.request.ask, waits.request.requester) == of);
+        let asked = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests).any(|r| r.ask == request.ask);
+        let confirm = self.product.worlds.configuration(id).and_then(|configuration| configuration.confirm);
+        confirm.filter(|_| waits && !asked).map(|confirm| confirm.within)
     }
 
     /// Components that a request is about, in the state's world.

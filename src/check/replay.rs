@@ -24,8 +24,8 @@ pub struct Replay {
     pub arms: Vec<(String, FaultKind, Duration)>,
     /// What is to be done for it.
     pub does: Does,
-    /// At the end of a way: an answer that comes there at once, without being part of it.
-    pub then: Option<EventName>,
+    /// At the end of a way: an answer that comes there within that time, without being part of it.
+    pub then: Option<(EventName, Duration)>,
     /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
     pub passes: bool,
 }

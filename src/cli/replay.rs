@@ -57,8 +57,8 @@ pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<Str
     }
     if let Some(last) = trace.last() {
         out.wait_until(last.replay.at + half / 2);
-        if let Some(then) = last.replay.then {
-            _ = writeln!(out.text, "wait_answer({}, 0)", quoted(then.as_str()));
+        if let Some((then, within)) = last.replay.then {
+            _ = writeln!(out.text, "wait_answer({}, {})", quoted(then.as_str()), within.as_secs_f64());
             return Ok(out.text);
         }
         for place in &last.states {

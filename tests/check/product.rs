@@ -297,3 +297,38 @@ fn what_had_not_begun_when_a_safe_configuration_came_is_no_way_of_a_script() {
     let said = small.check();
     assert!(!said.refused("gain").is_empty(), "{:#}", said.0);
 }
+
+#[test]
+fn what_cannot_be_taken_back_unconfirmed_is_told_with_its_way() {
+    let small = Small::new(
+        "base = Configuration { create('a', 'Drive') },
+         x = Configuration { post_conf_state = { 'a:running' }, confirm = { event = 'e_conf', within = 1.0 } },
+         y = Configuration { pre_conf_state = { 'a:running' }, operation_call('a.raise') }",
+        "idle = state {}, b = state { entry = 'base' }, t = state { entry = 'x' }, up = state { entry = 'y' },
+         d0 = state { entry = 'y.undo' }, d1 = state { entry = 'x.undo' }, d2 = state { entry = 'base.undo' },
+         trans { src = 'initial', tgt = 'idle' },
+         trans { src = 'idle', tgt = 'b', events = { 'e_start' } },
+         trans { src = 'b', tgt = 't', events = { 'base.ok' } },
+         trans { src = 't', tgt = 'up', events = { 'x.ok' } },
+         trans { src = 't', tgt = 'd0', events = { 'x.failed', 'x.broken', 'e_shutdown' } },
+         trans { src = 'up', tgt = 'd0', events = { 'y.failed', 'y.broken', 'e_shutdown' } },
+         trans { src = 'd0', tgt = 'd1', events = { 'y.undone' } },
+         trans { src = 'd1', tgt = 'd2', events = { 'x.undone' } },
+         trans { src = 'd2', tgt = 'idle', events = { 'base.undone' } }",
+        "",
+    );
+    let said = small.check();
+    let all = said.of("coord::request_refused").into_iter();
+    let unconfirmed: Vec<_> =
+        all.filter(|f| f["message"].as_str().unwrap().contains("not confirmed within 1 s")).collect();
+    let [finding] = unconfirmed[..] else { panic!("{:#}", said.0) };
+    assert!(finding["message"].as_str().unwrap().starts_with("`x` cannot be taken back"), "{finding:#}");
+    assert_eq!((finding["file"].as_str(), finding["line"].as_u64()), (Some("conf.lua"), Some(2)), "{finding:#}");
+    assert_eq!(Said::answers(finding).last().map(String::as_str), Some("y.ok"), "{finding:#}");
+    // Its script waits for the time to run out.
+    let script = (1..40).map(|n| format!("way{n}.lua")).find(|script| {
+        std::fs::read_to_string(small.demo.path(script))
+            .is_ok_and(|text| text.contains("wait_answer(\"x.undo.failed\", 1)"))
+    });
+    assert!(script.is_some());
+}
