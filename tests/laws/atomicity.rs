@@ -1,7 +1,7 @@
 //! Atomicity of what the configurator carries out: with a failure at any step, in any permitted order, the transaction's own
 //! machine ends whole, or with the system as it was, or names exactly what is left. Undos before a failing push stand.
 
-use crate::generate::{self, context, read};
+use crate::generate::{self, ConfigGene, context, read};
 use crate::plans::operator;
 use crate::settings;
 use davit::model::{
@@ -37,6 +37,19 @@ pub struct Bench {
     pub unknown: bool,
     /// Nobody answers who is asked how things are.
     pub blind: bool,
+}
+
+/// What all but the last of these configurations lead to, those that are refused left out; and the last.
+pub fn in_force(types: Arc<Catalogue>, genes: &[ConfigGene]) -> (System, Stack, &ConfigGene) {
+    let (mut system, mut stack) = (System::new(types), Stack::new(8));
+    let (last, first) = genes.split_last().expect("some configurations");
+    for gene in first {
+        let conf = read(gene, &system);
+        let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
+        push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
+        stack.commit(push);
+    }
+    (system, stack, last)
 }
 
 impl Bench {
@@ -136,17 +149,7 @@ proptest! {
         again in prop::option::of(1usize..6),
         picks in prop::collection::vec(any::<u8>(), 24),
     ) {
-        let mut system = System::new(generate::catalogue(&types, false));
-        let mut stack = Stack::new(8);
-        let (last, first) = genes.split_last().unwrap();
-        for gene in first {
-            let conf = read(gene, &system);
-            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
-            for s in push.steps.iter() {
-                step::apply(&s.step, &mut system).unwrap();
-            }
-            stack.commit(push);
-        }
+        let (system, mut stack, last) = in_force(generate::catalogue(&types, false), &genes);
         let conf = read(last, &system);
         let ops = [Op::UndoTop, operator(&conf)];
         // A push, an undo, or the net of both.

@@ -1,12 +1,11 @@
 //! However a transaction ends that is given up, interrupted or fails: so it may end by what `check` follows.
 
-use crate::atomicity::Bench;
+use crate::atomicity::{Bench, in_force};
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
 use davit::model::ConfigId;
-use davit::stack::{Ending, Endings, Op, Stack, transaction};
-use davit::system::{System, step};
+use davit::stack::{Ending, Endings, Op, transaction};
 use davit::transaction::{Input, PartEnd, Stopping, can_fail, endings};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -26,15 +25,7 @@ fn a_transaction_ends_as_check_follows_it() {
     );
     let mut runner = TestRunner::new(settings());
     let ran = runner.run(&cases, |(types, genes, what, (fails, unknown, blind), comes, picks)| {
-        let mut system = System::new(generate::catalogue(&types, false));
-        let mut stack = Stack::new(8);
-        let (last, first) = genes.split_last().unwrap();
-        for gene in first {
-            let conf = read(gene, &system);
-            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
-            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
-            stack.commit(push);
-        }
+        let (system, stack, last) = in_force(generate::catalogue(&types, false), &genes);
         let conf = read(last, &system);
         let ops = [Op::UndoTop, operator(&conf)];
         let ops = [&ops[..1], &ops[1..], &ops[..]][what % 3];

@@ -1,12 +1,11 @@
 //! Nothing moves that nobody asked to move: no automatic rollback moves anything, unless the configuration says so.
 
-use crate::atomicity::Bench;
+use crate::atomicity::{Bench, in_force};
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
 use davit::model::{Catalogue, ConfigId, OnFailure};
-use davit::stack::{Op, Stack, transaction};
-use davit::system::{System, step};
+use davit::stack::{Op, transaction};
 use davit::transaction::{Input, PartEnd};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -38,15 +37,7 @@ fn no_automatic_rollback_moves_anything() {
     );
     let mut runner = TestRunner::new(settings());
     let ran = runner.run(&cases, |(types, genes, undo, asked, fail, picks)| {
-        let mut system = System::new(moving(&generate::catalogue(&types, false)));
-        let mut stack = Stack::new(8);
-        let (last, first) = genes.split_last().unwrap();
-        for gene in first {
-            let conf = read(gene, &system);
-            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
-            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
-            stack.commit(push);
-        }
+        let (system, stack, last) = in_force(moving(&generate::catalogue(&types, false)), &genes);
         let mut conf = read(last, &system);
         if asked {
             conf.on_failure = OnFailure::Rollback;
@@ -90,15 +81,7 @@ fn an_undo_of_what_was_interrupted_moves_nothing_more_on_its_way_back() {
     );
     let mut runner = TestRunner::new(settings());
     let ran = runner.run(&cases, |(types, genes, rollback, at, fail, picks)| {
-        let mut system = System::new(moving(&generate::catalogue(&types, false)));
-        let mut stack = Stack::new(8);
-        let (last, first) = genes.split_last().unwrap();
-        for gene in first {
-            let conf = read(gene, &system);
-            let Ok(push) = transaction(&system, &stack, &[operator(&conf)], &context()) else { continue };
-            push.steps.iter().for_each(|s| step::apply(&s.step, &mut system).unwrap());
-            stack.commit(push);
-        }
+        let (system, stack, last) = in_force(moving(&generate::catalogue(&types, false)), &genes);
         let mut conf = read(last, &system);
         if rollback {
             conf.on_failure = OnFailure::Rollback;
