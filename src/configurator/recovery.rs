@@ -118,10 +118,10 @@ impl Engine {
     /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone.
     fn recover_back(&mut self) -> Result<(), Arc<Residual>> {
         let some = !self.world.broken.is_empty() || self.world.stack.frames().iter().any(|frame| frame.partial);
-        // An operator asks for it, without force.
-        let still = self.world.stack.safe().next().is_some();
+        // An operator asks for it, without force; and a safe configuration may come while it is looked.
+        let still = |engine: &Self| engine.world.stack.safe().next().is_some();
         while !self.world.broken.is_empty() {
-            self.repair(self.world.broken.len() - 1, !still, RequestId(0))?;
+            self.repair(self.world.broken.len() - 1, !still(self), RequestId(0))?;
         }
         while let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() {
             // A person has decided that what cannot be undone may stay.
@@ -130,7 +130,7 @@ impl Engine {
             }
             let planned = transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.context)
                 .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
-            if let Some(moving) = planned.steps.iter().find(|planned| still && planned.moves) {
+            if let Some(moving) = planned.steps.iter().find(|planned| planned.moves && still(self)) {
                 return Err(Arc::new(Residual::of(Reason::Moves(moving.step.clone()))));
             }
             let edits = planned.parts[0].edits.clone();
