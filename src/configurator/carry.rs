@@ -1,19 +1,23 @@
 //! A transaction between its machine and the platform: calls that are out, awaited and given up.
 
 use super::engine::Engine;
+use super::hands::Hands;
 use super::inbox::Reply;
-use super::pool::{self, Call};
+use super::pool::Call;
 use super::progress::{Progress, StepEnd, StepName};
 use super::running::{Flight, Purpose, Running};
 use crate::limits;
 use crate::model::{Cause, Execution, Outcome, Snapshot, Step};
 use crate::platform::Ended;
 use crate::time::Time;
-use crate::transaction::{Can, Input, Poll};
+use crate::transaction::{Can, Doing, Input, Poll};
 use smallvec::{SmallVec, smallvec};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// After so many immediate steps the mail is looked at.
+const GLANCE: usize = 64;
 
 impl Engine {
     /// Lets a transaction go on as far as it can without waiting. True: it did something.
@@ -78,9 +82,13 @@ impl Engine {
                     did = true;
                     let first = &running.machine.step(steps[0]).step;
                     if steps.len() == 1 && platform.execution(first) == Execution::Immediate {
-                        self.inline(running, steps[0], &mut now);
+                        let tools = (&*self.platform, &self.clock, self.progress.as_ref());
+                        let hands = Hands::new(tools, &running.serves, running.enters_quarantine);
+                        let outcome = hands.execute(running.machine.doing(steps[0], now), &mut now);
+                        running.machine.ended(steps[0], outcome, &mut self.world.system);
+                        self.steps += 1;
                         inline += 1;
-                        if inline % 64 == 0 {
+                        if inline % GLANCE == 0 {
                             self.glance();
                         }
                     } else {
@@ -93,7 +101,8 @@ impl Engine {
     }
 
     /// Carries out immediate steps, one after the other, until something else is to be done or somebody is urgent. Answers how
-    /// many.
+    /// many. Of steps that follow each other one begins where the one before has ended, since a look at the clock costs as
+    /// much as half a step.
     fn immediate_ones(
         &mut self,
         running: &mut Running,
@@ -101,37 +110,30 @@ impl Engine {
         now: &mut Time,
     ) -> usize {
         let mut count = 0;
-        while let Some(step) = running.machine.next_immediate(&self.world.system, *now, execution) {
-            self.inline(running, step, now);
-            count += 1;
-            if count % 64 == 0 {
-                self.glance();
+        loop {
+            if count > 0 && !running.is_safe() && self.urgent() {
+                return count;
             }
-            if !running.is_safe() && self.urgent() {
-                break;
+            let gives_way = !running.is_safe();
+            let counts = self.counts.clone();
+            let goes_on = || !(gives_way && counts.safe.load(Ordering::Acquire) > 0);
+            let tools = (&*self.platform, &self.clock, self.progress.as_ref());
+            let hands = Hands::new(tools, &running.serves, running.enters_quarantine);
+            let execute = |doing: Doing<'_>, at: &mut Time| hands.execute(doing, at);
+            let did = running.machine.immediate_ones(GLANCE, &mut self.world.system, now, execution, goes_on, execute);
+            self.steps += did as u64;
+            count += did;
+            if did < GLANCE {
+                return count;
             }
+            self.glance();
         }
-        count
     }
 
     /// Whether a call that takes time may begin: one worker stays free for each of the others that has none.
     fn has_room(&self, running: &Running) -> bool {
         let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
         self.pool.has_room_beside(if running.flights.is_empty() { 0 } else { others })
-    }
-
-    /// Carries out an immediate step, from `at` on, which becomes the time of its end: of steps that follow each other one
-    /// begins where the one before has ended, since a look at the clock costs as much as half a step.
-    fn inline(&mut self, running: &mut Running, number: u32, at: &mut Time) {
-        let step = &running.machine.step(number).step;
-        let started = *at;
-        self.tell_started(step);
-        let deadline = running.machine.deadline(started);
-        let outcome = pool::execute(&*self.platform, step, deadline, running.enters_quarantine);
-        *at = self.clock.now();
-        self.tell(running, number, StepEnd::from(&outcome), Some(at.since(started)));
-        running.machine.ended(number, outcome, &mut self.world.system);
-        self.steps += 1;
     }
 
     /// Hands steps to a worker: one of any kind, or several brief ones. Their preconditions hold.

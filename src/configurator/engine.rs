@@ -35,7 +35,6 @@ pub(super) struct Confirming {
     pub until: Time,
 }
 
-/// What a configurator is made of.
 /// What is applied when everything is taken down by force, in order: what is safe, and what brings the system to rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Force {
@@ -43,6 +42,7 @@ pub(super) struct Force {
     pub rest: Vec<ConfigId>,
 }
 
+/// What a configurator is made of.
 pub(super) struct Parts {
     pub clock: Clock,
     pub platform: Arc<dyn Platform>,

@@ -8,10 +8,12 @@
 //! model immediately before; no outcome *unknown* that is reported as done or not done without having been read back; no
 //! request that is dropped.
 //!
-//! * [`Configurator`], [`ConfiguratorHandle`] (`handle`): starting one, and talking to it. [`request`]: what is asked and answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
+//! * [`Configurator`], [`ConfiguratorHandle`] (`handle`): starting one, and talking to it. [`request`]: what is asked and
+//!   answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
-//!   platform. [`conditions`], `stands`: what only the values of components tell, and what is watched while it is in force. `safe`: what goes first. `fast`, `switches`: plans that are carried out again. `teardown`: to nothing. `recovery`: the way out of what is broken.
-//!   `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
+//!   platform; `hands`: an immediate step. [`conditions`], `stands`: what only the values of components tell, and what is
+//!   watched while it is in force. `safe`: what goes first. `fast`, `switches`: plans that are carried out again.
+//!   `teardown`: to nothing. `recovery`: the way out of what is broken. `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
 mod carry;
@@ -20,6 +22,7 @@ pub mod control;
 mod engine;
 mod fast;
 mod handle;
+mod hands;
 mod inbox;
 mod looks;
 mod observing;

@@ -123,17 +123,16 @@ impl Engine {
 
     /// A transaction is over.
     pub(super) fn ended(&mut self, running: Running) {
-        let Running { number: own, machine, purpose, asked, stood, .. } = running;
+        let Running { number: own, mut machine, purpose, asked, stood, .. } = running;
         self.forget_conditions(asked.iter().map(|asked| asked.number));
         if let Some(conditions) = &self.conditions {
             conditions.nudge();
         }
         match purpose {
             Purpose::Requests(number, group) => {
-                let planned = machine.planned().clone();
-                let interrupted = machine.interrupted();
                 let end = machine.end();
-                self.book(number, group, end.parts, Some((&planned, &stood, interrupted)));
+                // It is dropped when everybody has been answered: a long plan takes its time for that.
+                self.book(number, group, end.parts, Some((machine.planned(), &stood, machine.interrupted())));
                 self.take_up(number);
             }
             Purpose::Safe(safe) => {

@@ -92,10 +92,12 @@ impl Running {
     }
 
     pub fn serves(&self, step: u32) -> RequestId {
-        if let [one] = self.serves[..] {
-            return one;
-        }
-        let part = self.machine.part_of_step(step);
-        self.serves.get(part).or(self.serves.last()).copied().unwrap_or(RequestId(0))
+        let part = if self.serves.len() == 1 { 0 } else { self.machine.part_of_step(step) };
+        served(&self.serves, part)
     }
+}
+
+/// The request that a part of a plan serves; 0 for what nobody asked for.
+pub(super) fn served(serves: &[RequestId], part: usize) -> RequestId {
+    serves.get(part).or(serves.last()).copied().unwrap_or(RequestId(0))
 }

@@ -141,7 +141,7 @@ impl Engine {
         &mut self,
         number: u64,
         safe: (Request, Frame, Touched),
-        machine: Transaction,
+        mut machine: Transaction,
         stood: Option<u64>,
     ) {
         let (request, frame, mut touched) = safe;

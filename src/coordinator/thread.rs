@@ -6,9 +6,9 @@ use super::{Delivered, Tag};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
-use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time};
+use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time, lock};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 
 /// A running coordinator. Cloning makes another handle of the same one; it ends when it is told to, not when the handles
 /// are gone.
@@ -64,11 +64,6 @@ pub enum Waited {
     TimedOut,
     /// The coordinator was detached first.
     Detached,
-}
-
-/// Nothing that is locked here is left half-changed by a panic of a listener.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Coordinator {

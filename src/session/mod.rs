@@ -18,6 +18,7 @@ pub mod rpc;
 pub mod service;
 pub mod socket;
 mod stands;
+mod steps;
 mod wiring;
 
 pub use hub::{Hub, Observer};

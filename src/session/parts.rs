@@ -4,13 +4,13 @@
 //! of the others that wait for it. A frame belongs to whoever asked for it, so none undoes another's.
 
 use super::hub::Hub;
-use super::routes::{Junction, ToConfigurator, lock};
+use super::routes::{Junction, ToConfigurator};
 use crate::configurator::Requester;
 use crate::coordinator::Coordinator;
 use crate::functions::Opener;
 use crate::model::{Deployment, EventName, Ident};
 use crate::statechart::{Chart, EventId, NodeId};
-use crate::time::Clock;
+use crate::time::{Clock, lock};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 

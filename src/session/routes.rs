@@ -3,18 +3,14 @@
 
 use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
+use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, Scope};
 use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
-use crate::limits;
 use crate::model::{Ask, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
-use rustc_hash::FxHashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
+use crate::time::lock;
+use std::sync::{Arc, Mutex, Weak};
 
 /// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
 /// neither keeps the other alive.
@@ -159,18 +155,12 @@ impl ToConfigurator {
     }
 }
 
-/// Steps carried out for requests that are not answered yet.
-pub(super) type Steps = Mutex<FxHashMap<RequestId, Vec<StepTime>>>;
-
 pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progress: &Progress) {
     match progress {
         Progress::Begun { .. } => {}
         Progress::Ended { request, step, end, took, undoing } => {
-            let mut steps = lock(steps);
-            let steps = steps.entry(*request).or_default();
-            if steps.len() < limits::STEPS_LOGGED {
-                steps.push(StepTime { step: *step, undoing: *undoing, end: *end, took: *took });
-            }
+            let noted = || StepTime { step: *step, undoing: *undoing, end: *end, took: *took };
+            steps.note(*request, noted);
         }
         Progress::Survived(text) => {
             hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
@@ -186,8 +176,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
         }
         Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
         Progress::Recovered => {
-            let steps = lock(steps).remove(&RequestId(0)).unwrap_or_default();
-            hub.note(Happening::Recovered { steps });
+            hub.note(Happening::Recovered { steps: steps.take(RequestId(0)) });
         }
         Progress::Started(_) | Progress::Answered(_) => {}
     }
@@ -205,7 +194,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
         by: answer.request.requester.to_string(),
         took_us: answer.took.as_secs_f64() * 1e6,
         reasons,
-        steps: lock(steps).remove(&answer.request.id).unwrap_or_default(),
+        steps: steps.take(answer.request.id),
     });
     if let Some(coordinator) = junction.coordinator(answer.request.requester) {
         let (owner, visit) = answer.request.tag;

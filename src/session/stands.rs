@@ -4,14 +4,14 @@
 //! Each condition has its own look at the platform, from when it is asked for: so it sees what is written from then on and
 //! nothing before.
 
-use super::routes::{Junction, lock};
+use super::routes::Junction;
 use crate::configurator::{Conditions, Truth};
 use crate::limits;
 use crate::model::monitor::{Condition, Sampling};
 use crate::model::{Catalogue, ComponentName, ComponentType, Deployment, Ident, Monitor, Origin};
 use crate::monitor::{Bank, Input, Sample};
 use crate::platform::{Platform, Watch};
-use crate::time::{Clock, Signal, Time};
+use crate::time::{Clock, Signal, Time, lock};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 

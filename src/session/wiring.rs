@@ -6,8 +6,9 @@ use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
 use super::recovery::Difference;
-use super::routes::{Junction, lock, on_answer, on_platform, on_progress};
+use super::routes::{Junction, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
+use super::steps::Steps;
 use crate::configurator::{
     Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown,
     View,
@@ -18,7 +19,7 @@ use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
-use crate::time::{Clock, Time};
+use crate::time::{Clock, Time, lock};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -63,7 +64,7 @@ impl Session {
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
         let junction = Arc::new(Junction::default());
-        let steps = Arc::new(Mutex::new(rustc_hash::FxHashMap::default()));
+        let steps = Arc::new(Steps::default());
         let evaluator =
             super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
         let configurator = Configurator::start(ConfiguratorSetup {

@@ -5,9 +5,10 @@
 //! whoever drives the machine and changes only here, with each step that was done. The configurator carries messages
 //! between a machine and the platform; a test can drive one through every outcome at every step.
 //!
-//! `run`: a list of steps being carried out. `order`: which may begin. `settle`: unknown outcomes. `stand`: whether what
-//! was applied stands. `back`: the way back; `touched`, `heed`: what it leaves to safe
-//! configurations; `bring`: where it goes on for them. `end`: what comes of each part; `endings`: what may. `messages`: what goes in and out.
+//! `run`: a list of steps being carried out; `immediate`: without a detour. `order`: which may begin. `settle`: unknown
+//! outcomes. `stand`: whether what was applied stands. `back`: the way back; `touched`, `heed`: what it leaves to safe
+//! configurations; `bring`: where it goes on for them. `end`: what comes of each part; `endings`: what may. `messages`: what
+//! goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
@@ -17,6 +18,7 @@ mod bring;
 mod end;
 mod endings;
 mod heed;
+mod immediate;
 mod messages;
 mod order;
 mod run;
@@ -26,6 +28,7 @@ mod touched;
 
 pub use end::{BrokenPart, End, PartEnd};
 pub use endings::{Stopping, can_fail, endings};
+pub use immediate::Doing;
 pub use messages::{Can, Input, Poll, Question, Spec};
 pub use touched::Touched;
 
@@ -245,9 +248,9 @@ impl Transaction {
         self.own()
     }
 
-    /// What came of it, once it is over.
-    pub fn end(self) -> End {
-        self.end.expect("it is over")
+    /// What came of it, once it is over: told once.
+    pub fn end(&mut self) -> End {
+        self.end.take().expect("it is over")
     }
 
     /// A step that was begun is back: [`Input::Ended`].

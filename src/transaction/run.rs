@@ -2,7 +2,6 @@
 
 use super::messages::Can;
 use super::order::Order;
-use super::{Phase, Transaction};
 use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
 use crate::plan::PlannedStep;
@@ -117,6 +116,7 @@ impl Run {
         (0..).zip(&self.state).filter(|(_, state)| matches!(state, State::Out(_))).map(|(i, _)| i)
     }
 
+    #[inline]
     fn finish(&mut self, i: u32) {
         self.state[i as usize] = State::Over;
         if let Some(order) = &mut self.order {
@@ -179,6 +179,7 @@ impl Run {
     }
 
     /// The immediate step at the present place, which is out from now on. None: it must not begin, and has failed.
+    #[inline]
     fn immediate(&mut self, live: &System, now: Time, timeout: std::time::Duration) -> Option<u32> {
         let i = self.at as u32;
         if !self.gate(i, live, now, timeout) {
@@ -190,7 +191,8 @@ impl Run {
     }
 
     /// What [`Self::begin`] begins where that is an immediate step in the list's own order, with nothing to be looked at
-    /// before.
+    /// before; it is out from now on.
+    #[inline]
     pub fn next_immediate(
         &mut self,
         live: &System,
@@ -207,6 +209,15 @@ impl Run {
         }
         let immediate = execution(&self.list[self.at].step) == Execution::Immediate;
         if immediate { self.immediate(live, now, timeout) } else { None }
+    }
+
+    /// The immediate step that was begun last was done. In the same breath, so that nothing can have come between the look at
+    /// its precondition and now.
+    #[inline]
+    pub fn was_executed(&mut self, i: u32, live: &mut System) {
+        self.out -= 1;
+        self.took_effect(i, live);
+        self.at = i as usize + 1;
     }
 
     /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
@@ -314,6 +325,7 @@ impl Run {
 
     /// Whether a step may be given to the platform now: its precondition on the live model, and the time. If not, it has
     /// failed.
+    #[inline]
     fn gate(&mut self, i: u32, live: &System, now: Time, timeout: std::time::Duration) -> bool {
         let refused = if now >= self.until {
             Some(Reason::Timeout(timeout))
@@ -371,20 +383,31 @@ impl Run {
             self.failures.push((i, reason));
             return;
         }
+        self.took_effect(i, live);
+    }
+
+    #[inline]
+    fn took_effect(&mut self, i: u32, live: &mut System) {
         if self.late_from_now {
-            let call = match &self.list[i as usize].undo {
-                Undo::One(Step::Operation(call)) => Some(call.clone()),
-                _ => None,
-            };
-            let undo = step::inverse(step, call.as_ref(), live);
-            self.late.push(Late { step: i, undo, revision: live.revision() });
+            self.comes_late(i, live);
         }
-        step::effect(step, live);
+        step::effect(&self.list[i as usize].step, live);
         if self.notes {
             self.noted.push((i, live.revision()));
         }
         self.finish(i);
         self.done.push(i);
+    }
+
+    #[cold]
+    fn comes_late(&mut self, i: u32, live: &System) {
+        let planned = &self.list[i as usize];
+        let call = match &planned.undo {
+            Undo::One(Step::Operation(call)) => Some(call.clone()),
+            _ => None,
+        };
+        let undo = step::inverse(&planned.step, call.as_ref(), live);
+        self.late.push(Late { step: i, undo, revision: live.revision() });
     }
 
     pub fn did_not_happen(&mut self, i: u32, cause: Cause, live: &mut System) {
@@ -411,30 +434,20 @@ impl Run {
     }
 }
 
-impl Transaction {
-    /// The step that [`Self::poll`] would let begin, where that is an immediate one and nothing is to be done before: of many
-    /// small steps most are. None: nothing is known by that. Not where steps come after those of others ([`Can::busy`]).
-    pub fn next_immediate(&mut self, live: &System, now: Time, execution: &impl Fn(&Step) -> Execution) -> Option<u32> {
-        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
-        if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
-            return None;
-        }
-        let timeout = self.spec.timeout;
-        self.in_hand_mut().next_immediate(live, now, execution, timeout)
-    }
-}
-
 /// Whether a step comes after what an earlier safe configuration still does.
 fn is_busy(step: &Step, can: &Can<'_>) -> bool {
     !can.busy.is_empty() && components(step).iter().any(|component| can.busy.contains(component))
 }
 
 /// Why the precondition of a step is false on the model, if it is.
+#[inline]
 pub(super) fn false_precondition(step: &Step, live: &System) -> Option<Reason> {
     let violations = step::precondition(step, live);
-    if violations.is_empty() {
-        return None;
-    }
+    if violations.is_empty() { None } else { Some(refused(step, &violations, live)) }
+}
+
+#[cold]
+fn refused(step: &Step, violations: &[Violation], live: &System) -> Reason {
     let finding = |violation: &Violation| {
         let finding = Finding::error(violation.code(), format!("`{step}`: {violation}"));
         match violation.help(live) {
@@ -442,5 +455,5 @@ pub(super) fn false_precondition(step: &Step, live: &System) -> Option<Reason> {
             None => finding,
         }
     };
-    Some(Reason::Refused(violations.iter().map(finding).collect()))
+    Reason::Refused(violations.iter().map(finding).collect())
 }
