@@ -50,7 +50,7 @@ impl Transaction {
             let settled = match is {
                 Some(true) => Settled::Happened,
                 Some(false) => Settled::DidNot,
-                None => Settled::Nobody,
+                None => unread(&self.step(step).step, live).unwrap_or(Settled::Nobody),
             };
             self.in_hand_mut().settle(at, settled, live);
         }
@@ -61,9 +61,10 @@ impl Transaction {
 /// What is known of a step of unknown outcome without reading anything; none: it must be read.
 fn unread(step: &Step, live: &System) -> Option<Settled> {
     let Step::Operation(call) = step else { return None };
-    // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known.
+    // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known. What moves
+    // may be moving still, though nothing undoes it.
     let declared = live.component(step.component()).and_then(|node| node.ty.operations.get(&call.operation.member));
-    let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None);
+    let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None && !operation.moves);
     Some(if leaves_nothing { Settled::DidNot } else { Settled::Nobody })
 }
 

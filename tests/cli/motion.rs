@@ -14,6 +14,8 @@ types:
       dn: { effect: { undo: up }, moves: true }
       open: { effect: { undo: close } }
       close: { effect: { undo: open } }
+      home: { effect: none, moves: true }
+      look: { effect: none }
   M:
     moves: [start, stop]
 configurations: [conf.lua]
@@ -28,6 +30,8 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   other = Configuration { property_set("b.k", 1) },
   lift  = Configuration { operation_call("a.up") },
   open  = Configuration { operation_call("a.open") },
+  home  = Configuration { property_set("b.k", 4), operation_call("a.home") },
+  look  = Configuration { property_set("b.k", 4), operation_call("a.look") },
   tried = Configuration { confirm = { event = "e_conf", within = 1.0 }, operation_call("a.up") },
   build = Configuration { create("c", "M"), post_conf_state = { "c:stopped" } },
   go    = Configuration { post_conf_state = { "c:running" } },
@@ -93,6 +97,31 @@ fn a_confirmation_that_runs_out_moves_nothing_unasked() {
         "apply('meant', {force = true}) wait_answer('meant.ok', 1) wait_answer('meant.reverted', 2) assert(#stack() == 1)",
     );
     assert_eq!(steps(&log, "meant.reverted"), ["operation_call a.dn"]);
+}
+
+/// A call that moves and leaves nothing to take back: without an answer it is not known whether it moves still, and that is
+/// not the system as before. Of what only looks nothing need be known.
+#[test]
+fn a_call_that_may_be_moving_still_is_broken_though_nothing_undoes_it() {
+    for how in ["lost", "hang", "late"] {
+        let log = run(&format!(
+            "fault('operation_call a.home', '{how}') apply('home', {{force = true}}) wait_answer('home.broken', 5)
+            assert(property('b.k') == 0)
+            local f for _, d in ipairs(drift()) do f = f or d.how == 'unknown' and d.text:find('a.home', 1, true) end assert(f)
+            apply('first', {{force = true}}) wait_answer('first.failed', 5)
+            apply('other', {{force = true}}) wait_answer('other.ok', 5)"
+        ));
+        assert!(log.contains("nobody knows whether it happened: `operation_call a.home()`"), "{how}: {log}");
+        run(&format!(
+            "fault('operation_call a.look', '{how}') apply('look', {{force = true}}) wait_answer('look.failed', 5)
+            assert(property('b.k') == 0)"
+        ));
+    }
+    // Who asks for its undo accepts what is unknown: nothing is called for that.
+    let log = run("fault('operation_call a.home', 'lost') apply('home', {force = true}) wait_answer('home.broken', 5)
+        undo('home') wait_answer('home.undone', 5) assert(#stack() == 1 and #drift() == 0)
+        apply('first', {force = true}) wait_answer('first.ok', 5)");
+    assert!(steps(&log, "home.undone").is_empty(), "{log}");
 }
 
 #[test]
