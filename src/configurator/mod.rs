@@ -26,6 +26,7 @@ mod observing;
 mod pool;
 pub mod progress;
 mod recovery;
+mod repair;
 pub mod request;
 mod requests;
 mod running;

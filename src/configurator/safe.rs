@@ -41,6 +41,7 @@ impl Engine {
         let Ask::Apply(id) = request.ask else { return };
         let configurations = self.configurations.clone();
         let Some(configuration) = configurations.get(&id) else { return };
+        self.safes += 1;
         let before = self.interrupt(id);
         let at = self.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.

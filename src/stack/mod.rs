@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -14,6 +14,7 @@ mod batch;
 pub mod claims;
 mod desk;
 mod effort;
+mod mend;
 mod net;
 mod permanent;
 mod prepared;
@@ -30,6 +31,7 @@ pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
 pub use desk::{Arrival, Desk, GivenUp, Gone, Turn, given_up_of};
 pub use effort::{Effort, effort};
+pub use mend::Mending;
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};

@@ -18,6 +18,9 @@ types:
       look: { effect: none }
   M:
     moves: [start, stop]
+    operations:
+      open: { effect: { undo: close } }
+      close: { effect: { undo: open } }
 configurations: [conf.lua]
 coordinator: coordinator.lua
 deploy:   { event: e_start, up: up, within_s: 5 }
@@ -35,6 +38,7 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   tried = Configuration { confirm = { event = "e_conf", within = 1.0 }, operation_call("a.up") },
   build = Configuration { create("c", "M"), post_conf_state = { "c:stopped" } },
   go    = Configuration { post_conf_state = { "c:running" } },
+  work  = Configuration { pre_conf_state = { "c:running" }, property_set("b.k", 3), operation_call("c.open") },
   halt  = Configuration { post_conf_state = { "c:stopped" } },
   both  = Configuration { operation_call("a.up"), operation_call("b.open") },
   safe  = Configuration { safe = true, property_set("b.k", 9) },
@@ -197,11 +201,6 @@ fn recovering_moves_nothing_while_a_safe_configuration_is_in_force() {
         local ok, why = pcall(recover, 'back')
         assert(not ok and tostring(why):find('start c', 1, true), tostring(why)) assert(state('c') == 'stopped')
         undo('safe') wait_answer('safe.undone', 1) recover('back') assert(state('c') == 'running')");
-    // What is mended before something is undone is told with that.
-    let log = run("apply('build', {force = true}) wait_answer('build.ok', 1)
-        fault('start c', 'lie') apply('go', {force = true}) wait_answer('go.ok', 1) wait(8)
-        undo('go') wait_answer('go.undone', 1) assert(state('c') == 'stopped')");
-    assert_eq!(steps(&log, "go.undone"), ["start c", "stop c"]);
     let log = run("fault('operation_call b.open', 'slow', 1, 0.8) apply('both', {force = true}) wait(0.4)
         apply('safe') wait_answer('safe.ok', 0.1) wait_answer('both.broken', 5)
         local ok, why = pcall(recover, 'back')
@@ -210,4 +209,33 @@ fn recovering_moves_nothing_while_a_safe_configuration_is_in_force() {
     let recovered = log.lines().find(|line| line.contains("\"recovered\"")).unwrap_or_else(|| panic!("{log}"));
     assert!(recovered.contains("operation_call a.dn"), "{recovered}");
     assert!(!steps(&log, "both.broken").contains(&"operation_call a.dn".to_owned()), "{log}");
+}
+
+/// What is not running, though the platform had said so, is not started to be stopped: its undo goes straight to where it
+/// leads, whatever else is to be done for that.
+#[test]
+fn what_is_undone_is_not_mended_first() {
+    let lied = "apply('build', {force = true}) wait_answer('build.ok', 1) fault('start c', 'lie')";
+    let log = run(&format!(
+        "{lied} apply('go', {{force = true}}) wait_answer('go.ok', 1) wait(8) assert(state('c') == 'stopped')
+        undo('go') wait_answer('go.undone', 1) assert(state('c') == 'stopped' and #drift() == 0 and #stack() == 2)"
+    ));
+    assert!(steps(&log, "go.undone").is_empty(), "{log}");
+    // What lies between the two is taken back all the same.
+    let log = run(&format!(
+        "{lied} apply('work', {{force = true}}) wait_answer('work.ok', 1) wait(8)
+        undo('work') wait_answer('work.undone', 1) assert(state('c') == 'stopped' and property('b.k') == 0 and #drift() == 0)"
+    ));
+    assert_eq!(steps(&log, "work.undone"), ["operation_call c.close", "property_set b.k"]);
+    // Nothing that would move is left, so it goes also while a safe configuration is in force.
+    let log = run(&format!(
+        "{lied} apply('go', {{force = true}}) wait_answer('go.ok', 1) wait(8) apply('safe') wait_answer('safe.ok', 1)
+        undo('go') wait_answer('go.undone', 1) assert(state('c') == 'stopped' and #drift() == 0)"
+    ));
+    assert!(steps(&log, "go.undone").is_empty(), "{log}");
+    // The other way round: what still runs, though it was said to be stopped, is not stopped to be started.
+    let log = run("apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)
+        fault('stop c', 'lie') apply('halt', {force = true}) wait_answer('halt.ok', 1) wait(8) assert(state('c') == 'running')
+        undo('halt') wait_answer('halt.undone', 1) assert(state('c') == 'running' and #drift() == 0)");
+    assert!(steps(&log, "halt.undone").is_empty(), "{log}");
 }
