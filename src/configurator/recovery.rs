@@ -127,7 +127,9 @@ impl Engine {
                 }
                 continue;
             }
-            let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() else { break };
+            let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() else {
+                break;
+            };
             some = true;
             self.pass_floor(&frame);
             let planned = transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.context)

@@ -7,9 +7,10 @@ use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::Running;
 use super::teardown::own_plan;
+use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Mending, Residual, keeps_still};
+use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, keeps_still};
 use crate::system::{self, View as _, step};
 use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
 use std::sync::Arc;
@@ -123,12 +124,11 @@ impl Engine {
         let broken = self.world.broken.remove(at);
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut observed = self.read(&components);
-        self.after_safe();
         let mut withheld = None;
         if observed {
             self.note_quarantine();
             // Made of what is there now: others go on while it is looked.
-            let Mending { steps, .. } = self.world.mending(&broken);
+            let steps = self.world.mending(&broken);
             let hung = |step: &Step| self.world.quarantined.contains(&step.component());
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
@@ -143,7 +143,6 @@ impl Engine {
                 let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
                 let _ = self.carry_out_for(serves, Transaction::new(plan, spec));
                 observed = self.read(&components);
-                self.after_safe();
             }
         }
         let wanted = self.world.as_meant(&broken);
@@ -188,21 +187,26 @@ impl Engine {
         }
     }
 
-    /// Reads some components back into the model. False: nobody answered.
+    /// Reads some components back into the model. False: nobody answered, or a safe configuration touched them each time while
+    /// it was looked: what was seen then may be from before that.
     fn read(&mut self, components: &[ComponentName]) -> bool {
-        match self.ask(Call::ObserveSome(components.to_vec())) {
-            Some(Reply::Observed(Ok(seen))) => match self.world.system.adopt(components, &seen) {
-                Ok(changed) => {
-                    if changed {
-                        self.switches.clear();
-                        self.changed();
-                    }
-                    true
-                }
-                Err(_) => false,
-            },
-            _ => false,
+        for _ in 0..limits::LOOKS_AGAIN {
+            let before: Vec<Option<u64>> = components.iter().map(|name| self.generation(*name)).collect();
+            let Some(Reply::Observed(Ok(seen))) = self.ask(Call::ObserveSome(components.to_vec())) else {
+                return false;
+            };
+            self.after_safe();
+            if components.iter().zip(&before).any(|(name, before)| self.generation(*name) != *before) {
+                continue;
+            }
+            let Ok(changed) = self.world.system.adopt(components, &seen) else { return false };
+            if changed {
+                self.switches.clear();
+                self.changed();
+            }
+            return true;
         }
+        false
     }
 
     /// A component came back from a call that had never returned: what could not be mended because of it may be now. By
@@ -226,7 +230,6 @@ impl Engine {
         let components: Vec<ComponentName> = self.world.broken[at].components.iter().copied().collect();
         let observed = self.read(&components);
         self.note_quarantine();
-        self.after_safe();
         observed
     }
 }

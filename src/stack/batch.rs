@@ -258,7 +258,9 @@ fn resolve<'a>(
             };
             match found {
                 Some(frame) => {
+                    // A safe configuration was applied to what is broken as it is; taken back, that is as it was.
                     if !repaired
+                        && !frame.safe
                         && !world.broken.is_empty()
                         && let Some(reason) = still_broken(&mut share::components(&frame.footprint).into_iter())
                     {
@@ -287,8 +289,8 @@ fn resolve<'a>(
         }
         Ask::Undo => match work.frames.iter().rev().find(|frame| frame.requester == request.requester) {
             Some(frame) => match still_broken(&mut share::components(&frame.footprint).into_iter()) {
-                Some(reason) => tell(failed, reason),
-                None => Resolved::Op(Op::Undo(frame.id)),
+                Some(reason) if !frame.safe => tell(failed, reason),
+                _ => Resolved::Op(Op::Undo(frame.id)),
             },
             None => tell(failed, Reason::NothingToUndo),
         },

@@ -16,16 +16,6 @@ use crate::system::{Overlay, System, diff, step};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// How something broken is brought to where the model has it.
-pub struct Mending {
-    /// The steps, in their order.
-    pub steps: Vec<Step>,
-    /// What they lead to.
-    pub wanted: System,
-    /// Something else differs that a safe configuration in force has to do with: that is left as it wants it.
-    pub held: bool,
-}
-
 impl World {
     /// The picture with something broken as the model has it.
     pub fn as_meant(&self, broken: &Broken) -> System {
@@ -37,18 +27,17 @@ impl World {
 
     /// What mends something broken, on the picture as it is. Nothing of it undoes what a safe configuration in force wrote or
     /// demanded: those come also to what is broken.
-    pub fn mending(&self, broken: &Broken) -> Mending {
-        let mut wanted = self.as_meant(broken);
-        let mut steps = diff(&self.system, &wanted);
+    pub fn mending(&self, broken: &Broken) -> Vec<Step> {
+        let meant = self.as_meant(broken);
+        let mut steps = diff(&self.system, &meant);
         let before = steps.len();
-        steps.retain(|step| !self.is_safe_ones(step, &wanted));
-        let held = steps.len() < before;
-        if held {
-            wanted = self.system.clone();
+        steps.retain(|step| !self.is_safe_ones(step, &meant));
+        if steps.len() < before {
             // One that comes after what was left out may not be possible.
-            steps.retain(|step| step::apply(step, &mut wanted).is_ok());
+            let mut view = Overlay::new(&self.system);
+            steps.retain(|step| step::apply(step, &mut view).is_ok());
         }
-        Mending { steps, wanted, held }
+        steps
     }
 
     /// Whether a step would change what a safe configuration in force wrote or demanded.
@@ -70,9 +59,10 @@ impl World {
     /// mended to be taken back at once, and each goes by itself.
     pub fn straight(&self, at: usize, frame: FrameId, context: &Context) -> Option<Planned> {
         let broken = &self.broken[at];
-        let Mending { steps: mend, wanted, held } = self.mending(broken);
+        let wanted = self.as_meant(broken);
+        let mend = diff(&self.system, &wanted);
         let out = broken.residual.unsettled.iter().any(|step| self.quarantined.contains(&step.component()));
-        if mend.is_empty() || held || out {
+        if mend.is_empty() || out {
             return None;
         }
         let undo = transaction(&wanted, &self.stack, &[Op::Undo(frame)], context).ok()?;
@@ -93,6 +83,9 @@ impl World {
             let whole = diff(&self.system, &end).into_iter().map(alone).collect();
             if calls { None } else { self.leads_to(whole, &end) }
         })?;
+        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted)) {
+            return None;
+        }
         let mut parts = undo.parts;
         parts.iter_mut().for_each(|part| part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that"));
         let revision = self.system.revision();

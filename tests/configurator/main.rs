@@ -6,6 +6,7 @@ mod brief;
 mod claims;
 mod observing;
 mod prepared;
+mod repair;
 mod rig;
 mod safe;
 mod survival;
