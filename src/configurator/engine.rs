@@ -91,8 +91,6 @@ pub(super) struct Engine {
     pub steps: u64,
     /// Requests for safe configurations that have come and were not begun.
     pub safe: VecDeque<Request>,
-    /// How many have begun.
-    pub safes: u64,
     /// What safe configurations under way could not plan, and what those that have ended touched.
     pub troubles: Vec<(RequestId, Vec<Reason>)>,
     pub touched: crate::transaction::Touched,
@@ -151,7 +149,6 @@ impl Engine {
             numbers: 0,
             steps: 0,
             safe: VecDeque::new(),
-            safes: 0,
             troubles: Vec::new(),
             touched: crate::transaction::Touched::default(),
             commands: VecDeque::new(),

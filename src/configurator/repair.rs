@@ -20,8 +20,8 @@ use std::sync::Arc;
 pub(super) enum By {
     /// An operator who recovers, without force.
     Recovery,
-    /// A request: the undo of what broke it.
-    Request(Request),
+    /// The request of a batch under way, by that number: the undo of what broke it.
+    Request(u32),
     /// Nobody: a component came back.
     Nobody,
 }
@@ -40,33 +40,10 @@ impl Engine {
         }
     }
 
-    /// Looks at what a request is about to undo and is broken. False: nobody answered.
-    pub(super) fn look_for(&mut self, number: u32, at: usize) -> bool {
-        let before = self.safes;
-        let observed = self.read_broken(at);
-        self.note_still(number, before);
-        observed
-    }
-
-    /// Safe configurations have come since there were so many: the request that is about to be carried out was raised before
-    /// them, and nothing of it moves.
-    fn note_still(&mut self, number: u32, before: u64) {
-        if self.safes == before {
-            return;
-        }
-        let Some(turn) = self.desk.turn_of(number) else { return };
-        let mut requests = turn.batch.requests.clone();
-        requests.iter_mut().for_each(|request| request.still = true);
-        self.desk.begun_as(number, &requests);
-    }
-
     /// Mends what a request is about to undo. False: it was answered, since that does not go.
     pub(super) fn repair_for(&mut self, number: u32, at: usize) -> bool {
         let Some(request) = self.desk.turn_of(number).map(|turn| turn.batch.requests[0]) else { return false };
-        let before = self.safes;
-        let mended = self.repair(at, By::Request(request));
-        self.note_still(number, before);
-        match mended {
+        match self.repair(at, By::Request(number)) {
             Ok(()) => true,
             Err(residual) => {
                 self.answer(request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
@@ -107,20 +84,25 @@ impl Engine {
         self.changed();
     }
 
+    /// The request that something is repaired for; one that a safe configuration has overtaken is marked since.
+    fn request_of(&self, by: By) -> Option<&Request> {
+        let By::Request(number) = by else { return None };
+        self.desk.turn_of(number).and_then(|turn| turn.batch.requests.first())
+    }
+
     /// Whether something may move for who has it repaired: asked only when it is known what, since a safe configuration may come
-    /// while it is looked. `before`: so many had come when it was asked for.
-    fn may_move(&self, by: By, before: u64) -> bool {
+    /// while it is looked.
+    fn may_move(&self, by: By) -> bool {
         match by {
             By::Recovery => self.world.stack.safe().next().is_none(),
-            By::Request(request) => self.safes == before && !keeps_still(&self.world, &request),
+            By::Request(_) => self.request_of(by).is_some_and(|request| !keeps_still(&self.world, request)),
             By::Nobody => false,
         }
     }
 
     /// Brings what is broken to where the model has it. What is unsettled is accepted by that.
     pub(super) fn repair(&mut self, at: usize, by: By) -> Result<(), Arc<Residual>> {
-        let before = self.safes;
-        let serves = if let By::Request(request) = by { request.id } else { RequestId(0) };
+        let serves = self.request_of(by).map_or(RequestId(0), |request| request.id);
         let broken = self.world.broken.remove(at);
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut observed = self.read(&components);
@@ -133,7 +115,7 @@ impl Engine {
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
             let moves = system::diff::moves_any(&steps, &self.world.system);
-            let asked = self.may_move(by, before);
+            let asked = self.may_move(by);
             if moves && !asked && self.world.stack.safe().next().is_some() {
                 withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
             }

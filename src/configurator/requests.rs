@@ -68,7 +68,7 @@ impl Engine {
                 // What it comes to is decided on what is there, and by whether a safe configuration came meanwhile.
                 if !looked {
                     looked = true;
-                    if self.look_for(number, at) {
+                    if self.read_broken(at) {
                         continue;
                     }
                 }

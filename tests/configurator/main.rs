@@ -9,6 +9,7 @@ mod prepared;
 mod repair;
 mod rig;
 mod safe;
+mod safe_ends;
 mod survival;
 mod table;
 mod teardown;
