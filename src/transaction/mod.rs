@@ -29,7 +29,7 @@ pub use endings::{Stopping, can_fail, endings};
 pub use messages::{Can, Input, Poll, Question, Spec};
 pub use touched::Touched;
 
-use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
+use crate::model::{ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
