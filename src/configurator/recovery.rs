@@ -58,8 +58,7 @@ impl Engine {
     fn wanted(&self) -> System {
         let mut wanted = self.world.system.clone();
         for broken in &self.world.broken {
-            let components: Vec<ComponentName> = broken.components.iter().copied().collect();
-            let _ = wanted.adopt(&components, &broken.expected);
+            self.world.put_meant(broken, &mut wanted);
         }
         wanted
     }

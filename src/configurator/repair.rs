@@ -80,7 +80,10 @@ impl Engine {
     }
 
     pub(super) fn forget_broken(&mut self, of: &Arc<Residual>) {
-        self.world.broken.retain(|broken| !Arc::ptr_eq(&broken.residual, of));
+        if let Some(at) = self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of)) {
+            let broken = self.world.broken.remove(at);
+            self.world.hand_meant(&broken);
+        }
         self.changed();
     }
 
@@ -134,6 +137,7 @@ impl Engine {
             broken.residual.unsettled.iter().any(out)
         };
         if observed && system::diff::reached(&self.world.system, &wanted) && !out() {
+            self.world.hand_meant(&broken);
             self.drop_empty(broken.frame);
             self.changed();
             return Ok(());

@@ -6,23 +6,75 @@
 //! leads to (design §6).
 
 use super::work::{Op, Planned, is_bound, transaction};
-use super::{Broken, FrameId, World, net};
+use super::{Broken, FrameId, HandOver, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, Step};
-use crate::plan::footprint::{Footprint, Index};
+use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{Item, Script, absolute};
-use crate::plan::{Context, PlannedStep, Stage, StepId};
+use crate::plan::{Context, PlannedStep, SavedValue, Stage, StepId};
 use crate::system::touch::{Access, touches};
-use crate::system::{Overlay, System, diff, step};
+use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl World {
     /// The picture with something broken as the model has it.
     pub fn as_meant(&self, broken: &Broken) -> System {
-        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut meant = self.system.clone();
-        let _ = meant.adopt(&components, &broken.expected);
+        self.put_meant(broken, &mut meant);
         meant
+    }
+
+    /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it since is
+    /// as that wrote it.
+    pub fn put_meant(&self, broken: &Broken, system: &mut System) {
+        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
+        let _ = system.adopt(&components, &broken.expected);
+        for (_, saved) in self.overwritten(broken) {
+            let written = match saved.slot {
+                Slot::Property(property) => {
+                    let value = self.system.component(property.component).and_then(|node| node.value(property.member));
+                    value.map(|value| Step::PropertySet { property, value: value.clone() })
+                }
+                Slot::Port(port) => {
+                    step::written(port, &self.system).map(|value| Step::PortWrite { port, value: value.cloned() })
+                }
+                _ => None,
+            };
+            let there = |member: MemberRef| {
+                let node = system.component(member.component);
+                node.is_some_and(|node| node.property(member.member).is_some() || node.port(member.member).is_some())
+            };
+            let written = written.filter(|_| matches!(saved.slot, Slot::Property(of) | Slot::Port(of) if there(of)));
+            // Not a step that is done: nothing need allow it.
+            written.iter().for_each(|step| step::effect(step, system));
+        }
+    }
+
+    /// What safe configurations in force overwrote of something broken: the frame of the first of each slot.
+    fn overwritten<'w>(&'w self, broken: &'w Broken) -> impl Iterator<Item = (FrameId, &'w SavedValue)> {
+        let frames = self.stack.frames().iter().filter(|frame| frame.safe);
+        let saved = frames.flat_map(|frame| frame.saved.iter().map(|saved| (frame.id, saved)));
+        let mut met: Vec<Slot> = Vec::new();
+        saved.filter(move |(_, saved)| {
+            let own = broken.components.contains(&saved.slot.components().0) && !met.contains(&saved.slot);
+            met.extend(own.then_some(saved.slot));
+            own
+        })
+    }
+
+    /// Something is broken no more: what safe configurations in force overwrote of it goes back to what the model had there.
+    pub fn hand_meant(&mut self, broken: &Broken) {
+        let meant = |slot: Slot| match slot {
+            Slot::Property(property) => {
+                let one = broken.expected.components.get(&property.component)?;
+                Some(Saved::Property(one.properties.get(&property.member)?.clone()))
+            }
+            Slot::Port(port) => Some(Saved::Port(broken.expected.ports.get(&port).cloned())),
+            _ => None,
+        };
+        let all = self.overwritten(broken).filter_map(|(frame, saved)| Some((frame, saved.slot, meant(saved.slot)?)));
+        let hand = HandOver::to(all.collect());
+        self.stack.hand_over(&hand);
     }
 
     /// What mends something broken, on the picture as it is. Nothing of it undoes what a safe configuration in force wrote or

@@ -278,6 +278,11 @@ impl Stack {
         self.apply(planned.parts.iter().map(|part| &part.edits), &[])
     }
 
+    /// Gives values to the frames that take them over.
+    fn hand_over(&mut self, hand: &HandOver) {
+        share::hand_over(&mut self.frames, hand, &|id| id);
+    }
+
     /// Puts another frame in the place of that of the same number.
     pub fn replace(&mut self, frame: Frame) {
         if let Some(at) = self.frames.iter().position(|f| f.id == frame.id) {

@@ -83,9 +83,10 @@ impl Bench {
             configuration("hold", "C:running", "call B.open", ""),
             configuration("nine", "", "set B.k 9", ""),
             configuration("low", "", "set A.k 1", ""),
+            configuration("rest", "", "set C.k 1", "C:stopped"),
         ];
         for configuration in &mut all {
-            configuration.safe = ["nine", "low"].contains(&configuration.id.as_str());
+            configuration.safe = ["nine", "low", "rest"].contains(&configuration.id.as_str());
             if configuration.id == id("hold") {
                 configuration.on_failure = OnFailure::Hold;
             }
@@ -188,12 +189,33 @@ fn what_a_safe_configuration_wants_of_what_is_broken_stays_while_it_is_in_force(
     let bench = Bench::new();
     bench.tamper(&[set("A.k", 5.0)]);
     bench.comes("low");
-    let why = bench.recover().expect_err("A is as the safe configuration wants it");
-    assert!(why.contains("property_set A.k = 1.0"), "{why}");
-    assert_eq!(bench.gain("A"), Value::Float(1.0));
-    assert_eq!(bench.rig.ask_as("low.undo", coordinator("c2")), ["low.undone"]);
     assert_eq!(bench.recover(), Ok(()));
+    assert_eq!(bench.done(), ["property_set A.k = 1.0"], "A is as the safe configuration wants it");
+    // It had found what somebody else has set; it is taken back to what the model had.
+    assert_eq!(bench.rig.ask_as("low.undo", coordinator("c2")), ["low.undone"]);
     assert_eq!(bench.gain("A"), Value::Float(0.0));
+    bench.rig.in_step();
+}
+
+/// What it demands of a run state, too: then who recovers is told, and what is undone goes straight to where that leads.
+#[test]
+fn what_a_safe_configuration_demands_of_what_is_broken_is_not_mended() {
+    let bench = Bench::new();
+    bench.rig.inject("start C", Fault::FalseDone);
+    assert_eq!(bench.rig.ask("go"), ["go.ok"]);
+    bench.rig.wait(12.0);
+    bench.done();
+    assert_eq!(bench.rig.ask_as("rest", coordinator("c2")), ["rest.ok"]);
+    let drift = bench.rig.handle.drift(bench.rig.clock.now() + Duration::from_secs(5)).unwrap();
+    assert_eq!(drift.steps, [stop("C")], "what it wrote is no difference");
+    let why = bench.recover().expect_err("C is to be stopped");
+    assert!(why.contains("what differs: `stop C`"), "{why}");
+    assert_eq!(bench.done(), ["property_set C.k = 1.0"]);
+    // Undone although C is broken: it was applied so.
+    assert_eq!(bench.rig.ask_as("rest.undo", coordinator("c2")), ["rest.undone"]);
+    assert_eq!(bench.rig.ask("go.undo"), ["go.undone"]);
+    assert_eq!(bench.done(), ["property_set C.k = 0.0"]);
+    assert!(bench.rig.view().residuals.is_empty());
     bench.rig.in_step();
 }
 
