@@ -10,7 +10,7 @@ use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, keeps_still};
+use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
 use crate::system::{self, View as _, step};
 use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
 use std::sync::Arc;
@@ -98,7 +98,9 @@ impl Engine {
     fn may_move(&self, by: By) -> bool {
         match by {
             By::Recovery => self.world.stack.safe().next().is_none(),
-            By::Request(_) => self.request_of(by).is_some_and(|request| !keeps_still(&self.world, request)),
+            By::Request(_) => self
+                .request_of(by)
+                .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request)),
             By::Nobody => false,
         }
     }

@@ -81,12 +81,16 @@ impl Bench {
             configuration("go", "", "", "C:running"),
             configuration("gain", "", "set A.k 7; set B.k 3", ""),
             configuration("hold", "C:running", "call B.open", ""),
+            configuration("sure", "", "set A.k 7", ""),
             configuration("nine", "", "set B.k 9", ""),
             configuration("low", "", "set A.k 1", ""),
             configuration("rest", "", "set C.k 1", "C:stopped"),
         ];
         for configuration in &mut all {
             configuration.safe = ["nine", "low", "rest"].contains(&configuration.id.as_str());
+            if configuration.id == id("sure") {
+                configuration.confirm = Some(Confirm { event: event("e_fine"), within: Duration::from_secs(20) });
+            }
             if configuration.id == id("hold") {
                 configuration.on_failure = OnFailure::Hold;
             }
@@ -258,5 +262,26 @@ fn who_recovers_does_not_start_what_is_taken_back_at_once() {
     let told = bench.rig.progress.lock().unwrap();
     assert!(told.iter().any(|told| matches!(told, Progress::Recovered)));
     drop(told);
+    bench.rig.in_step();
+}
+
+/// Nobody asks for a revert: what would have to move for it is not mended either.
+#[test]
+fn a_confirmation_that_runs_out_mends_nothing_that_moves() {
+    let bench = Bench::new();
+    bench.rig.submit("sure");
+    bench.rig.wait(0.1);
+    bench.tamper(&[stop("A"), set("A.k", 5.0)]);
+    bench.rig.wait(20.0);
+    assert_eq!(bench.rig.events().last().unwrap(), "sure.undo.failed", "{:?}", bench.rig.last());
+    assert!(
+        bench.rig.last().findings()[0].message.contains("`start A` moves, and nobody asked"),
+        "{:?}",
+        bench.rig.last()
+    );
+    assert_eq!(bench.done(), [""; 0]);
+    assert_eq!(bench.rig.frames(), ["sure"]);
+    assert_eq!(bench.rig.ask("sure.undo"), ["sure.undone"]);
+    assert_eq!(bench.done(), ["start A", "property_set A.k = 0.0"]);
     bench.rig.in_step();
 }
