@@ -149,6 +149,10 @@ pub const HOLDS_LOOK: Duration = Duration::from_micros(100);
 /// residual that nobody reported is found within some seconds, at a cost that nobody notices.
 pub const OBSERVE_EVERY: Duration = Duration::from_secs(5);
 
+/// How often what is broken is looked at again, since a safe configuration touched it while it was looked; a safe
+/// configuration that comes more often than that is not a repair's to wait for.
+pub const LOOKS_AGAIN: usize = 4;
+
 /// Components looked at in one call then; a larger system is looked at in several, so that no step waits for long while a
 /// platform reads.
 pub const OBSERVED_AT_ONCE: usize = 256;

@@ -29,6 +29,7 @@ mod observing;
 mod pool;
 pub mod progress;
 mod recovery;
+mod repair;
 pub mod request;
 mod requests;
 mod running;

@@ -5,14 +5,13 @@ use super::engine::Engine;
 use super::inbox::Reply;
 use super::pool::Call;
 use super::progress::Progress;
+use super::repair::By;
 use super::request::{Reason, Request};
-use super::teardown::own_plan;
 use crate::limits;
-use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
-use crate::plan::undo::in_order;
-use crate::stack::{Broken, Edits, FrameId, HandOver, Inverse, Op, Residual, keeps_still, transaction};
+use crate::model::{ComponentName, RequestId, RunState, Snapshot};
+use crate::stack::{Broken, Frame, Op, Planned, Residual, transaction};
 use crate::system::{self, System, View as _, step};
-use crate::transaction::{PartEnd, Spec, Transaction};
+use crate::transaction::{PartEnd, Transaction};
 use std::sync::Arc;
 
 impl Engine {
@@ -25,7 +24,7 @@ impl Engine {
     }
 
     /// Asks the platform something on a worker, while everything else goes on. None: no answer.
-    fn ask(&mut self, call: Call) -> Option<Reply> {
+    pub(super) fn ask(&mut self, call: Call) -> Option<Reply> {
         let deadline = self.clock.now() + self.limits.step_timeout;
         let ticket = self.pool.start(call, deadline);
         let until = deadline + limits::PLATFORM_GRACE;
@@ -59,8 +58,7 @@ impl Engine {
     fn wanted(&self) -> System {
         let mut wanted = self.world.system.clone();
         for broken in &self.world.broken {
-            let components: Vec<ComponentName> = broken.components.iter().copied().collect();
-            let _ = wanted.adopt(&components, &broken.expected);
+            self.world.put_meant(broken, &mut wanted);
         }
         wanted
     }
@@ -117,41 +115,25 @@ impl Engine {
 
     /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone.
     fn recover_back(&mut self) -> Result<(), Arc<Residual>> {
-        let some = !self.world.broken.is_empty() || self.world.stack.frames().iter().any(|frame| frame.partial);
-        // An operator asks for it, without force; and a safe configuration may come while it is looked.
-        let still = |engine: &Self| engine.world.stack.safe().next().is_some();
-        while !self.world.broken.is_empty() {
-            self.repair(self.world.broken.len() - 1, !still(self), RequestId(0))?;
-        }
-        while let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() {
-            // A person has decided that what cannot be undone may stay.
-            if frame.floor.is_some() {
-                self.world.stack.replace(crate::stack::Frame { floor: None, ..(*frame).clone() });
+        let mut some = false;
+        loop {
+            self.after_safe();
+            if let Some(at) = self.world.broken.len().checked_sub(1) {
+                some = true;
+                match self.partial_of(at) {
+                    Some(frame) if self.read_broken(at) && self.take_back_straight(at, &frame)? => {}
+                    _ => self.repair(at, By::Recovery)?,
+                }
+                continue;
             }
+            let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() else {
+                break;
+            };
+            some = true;
+            self.pass_floor(&frame);
             let planned = transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.context)
                 .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
-            if let Some(moving) = planned.steps.iter().find(|planned| planned.moves && still(self)) {
-                return Err(Arc::new(Residual::of(Reason::Moves(moving.step.clone()))));
-            }
-            let edits = planned.parts[0].edits.clone();
-            let spec = self.spec(&planned, true);
-            match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
-                Some(PartEnd::Done) | None => {
-                    self.world.stack.apply([&edits], &[]);
-                    self.changed();
-                }
-                Some(PartEnd::Failed(reason)) => {
-                    let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
-                    return Err(Arc::new(Residual { cause: reason.clone(), ..left.unwrap_or(Residual::of(reason)) }));
-                }
-                Some(PartEnd::Broken(part)) => {
-                    let residual = part.residual.clone();
-                    let ask = crate::model::Ask::UndoOf(frame.configuration);
-                    self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part);
-                    return Err(residual);
-                }
-                Some(PartEnd::Cancelled | PartEnd::Anew) => return Err(Arc::new(Residual::of(Reason::Busy))),
-            }
+            self.take_back(&frame, planned)?;
         }
         if some && let Some(progress) = &self.progress {
             progress(&Progress::Recovered);
@@ -159,121 +141,55 @@ impl Engine {
         Ok(())
     }
 
-    /// Mends what a request is about to undo. False: it was answered, since that does not go.
-    pub(super) fn repair_for(&mut self, request: &Request, at: usize) -> bool {
-        match self.repair(at, !keeps_still(&self.world, request), request.id) {
-            Ok(()) => true,
-            Err(residual) => {
-                self.answer(*request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
-                false
-            }
+    /// A person has decided that what cannot be undone may stay.
+    fn pass_floor(&mut self, frame: &Frame) {
+        if frame.floor.is_some() {
+            self.world.stack.replace(Frame { floor: None, ..frame.clone() });
         }
     }
 
-    /// Brings what is broken to where the model has it. What is unsettled is accepted by that. `asked`: it may move;
-    /// `serves`: the request that its steps are told with.
-    fn repair(&mut self, at: usize, asked: bool, serves: RequestId) -> Result<(), Arc<Residual>> {
-        let broken = self.world.broken.remove(at);
-        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
-        // Anew whenever it was waited for an answer: others go on meanwhile.
-        let as_expected = |system: &System| {
-            let mut wanted = system.clone();
-            let _ = wanted.adopt(&components, &broken.expected);
-            wanted
-        };
-        let mut observed = self.read(&components);
-        let mut wanted = as_expected(&self.world.system);
-        let mut withheld = None;
-        if observed {
-            self.note_quarantine();
-            let steps = system::diff(&self.world.system, &wanted);
-            let hung = |step: &Step| self.world.quarantined.contains(&step.component());
-            let steps: Vec<Step> =
-                steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
-            let moves = system::diff::moves_any(&steps, &self.world.system);
-            if moves && !asked && self.world.stack.safe().next().is_some() {
-                withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
-            }
-            if !steps.is_empty() && (asked || !moves) {
-                let list = in_order(&self.world.system, steps).unwrap_or_default();
-                let plan = own_plan(list, &self.world.system);
-                let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
-                let _ = self.carry_out_for(serves, Transaction::new(plan, spec));
-                observed = self.read(&components);
-                wanted = as_expected(&self.world.system);
-            }
-        }
-        // A call that is out still may happen yet.
-        let out = || {
-            let out = |step: &Step| self.world.quarantined.contains(&step.component());
-            broken.residual.unsettled.iter().any(out)
-        };
-        if observed && system::diff::reached(&self.world.system, &wanted) && !out() {
-            self.drop_empty(broken.frame);
-            self.changed();
-            return Ok(());
-        }
-        let mut faulted: Vec<ComponentName> = Vec::new();
-        for node in components.iter().filter_map(|name| self.world.system.component(*name)) {
-            if node.state == RunState::Faulted
-                && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted)
-            {
-                faulted.push(node.name);
-            }
-        }
-        let residual = Arc::new(Residual {
-            difference: system::diff(&wanted, &self.world.system),
-            faulted,
-            quarantined: self.world.quarantined.clone(),
-            observed,
-            withheld: withheld.or_else(|| broken.residual.withheld.clone()),
-            ..(*broken.residual).clone()
-        });
-        self.world.broken.insert(at.min(self.world.broken.len()), Broken { residual: residual.clone(), ..broken });
-        self.changed();
-        Err(residual)
+    /// The partial frame of something broken.
+    fn partial_of(&self, at: usize) -> Option<Arc<Frame>> {
+        let frame = self.world.broken[at].frame.and_then(|frame| self.world.stack.frame(frame));
+        frame.filter(|frame| frame.partial).cloned()
     }
 
-    /// A partial frame that holds nothing to take back is gone with what was broken.
-    fn drop_empty(&mut self, frame: Option<FrameId>) {
-        let Some(frame) = frame.and_then(|frame| self.world.stack.frame(frame)) else { return };
-        if frame.partial && frame.floor.is_none() && matches!(&frame.inverse, Inverse::List(items) if items.is_empty())
+    /// Takes the partial frame of something broken back in one net with what mends that. False: each goes by itself.
+    fn take_back_straight(&mut self, at: usize, frame: &Frame) -> Result<bool, Arc<Residual>> {
+        self.pass_floor(frame);
+        let Some(planned) = self.world.straight(at, frame.id, &self.context) else { return Ok(false) };
+        let residual = self.world.broken[at].residual.clone();
+        self.take_back(frame, planned)?;
+        self.forget_broken(&residual);
+        Ok(true)
+    }
+
+    /// Carries the undo of a partial frame out. An operator asks for it, without force.
+    fn take_back(&mut self, frame: &Frame, planned: Planned) -> Result<(), Arc<Residual>> {
+        if self.world.stack.safe().next().is_some()
+            && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
         {
-            let edits = Edits { pops: vec![(frame.id, HandOver::default())], ..Edits::default() };
-            self.world.stack.apply([&edits], &[]);
+            return Err(Arc::new(Residual::of(Reason::Moves(moving.step.clone()))));
         }
-    }
-
-    /// Reads some components back into the model. False: nobody answered.
-    fn read(&mut self, components: &[ComponentName]) -> bool {
-        match self.ask(Call::ObserveSome(components.to_vec())) {
-            Some(Reply::Observed(Ok(seen))) => match self.world.system.adopt(components, &seen) {
-                Ok(changed) => {
-                    if changed {
-                        self.switches.clear();
-                        self.changed();
-                    }
-                    true
-                }
-                Err(_) => false,
-            },
-            _ => false,
-        }
-    }
-
-    /// A component came back from a call that had never returned: what could not be mended because of it may be now. By
-    /// itself nothing moves.
-    pub(super) fn mend(&mut self) {
-        self.note_quarantine();
-        let mut at = 0;
-        while at < self.world.broken.len() {
-            if self.world.broken[at].mendable && self.repair(at, false, RequestId(0)).is_ok() {
-                if let Some(progress) = &self.progress {
-                    progress(&Progress::Recovered);
-                }
-            } else {
-                at += 1;
+        let edits = planned.parts[0].edits.clone();
+        let spec = self.spec(&planned, true);
+        match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
+            Some(PartEnd::Done) | None => {
+                self.world.stack.apply([&edits], &[]);
+                self.changed();
+                Ok(())
             }
+            Some(PartEnd::Failed(reason)) => {
+                let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
+                Err(Arc::new(Residual { cause: reason.clone(), ..left.unwrap_or(Residual::of(reason)) }))
+            }
+            Some(PartEnd::Broken(part)) => {
+                let residual = part.residual.clone();
+                let ask = crate::model::Ask::UndoOf(frame.configuration);
+                self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part);
+                Err(residual)
+            }
+            Some(PartEnd::Cancelled | PartEnd::Anew) => Err(Arc::new(Residual::of(Reason::Busy))),
         }
     }
 

@@ -38,6 +38,7 @@ impl Engine {
 
     /// The rest of a batch under way is taken up.
     fn take_up(&mut self, number: u32) {
+        let mut looked = false;
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
             let Some(turn) = self.desk.turn_of(number) else { return };
@@ -61,8 +62,18 @@ impl Engine {
                 placed: false,
             };
             let mut group = take_up(&self.world, &requests, &rules);
-            if let Some(at) = group.repairs {
-                if self.repair_for(&requests[0], at) {
+            if let Some(at) = group.repairs
+                && !(looked && group.mends.is_some())
+            {
+                // What it comes to is decided on what is there, and by whether a safe configuration came meanwhile.
+                if !looked {
+                    looked = true;
+                    if self.read_broken(at) {
+                        continue;
+                    }
+                }
+                looked = false;
+                if self.repair_for(number, at) {
                     continue;
                 }
                 if self.desk.answered(number, 0, None).over {
@@ -153,6 +164,7 @@ impl Engine {
         let Some(turn) = self.desk.turn_of(number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
+        let parts = self.mended(&group, parts, planned.as_ref().is_some_and(|(.., by)| by.is_some()));
         let endings: Endings = parts.iter().map(PartEnd::ending).collect();
         let interrupted = planned.as_ref().and_then(|(.., reason)| reason.clone());
         let stopped = match &interrupted {
@@ -231,7 +243,9 @@ impl Engine {
             (None, of) => of,
         };
         self.partials.extend(frame.map(|frame| (frame, residual.clone())));
-        if !residual.is_settled() {
+        // What was to be repaired and stays as it was is there already.
+        let known = self.world.broken.iter().any(|broken| Arc::ptr_eq(&broken.residual, &residual));
+        if !residual.is_settled() && !known {
             let components = residual.components().collect();
             let culprit = match request.ask {
                 Ask::Apply(id) | Ask::UndoOf(id) => Some((id, request.requester)),

@@ -8,12 +8,13 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Step, Target, Verdict};
 use crate::stack::claims::components as components_of;
-use crate::stack::{Effort, Frame, Stack, effort};
+use crate::stack::{Effort, Frame, Residual, Stack, effort, without};
 use crate::system::{System, step, touch};
 use crate::time::Time;
-use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
+use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Duration;
 
 impl Engine {
@@ -146,6 +147,7 @@ impl Engine {
     ) {
         let (request, frame, mut touched) = safe;
         machine.note_done(&mut touched);
+        let missed: Vec<Step> = machine.missed().cloned().collect();
         let edits = machine.planned().parts[0].edits.clone();
         let end = machine.end();
         let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
@@ -157,7 +159,8 @@ impl Engine {
         let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
         let frame = match (&broken, interrupted) {
             (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
-            _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
+            (Some(_), true) => without(frame, &missed),
+            (None, _) => frame,
         };
         let held = self.held_frames();
         let pushed = self.world.stack.push_safe(edits, frame, &held);
@@ -172,12 +175,17 @@ impl Engine {
         let (verdict, reason) = match broken {
             None if troubles.is_empty() => (Verdict::Ok, None),
             None => {
-                let residual = crate::stack::Residual::of(troubles.swap_remove(0));
-                (Verdict::Broken, Some(Reason::Broken(std::sync::Arc::new(residual))))
+                let cause = troubles.remove(0);
+                let residual = Arc::new(Residual { also: troubles, ..Residual::of(cause) });
+                self.partials.push((pushed, residual.clone()));
+                (Verdict::Broken, Some(Reason::Broken(residual)))
             }
             Some(part) => {
-                let residual = part.residual.clone();
-                let part = crate::transaction::BrokenPart { frame: None, instead: None, ..*part };
+                let mut residual = (*part.residual).clone();
+                residual.also.append(&mut troubles);
+                let residual = Arc::new(residual);
+                self.partials.push((pushed, residual.clone()));
+                let part = BrokenPart { frame: None, instead: None, residual: residual.clone(), ..*part };
                 self.left_broken(&request, part);
                 if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
                     last.frame = Some(pushed);

@@ -560,7 +560,7 @@ codes! {
     STILL_BROKEN = "run::still_broken", "what the request names is broken since an earlier request",
         "An earlier request left components of which not all is known, or that are not as the model has them. Plans are made from \
          what is known, so a request that names one of them is refused; everything else goes on. `ID.undo` of the configuration \
-         that broke repairs them, and so do `davit recover --back`, `davit recover --accept` and a shutdown.";
+         that broke repairs them, straight to where it leads, and so do `davit recover --back`, `davit recover --accept` and a shutdown.";
     DOES_NOT_STAND = "run::does_not_stand", "what a configuration stands for did not become true",
         "A configuration says with `holds` what it stands for. All its steps were done, and within its `timeout` (else within \
          `limits.step_timeout_s`) the condition did not become true on what was written after the last of them. So it failed, \

@@ -54,7 +54,7 @@ impl Item {
     }
 
     /// A step by itself.
-    fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
+    pub(crate) fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
         Self { step, call: None, was: None, stage, origin, of: Self::NOWHERE }
     }
 }

@@ -106,6 +106,8 @@ pub enum Reason {
 pub struct Residual {
     /// What it began with.
     pub cause: Reason,
+    /// What else went wrong, where everything was tried (a safe configuration).
+    pub also: Vec<Reason>,
     /// What was done and not taken back: the steps of the partial frame. The model has them.
     pub left: Vec<Step>,
     /// The step back that was withheld, with all behind it: it moves, and nobody asked for that.
@@ -131,6 +133,7 @@ impl Residual {
     pub fn of(cause: Reason) -> Self {
         Self {
             cause,
+            also: Vec::new(),
             left: Vec::new(),
             withheld: None,
             difference: Vec::new(),
@@ -190,7 +193,7 @@ impl Reason {
             Self::Refused(findings) => findings.clone(),
             Self::Broken(residual) => {
                 let mut all = vec![residual.finding(codes::BROKEN)];
-                all.extend(residual.cause.findings());
+                all.extend(std::iter::once(&residual.cause).chain(&residual.also).flat_map(Self::findings));
                 all
             }
             Self::StillBroken(residual) => vec![residual.finding(codes::STILL_BROKEN)],

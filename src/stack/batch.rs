@@ -6,7 +6,7 @@
 //! left out, and the rest is planned anew.
 
 use super::work::{Op, Planned, Work};
-use super::{FrameId, Reason, Request, Requester, Why, World, claims, may_commit, share};
+use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::{Context, PlannedStep};
@@ -14,6 +14,7 @@ use crate::system::Overlay;
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// What requests are judged by, beside the world.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +63,8 @@ pub struct Group {
     pub visits: SmallVec<[Option<FrameId>; 2]>,
     /// What is repaired before the plan is carried out, by its place in [`World::broken`].
     pub repairs: Option<usize>,
+    /// That is repaired by the plan itself, in one net with the undo; when it is done, this is broken no more.
+    pub mends: Option<Arc<Residual>>,
     /// The requester's frames are made permanent.
     pub commits: bool,
     /// A coordinator has come to its *down* state.
@@ -106,6 +109,14 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                 Resolved::Op(op) => {
                     let visit = request.ask.is_undo() && request.scope.is_some();
                     let visit = if let (true, Op::Undo(frame)) = (visit, &op) { Some(*frame) } else { None };
+                    if let (Some(at), Op::Undo(frame)) = (repairs, &op)
+                        && let Some(planned) = world.straight(at, *frame, context)
+                    {
+                        group.mends = Some(world.broken[at].residual.clone());
+                        group.places.push(place);
+                        group.visits.push(visit);
+                        return with_plan(world, requests, group, planned, rules);
+                    }
                     if let Err(refusal) = work.add(&op, context) {
                         refused.push(no(place, request, Reason::Refused(refusal.findings)));
                         continue 'anew;
@@ -132,11 +143,29 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                 }
             }
         }
-        group.told.sort_by_key(|told| told.place);
-        let failed = group.told.iter().filter(|told| told.verdict == Some(Verdict::UndoFailed));
-        group.stay = failed.filter_map(|told| Some((told.place, world.of_visit(&requests[told.place])?))).collect();
-        return group;
+        return told(world, requests, group);
     }
+}
+
+/// The group with its answers in order, and the frames that stay since their undo is refused.
+fn told(world: &World, requests: &[Request], mut group: Group) -> Group {
+    group.told.sort_by_key(|told| told.place);
+    let failed = group.told.iter().filter(|told| told.verdict == Some(Verdict::UndoFailed));
+    group.stay = failed.filter_map(|told| Some((told.place, world.of_visit(&requests[told.place])?))).collect();
+    group
+}
+
+/// A group of one whose plan is there already, if it may be carried out.
+fn with_plan(world: &World, requests: &[Request], mut group: Group, planned: Planned, rules: &Rules<'_>) -> Group {
+    match forbidden(world, requests, &group, &planned, rules) {
+        None => group.planned = Some(planned),
+        Some((_, reason)) => {
+            let place = group.places.remove(0);
+            group.visits.clear();
+            group.told.push(no(place, &requests[place], reason));
+        }
+    }
+    told(world, requests, group)
 }
 
 fn no(place: usize, request: &Request, reason: Reason) -> Told {
@@ -219,7 +248,7 @@ fn resolve<'a>(
                 // Leaving a state undoes the frame of that visit and no other; that of a later one, which has gone before
                 // since it is safe, stands above.
                 (_, Some(scope)) => {
-                    let of = |f: &&std::sync::Arc<super::Frame>| {
+                    let of = |f: &&Arc<super::Frame>| {
                         let of = (f.scope, f.configuration, f.requester);
                         !request.gone && of == (Some(scope), id, request.requester)
                     };
@@ -229,7 +258,9 @@ fn resolve<'a>(
             };
             match found {
                 Some(frame) => {
+                    // A safe configuration was applied to what is broken as it is; taken back, that is as it was.
                     if !repaired
+                        && !frame.safe
                         && !world.broken.is_empty()
                         && let Some(reason) = still_broken(&mut share::components(&frame.footprint).into_iter())
                     {
@@ -258,8 +289,8 @@ fn resolve<'a>(
         }
         Ask::Undo => match work.frames.iter().rev().find(|frame| frame.requester == request.requester) {
             Some(frame) => match still_broken(&mut share::components(&frame.footprint).into_iter()) {
-                Some(reason) => tell(failed, reason),
-                None => Resolved::Op(Op::Undo(frame.id)),
+                Some(reason) if !frame.safe => tell(failed, reason),
+                _ => Resolved::Op(Op::Undo(frame.id)),
             },
             None => tell(failed, Reason::NothingToUndo),
         },
@@ -302,8 +333,8 @@ pub fn may_apply(request: &Request, configuration: &Configuration, operator: &Fx
 }
 
 /// A frame of a coordinator that an operator without force does not meddle with.
-fn foreign(frames: &[std::sync::Arc<super::Frame>], request: &Request) -> Option<ConfigId> {
-    let others = |frame: &&std::sync::Arc<super::Frame>| frame.requester != request.requester;
+fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> {
+    let others = |frame: &&Arc<super::Frame>| frame.requester != request.requester;
     if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
 }
 

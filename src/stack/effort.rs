@@ -5,9 +5,10 @@
 
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{Change, Configuration, StateList, codes};
+use crate::model::{Change, Configuration, StateList, Step, codes};
 use crate::plan::footprint::Footprint;
-use crate::plan::{Context, PlannedStep, plan_on};
+use crate::plan::undo::{absolute, items};
+use crate::plan::{Context, PlannedStep, SavedValue, plan_on};
 use crate::system::{Overlay, System};
 use crate::time::Time;
 use std::sync::Arc;
@@ -40,6 +41,25 @@ pub fn effort(
         },
         Err(_) => piecewise(system, configuration, request, at, context),
     }
+}
+
+/// The frame of a safe configuration of which these steps were not done: it takes back what was.
+pub fn without(frame: Frame, missed: &[Step]) -> Frame {
+    let (mut done, mut gone, mut before) = (Vec::new(), Vec::new(), Vec::new());
+    for planned in frame.steps() {
+        before.push(done.len());
+        match missed.contains(&planned.step) {
+            true => gone.extend(absolute(&planned.step)),
+            false => done.push(planned.clone()),
+        }
+    }
+    // What was overwritten stands at the places of steps.
+    let place = |at: u32| before.get(at as usize).map_or(done.len(), |at| *at);
+    let saved = frame.saved.iter().filter(|saved| !gone.contains(&saved.slot));
+    let saved: Vec<SavedValue> = saved
+        .map(|saved| SavedValue { at: u32::try_from(place(saved.at)).unwrap_or(u32::MAX), ..saved.clone() })
+        .collect();
+    Frame { inverse: Inverse::List(items(&done, &saved)), saved, partial: true, ..frame }
 }
 
 fn piecewise(system: &System, configuration: &Configuration, request: &Request, at: Time, context: &Context) -> Effort {

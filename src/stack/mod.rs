@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -14,6 +14,7 @@ mod batch;
 pub mod claims;
 mod desk;
 mod effort;
+mod mend;
 mod net;
 mod permanent;
 mod prepared;
@@ -29,7 +30,7 @@ mod world;
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
 pub use desk::{Arrival, Desk, GivenUp, Gone, Turn, given_up_of};
-pub use effort::{Effort, effort};
+pub use effort::{Effort, effort, without};
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
@@ -275,6 +276,11 @@ impl Stack {
     /// Takes over all of a transaction.
     pub fn commit(&mut self, planned: Planned) -> Vec<FrameId> {
         self.apply(planned.parts.iter().map(|part| &part.edits), &[])
+    }
+
+    /// Gives values to the frames that take them over.
+    fn hand_over(&mut self, hand: &HandOver) {
+        share::hand_over(&mut self.frames, hand, &|id| id);
     }
 
     /// Puts another frame in the place of that of the same number.

@@ -6,7 +6,7 @@
 use crate::model::{ComponentName, MemberRef, Step};
 use crate::plan::footprint::Slot;
 use crate::plan::undo::{Item, absolute};
-use crate::system::{View, step};
+use crate::system::{View, is_so};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// The net of `items`. `present` is the system they begin in, where it is known; `bound` tells whether a property may be
@@ -51,21 +51,10 @@ fn drop_writes<V: View>(items: Vec<Item>, present: Option<&V>) -> Vec<Item> {
             replaced.insert(*component);
             true
         }
-        step if absolute(step).is_some() => replaced.contains(&step.component()) || !holds(step, present),
+        step if absolute(step).is_some() => replaced.contains(&step.component()) || !is_so(step, present),
         _ => true,
     });
     kept
-}
-
-/// Whether the slot of an absolute write holds its value in `view` already.
-fn holds(step: &Step, view: &impl View) -> bool {
-    match step {
-        Step::PropertySet { property, value } => {
-            view.component(property.component).and_then(|n| n.value(property.member)) == Some(value)
-        }
-        Step::PortWrite { port, value } => step::written(*port, view) == Some(value.as_ref()),
-        _ => false,
-    }
 }
 
 /// What a slot's surviving steps are, newest last.

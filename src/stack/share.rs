@@ -18,6 +18,11 @@ pub struct HandOver {
 }
 
 impl HandOver {
+    /// Values that these frames take over, with nothing undone for it.
+    pub(super) fn to(takers: Vec<(FrameId, Slot, Saved)>) -> Self {
+        Self { takers, ..Self::default() }
+    }
+
     /// The frames that take something over.
     pub fn takers(&self) -> impl Iterator<Item = FrameId> + '_ {
         self.takers.iter().map(|(id, ..)| *id)

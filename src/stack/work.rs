@@ -359,14 +359,17 @@ fn drifted(found: &[Violation]) -> Refusal {
     Refusal { findings, request: 0 }
 }
 
+/// Whether a property may be set only in certain run states: also that of a component that is neither now nor at the end
+/// there.
+pub(super) fn is_bound(property: MemberRef, now: &impl View, end: &impl View) -> bool {
+    let node = now.component(property.component).or_else(|| end.component(property.component));
+    let declared = node.and_then(|n| n.property(property.member));
+    declared.is_none_or(|(_, p)| p.tunable != Tunable::Always)
+}
+
 /// The net of `whole` with the places of its steps in it, when it ends in the same system (`end`) and is shorter.
 fn shorter(system: &System, end: &Overlay<'_>, whole: &[PlannedStep]) -> Option<(Vec<PlannedStep>, Vec<u32>)> {
-    let bound = |property: MemberRef| {
-        // The property of a component that is neither now nor at the end there: taken as bound.
-        let node = system.component(property.component).or_else(|| end.component(property.component));
-        let declared = node.and_then(|n| n.property(property.member));
-        declared.is_none_or(|(_, p)| p.tunable != Tunable::Always)
-    };
+    let bound = |property: MemberRef| is_bound(property, system, end);
     let reduced = net::reduce(whole.iter().map(Item::of).collect(), Some(system), &bound);
     if reduced.len() >= whole.len() {
         return None;

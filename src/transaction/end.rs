@@ -81,8 +81,11 @@ impl Transaction {
         }
         let unsettled = forward.unsettled.iter().map(|i| forward.list[*i as usize].step.clone()).collect();
         self.unsettled = unsettled;
-        let residual =
-            Residual { unsettled: self.unsettled.clone(), quarantined: self.hung(can), ..Residual::of(self.reason()) };
+        let left = self.remaining(0).into_iter().map(|i| forward.list[i as usize].step.clone()).collect();
+        let cause = self.reason();
+        let also = self.failures().into_iter().filter(|reason| *reason != cause).collect();
+        let unsettled = self.unsettled.clone();
+        let residual = Residual { left, also, unsettled, quarantined: self.hung(can), ..Residual::of(cause) };
         let own = self.own();
         let broken = self.broken(0, residual, live.snapshot_some(&own), false);
         self.over(vec![broken]);
@@ -108,6 +111,13 @@ impl Transaction {
     fn hung(&self, can: &Can<'_>) -> Vec<ComponentName> {
         let own = self.own();
         can.quarantined.iter().copied().filter(|component| own.contains(component)).collect()
+    }
+
+    /// What failed so far, and what nobody knows of.
+    pub fn failures(&self) -> Vec<Reason> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let unknown = |i: &u32| Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout };
+        forward.failures.iter().map(|(_, reason)| reason.clone()).chain(forward.unsettled.iter().map(unknown)).collect()
     }
 
     /// That a safe configuration interrupted it, if one did.

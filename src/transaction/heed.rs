@@ -17,6 +17,13 @@ impl Transaction {
         forward.noted.iter().for_each(|(i, revision)| touched.did(&forward.list[*i as usize].step, *revision));
     }
 
+    /// The steps of a best effort that were not done, or of which nobody knows.
+    pub fn missed(&self) -> impl Iterator<Item = &Step> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let failed = forward.failures.iter().map(|(i, _)| i).chain(&forward.unsettled);
+        failed.map(|i| &forward.list[*i as usize].step)
+    }
+
     /// The steps of a best effort that are not over.
     pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
         self.forward.iter().flat_map(Run::open).map(|planned| &planned.step)

@@ -32,7 +32,7 @@ pub use immediate::Doing;
 pub use messages::{Can, Input, Poll, Question, Spec};
 pub use touched::Touched;
 
-use crate::model::{Cause, ComponentName, Outcome, Snapshot, Step};
+use crate::model::{ComponentName, Outcome, Snapshot, Step};
 use crate::plan::PlannedStep;
 use crate::stack::{Planned, Reason};
 use crate::system::System;
@@ -53,6 +53,8 @@ struct Asked {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Forward,
+    /// Of a safe configuration something failed: is it as wanted all the same?
+    Reviewing,
     /// All was done; what the configurations stand for is to become true.
     Standing,
     /// Nothing further begins; what is out comes in.
@@ -236,13 +238,6 @@ impl Transaction {
         open.map(|i| (&forward.list[i as usize], self.undo_of(i, 0)))
     }
 
-    /// What failed so far, and what nobody knows of.
-    pub fn failures(&self) -> Vec<Reason> {
-        let forward = self.forward.as_ref().expect("something was carried out");
-        let unknown = |i: &u32| Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout };
-        forward.failures.iter().map(|(_, reason)| reason.clone()).chain(forward.unsettled.iter().map(unknown)).collect()
-    }
-
     /// The components that it is about.
     pub fn components(&self) -> Vec<ComponentName> {
         self.own()
@@ -352,6 +347,16 @@ impl Transaction {
                         return poll;
                     }
                 }
+                Phase::Reviewing => {
+                    if !std::mem::replace(&mut self.reading, true) {
+                        self.seen = None;
+                        return Poll::Read(self.failed_ones());
+                    }
+                    let Some(seen) = self.seen.take() else { return Poll::Wait };
+                    self.reading = false;
+                    self.review(seen.as_ref(), live);
+                    self.phase = Phase::Standing;
+                }
                 Phase::Stopping => {
                     let run = self.in_hand();
                     if self.held || run.out > 0 {
@@ -412,7 +417,7 @@ impl Transaction {
     /// Whether nothing further of the list in hand is to begin.
     fn is_stopped(&self) -> bool {
         match self.phase {
-            Phase::Forward | Phase::Standing => self.stopped_by.is_some(),
+            Phase::Forward | Phase::Reviewing | Phase::Standing => self.stopped_by.is_some(),
             _ => self.held || self.taken_down,
         }
     }
@@ -422,7 +427,10 @@ impl Transaction {
         match self.phase {
             Phase::Forward => {
                 let forward = self.forward.as_ref().expect("it was carried out");
-                if forward.is_over() && (self.spec.best_effort || !forward.stops() && back::whole(forward)) {
+                let safe = self.spec.best_effort && self.planned.parts.iter().any(|part| part.pushes.is_some());
+                if forward.is_over() && safe && !forward.failures.is_empty() && !self.taken_down {
+                    self.phase = Phase::Reviewing;
+                } else if forward.is_over() && (self.spec.best_effort || !forward.stops() && back::whole(forward)) {
                     self.phase = Phase::Standing;
                 } else {
                     self.phase = Phase::Stopping;

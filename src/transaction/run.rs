@@ -7,7 +7,7 @@ use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, 
 use crate::plan::PlannedStep;
 use crate::stack::Reason;
 use crate::system::touch::components;
-use crate::system::{System, Undo, View as _, Violation, step};
+use crate::system::{System, Undo, View as _, Violation, is_so, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
@@ -334,8 +334,35 @@ impl Run {
         };
         let Some(reason) = refused else { return true };
         self.finish(i);
-        self.failures.push((i, reason));
+        // Where everything is tried, what is so already need not be done, whoever did it; from now on it is wanted so.
+        match self.tries_all && is_so(&self.list[i as usize].step, live) {
+            true => self.note(i, live),
+            false => self.failures.push((i, reason)),
+        }
         false
+    }
+
+    /// What has failed, but is so on what was seen, counts as done.
+    pub fn review(&mut self, actual: &System, live: &mut System) {
+        for (i, reason) in std::mem::take(&mut self.failures) {
+            let step = &self.list[i as usize].step;
+            if !is_so(step, actual) {
+                self.failures.push((i, reason));
+            } else if step::apply(step, live).is_ok() {
+                self.done.push(i);
+                self.note(i, live);
+            } else if is_so(step, live) {
+                self.note(i, live);
+            } else {
+                self.failures.push((i, reason));
+            }
+        }
+    }
+
+    fn note(&mut self, i: u32, live: &System) {
+        if self.notes {
+            self.noted.push((i, live.revision()));
+        }
     }
 
     /// A step was done before this took over; the model has it.
@@ -392,9 +419,7 @@ impl Run {
             self.comes_late(i, live);
         }
         step::effect(&self.list[i as usize].step, live);
-        if self.notes {
-            self.noted.push((i, live.revision()));
-        }
+        self.note(i, live);
         self.finish(i);
         self.done.push(i);
     }

@@ -3,7 +3,8 @@
 use super::messages::{Poll, Question};
 use super::run::Run;
 use super::{Asked, Transaction};
-use crate::model::{Effect, RunState, Snapshot, Step};
+use crate::model::{ComponentName, Effect, RunState, Snapshot, Step};
+use crate::system::touch::components;
 use crate::system::{System, View as _};
 
 /// Whether a step happened.
@@ -21,6 +22,25 @@ fn is_asked(step: &Step, live: &System) -> bool {
 }
 
 impl Transaction {
+    /// The components of steps that failed.
+    pub(super) fn failed_ones(&self) -> Vec<ComponentName> {
+        let run = self.in_hand();
+        let failed = run.failures.iter().flat_map(|(i, _)| components(&run.list[*i as usize].step));
+        let mut failed: Vec<ComponentName> = failed.collect();
+        failed.sort_unstable();
+        failed.dedup();
+        failed
+    }
+
+    /// What failed of a safe configuration and is as wanted all the same (an answer was wrong, or somebody else did it) counts
+    /// as done. What nobody answers of stays as it was told.
+    pub(super) fn review(&mut self, seen: Option<&Snapshot>, live: &mut System) {
+        let (failed, mut actual) = (self.failed_ones(), live.clone());
+        if seen.is_some_and(|seen| actual.adopt(&failed, seen).is_ok()) {
+            self.in_hand_mut().review(&actual, live);
+        }
+    }
+
     /// Settles the calls that name the condition that settles them. None: there are none.
     pub(super) fn settle_by_questions(&mut self, live: &mut System) -> Option<Poll> {
         let mut waits = false;
@@ -50,7 +70,7 @@ impl Transaction {
             let settled = match is {
                 Some(true) => Settled::Happened,
                 Some(false) => Settled::DidNot,
-                None => Settled::Nobody,
+                None => unread(&self.step(step).step, live).unwrap_or(Settled::Nobody),
             };
             self.in_hand_mut().settle(at, settled, live);
         }
@@ -61,9 +81,10 @@ impl Transaction {
 /// What is known of a step of unknown outcome without reading anything; none: it must be read.
 fn unread(step: &Step, live: &System) -> Option<Settled> {
     let Step::Operation(call) = step else { return None };
-    // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known.
+    // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known. What moves
+    // may be moving still, though nothing undoes it.
     let declared = live.component(step.component()).and_then(|node| node.ty.operations.get(&call.operation.member));
-    let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None);
+    let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None && !operation.moves);
     Some(if leaves_nothing { Settled::DidNot } else { Settled::Nobody })
 }
 

@@ -37,6 +37,8 @@ pub struct Bench {
     pub unknown: bool,
     /// Nobody answers who is asked how things are.
     pub blind: bool,
+    /// What is told who asks about values.
+    pub tells: Option<bool>,
 }
 
 /// What all but the last of these configurations lead to, those that are refused left out; and the last.
@@ -66,6 +68,7 @@ impl Bench {
             beside: None,
             unknown: false,
             blind: false,
+            tells: Some(true),
         }
     }
 
@@ -100,7 +103,7 @@ impl Bench {
             match machine.poll(&mut self.model, Time::default(), &can) {
                 Poll::Begin(steps) => out.extend(steps),
                 Poll::Cancel(_) => {}
-                Poll::Ask(question) => machine.on(Input::Told { question, is: Some(true) }, &mut self.model),
+                Poll::Ask(question) => machine.on(Input::Told { question, is: self.tells }, &mut self.model),
                 Poll::Read(components) => {
                     let seen = self.platform.snapshot_some(&components);
                     machine.on(Input::Seen((!self.blind).then_some(seen)), &mut self.model);

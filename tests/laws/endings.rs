@@ -4,13 +4,66 @@ use crate::atomicity::{Bench, in_force};
 use crate::generate::{self, context, read};
 use crate::plans::operator;
 use crate::settings;
-use davit::model::ConfigId;
-use davit::stack::{Ending, Endings, Op, transaction};
+use davit::model::monitor::{Condition, ConditionKind};
+use davit::model::{
+    Call, Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Effect, Ident,
+    OperationType, Origin, TypeName,
+};
+use davit::stack::{Ending, Endings, Op, Stack, transaction};
+use davit::system::System;
 use davit::transaction::{Input, PartEnd, Stopping, can_fail, endings};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A call that leaves nothing to take back, of which nobody knows: broken where it moves, and else nothing need be known. The
+/// condition that settles it decides, where it can be seen.
+#[test]
+fn what_leaves_nothing_behind_is_broken_only_while_it_may_move() {
+    let (look, name) = (Ident::new("look").unwrap(), ComponentName::new("a").unwrap());
+    let change = |kind| Change { kind, origin: Origin::NONE };
+    let calls = Configuration {
+        changes: vec![
+            change(ChangeKind::Create {
+                component: name,
+                ty: TypeName::new("Node").unwrap(),
+                activity: None,
+                properties: BTreeMap::new(),
+            }),
+            change(ChangeKind::OperationCall { call: Call { operation: name.member(look), args: vec![] }, undo: None }),
+        ],
+        ..Configuration::new(ConfigId::new("calls").unwrap())
+    };
+    for (moves, settles, tells, worst) in [
+        (false, false, None, Ending::Failed),
+        (true, false, None, Ending::Broken),
+        (false, true, None, Ending::Failed),
+        (true, true, None, Ending::Broken),
+        (true, true, Some(false), Ending::Failed),
+        (true, true, Some(true), Ending::Done),
+    ] {
+        let settled_by = settles.then(|| Condition::new(ConditionKind::Faulted(name)));
+        let operation = OperationType { moves, settled_by, ..OperationType::new(Effect::None) };
+        let mut ty = ComponentType::new("Node", "What is called.");
+        ty.operations.insert(look, operation);
+        let mut catalogue = Catalogue::new();
+        assert!(catalogue.insert(ty).is_none());
+        let system = System::new(Arc::new(catalogue));
+        let planned = transaction(&system, &Stack::new(8), &[operator(&calls)], &context()).unwrap();
+        let may = endings(&can_fail(&planned), Stopping::Not, true);
+        let mut bench = Bench::new(&system, vec![2], vec![0]);
+        (bench.unknown, bench.tells) = (true, tells);
+        let ends = bench.drive(planned);
+        let how: Endings = ends.iter().map(PartEnd::ending).collect();
+        assert_eq!(how[..], [worst], "moves: {moves}, settled by {settles} {tells:?}");
+        assert!(may.contains(&how), "{may:?}");
+        if let [PartEnd::Broken(of)] = &ends[..] {
+            assert_eq!(of.residual.unsettled.len(), 1);
+        }
+    }
+}
 
 #[test]
 fn a_transaction_ends_as_check_follows_it() {

@@ -14,6 +14,7 @@ mod motion;
 mod plain;
 mod plans;
 mod prepared;
+mod repair;
 mod stacks;
 
 /// How many cases each law is tried on.

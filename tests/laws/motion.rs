@@ -13,7 +13,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 /// The same types, of which starting, stopping and half of the operations move something.
-fn moving(catalogue: &Catalogue) -> Arc<Catalogue> {
+pub fn moving(catalogue: &Catalogue) -> Arc<Catalogue> {
     let mut all = Catalogue::new();
     for ty in catalogue.iter() {
         let mut ty = (**ty).clone();

@@ -1,0 +1,223 @@
+//! What is broken is brought to where the model has it: by itself, or with the undo that asks for it.
+
+use super::engine::Engine;
+use super::inbox::Reply;
+use super::pool::Call;
+use super::progress::Progress;
+use super::request::{Reason, Request};
+use super::running::Running;
+use super::teardown::own_plan;
+use crate::limits;
+use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
+use crate::plan::undo::in_order;
+use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
+use crate::system::{self, View as _, step};
+use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
+use std::sync::Arc;
+
+/// Who has something repaired.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum By {
+    /// An operator who recovers, without force.
+    Recovery,
+    /// The request of a batch under way, by that number: the undo of what broke it.
+    Request(u32),
+    /// Nobody: a component came back.
+    Nobody,
+}
+
+impl Engine {
+    /// Safe configurations that have come are applied first: they move, and nothing else does.
+    pub(super) fn after_safe(&mut self) {
+        loop {
+            self.serve_safe();
+            if !self.running.iter().any(Running::is_safe) {
+                return;
+            }
+            if !self.advance_all() {
+                self.pump(self.running_until());
+            }
+        }
+    }
+
+    /// Mends what a request is about to undo. False: it was answered, since that does not go.
+    pub(super) fn repair_for(&mut self, number: u32, at: usize) -> bool {
+        let Some(request) = self.desk.turn_of(number).map(|turn| turn.batch.requests[0]) else { return false };
+        match self.repair(at, By::Request(number)) {
+            Ok(()) => true,
+            Err(residual) => {
+                self.answer(request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
+                false
+            }
+        }
+    }
+
+    /// What is repaired in one net with its undo is broken no more when that is done, and where that has left something, it
+    /// is told by that. Where nothing of it was done it is broken as before.
+    pub(super) fn mended(&mut self, group: &Group, mut parts: Vec<PartEnd>, interrupted: bool) -> Vec<PartEnd> {
+        let Some(of) = &group.mends else { return parts };
+        match parts.first_mut() {
+            Some(PartEnd::Done | PartEnd::Broken(_)) => self.forget_broken(of),
+            Some(part @ PartEnd::Failed(_)) if !interrupted => {
+                let Some(at) = self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of)) else {
+                    return parts;
+                };
+                if let (Some(cause), broken) = (part.reason(), self.world.broken.remove(at)) {
+                    let difference = system::diff(&self.world.as_meant(&broken), &self.world.system);
+                    let residual = Arc::new(Residual { cause, difference, ..(*broken.residual).clone() });
+                    self.world.broken.insert(at, Broken { residual: residual.clone(), ..broken });
+                    *part = PartEnd::Broken(Box::new(BrokenPart {
+                        residual,
+                        frame: None,
+                        instead: None,
+                        expected: Snapshot::default(),
+                    }));
+                }
+            }
+            _ => {}
+        }
+        parts
+    }
+
+    pub(super) fn forget_broken(&mut self, of: &Arc<Residual>) {
+        if let Some(at) = self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of)) {
+            let broken = self.world.broken.remove(at);
+            self.world.hand_meant(&broken);
+        }
+        self.changed();
+    }
+
+    /// The request that something is repaired for; one that a safe configuration has overtaken is marked since.
+    fn request_of(&self, by: By) -> Option<&Request> {
+        let By::Request(number) = by else { return None };
+        self.desk.turn_of(number).and_then(|turn| turn.batch.requests.first())
+    }
+
+    /// Whether something may move for who has it repaired: asked only when it is known what, since a safe configuration may come
+    /// while it is looked.
+    fn may_move(&self, by: By) -> bool {
+        match by {
+            By::Recovery => self.world.stack.safe().next().is_none(),
+            By::Request(_) => self
+                .request_of(by)
+                .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request)),
+            By::Nobody => false,
+        }
+    }
+
+    /// Brings what is broken to where the model has it. What is unsettled is accepted by that.
+    pub(super) fn repair(&mut self, at: usize, by: By) -> Result<(), Arc<Residual>> {
+        let serves = self.request_of(by).map_or(RequestId(0), |request| request.id);
+        let broken = self.world.broken.remove(at);
+        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
+        let mut observed = self.read(&components);
+        let mut withheld = None;
+        if observed {
+            self.note_quarantine();
+            // Made of what is there now: others go on while it is looked.
+            let steps = self.world.mending(&broken);
+            let hung = |step: &Step| self.world.quarantined.contains(&step.component());
+            let steps: Vec<Step> =
+                steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
+            let moves = system::diff::moves_any(&steps, &self.world.system);
+            let asked = self.may_move(by);
+            if moves && !asked && self.world.stack.safe().next().is_some() {
+                withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
+            }
+            if !steps.is_empty() && (asked || !moves) {
+                let list = in_order(&self.world.system, steps).unwrap_or_default();
+                let plan = own_plan(list, &self.world.system);
+                let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
+                let _ = self.carry_out_for(serves, Transaction::new(plan, spec));
+                observed = self.read(&components);
+            }
+        }
+        let wanted = self.world.as_meant(&broken);
+        // A call that is out still may happen yet.
+        let out = || {
+            let out = |step: &Step| self.world.quarantined.contains(&step.component());
+            broken.residual.unsettled.iter().any(out)
+        };
+        if observed && system::diff::reached(&self.world.system, &wanted) && !out() {
+            self.world.hand_meant(&broken);
+            self.drop_empty(broken.frame);
+            self.changed();
+            return Ok(());
+        }
+        let mut faulted: Vec<ComponentName> = Vec::new();
+        for node in components.iter().filter_map(|name| self.world.system.component(*name)) {
+            if node.state == RunState::Faulted
+                && wanted.component(node.name).is_none_or(|w| w.state != RunState::Faulted)
+            {
+                faulted.push(node.name);
+            }
+        }
+        let residual = Arc::new(Residual {
+            difference: system::diff(&wanted, &self.world.system),
+            faulted,
+            quarantined: self.world.quarantined.clone(),
+            observed,
+            withheld: withheld.or_else(|| broken.residual.withheld.clone()),
+            ..(*broken.residual).clone()
+        });
+        self.world.broken.insert(at.min(self.world.broken.len()), Broken { residual: residual.clone(), ..broken });
+        self.changed();
+        Err(residual)
+    }
+
+    /// A partial frame that holds nothing to take back is gone with what was broken.
+    fn drop_empty(&mut self, frame: Option<FrameId>) {
+        let Some(frame) = frame.and_then(|frame| self.world.stack.frame(frame)) else { return };
+        if frame.partial && frame.floor.is_none() && matches!(&frame.inverse, Inverse::List(items) if items.is_empty())
+        {
+            let edits = Edits { pops: vec![(frame.id, HandOver::default())], ..Edits::default() };
+            self.world.stack.apply([&edits], &[]);
+        }
+    }
+
+    /// Reads some components back into the model. False: nobody answered, or a safe configuration touched them each time while
+    /// it was looked: what was seen then may be from before that.
+    fn read(&mut self, components: &[ComponentName]) -> bool {
+        for _ in 0..limits::LOOKS_AGAIN {
+            let before: Vec<Option<u64>> = components.iter().map(|name| self.generation(*name)).collect();
+            let Some(Reply::Observed(Ok(seen))) = self.ask(Call::ObserveSome(components.to_vec())) else {
+                return false;
+            };
+            self.after_safe();
+            if components.iter().zip(&before).any(|(name, before)| self.generation(*name) != *before) {
+                continue;
+            }
+            let Ok(changed) = self.world.system.adopt(components, &seen) else { return false };
+            if changed {
+                self.switches.clear();
+                self.changed();
+            }
+            return true;
+        }
+        false
+    }
+
+    /// A component came back from a call that had never returned: what could not be mended because of it may be now. By
+    /// itself nothing moves.
+    pub(super) fn mend(&mut self) {
+        self.note_quarantine();
+        let mut at = 0;
+        while at < self.world.broken.len() {
+            if self.world.broken[at].mendable && self.repair(at, By::Nobody).is_ok() {
+                if let Some(progress) = &self.progress {
+                    progress(&Progress::Recovered);
+                }
+            } else {
+                at += 1;
+            }
+        }
+    }
+
+    /// Reads what is broken back into the model. False: nobody answered.
+    pub(super) fn read_broken(&mut self, at: usize) -> bool {
+        let components: Vec<ComponentName> = self.world.broken[at].components.iter().copied().collect();
+        let observed = self.read(&components);
+        self.note_quarantine();
+        observed
+    }
+}

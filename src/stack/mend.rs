@@ -1,0 +1,189 @@
+//! What is broken, brought to where the model has it; and with an undo that takes that back anyway, straight to where the
+//! undo leads.
+//!
+//! Mended first and undone then, a component that is not running, though the platform had said so, would be started to be
+//! stopped at once: it would move, and nobody asked for that. So both are one net, from what is there to what the undo
+//! leads to (design §6).
+
+use super::work::{Op, Planned, is_bound, transaction};
+use super::{Broken, FrameId, HandOver, World, net};
+use crate::model::{ComponentName, MemberRef, Origin, Step};
+use crate::plan::footprint::{Footprint, Index, Saved, Slot};
+use crate::plan::undo::{Item, Script, absolute};
+use crate::plan::{Context, PlannedStep, SavedValue, Stage, StepId};
+use crate::system::touch::{Access, touches};
+use crate::system::{Overlay, System, View as _, diff, step};
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+impl World {
+    /// The picture with something broken as the model has it.
+    pub fn as_meant(&self, broken: &Broken) -> System {
+        let mut meant = self.system.clone();
+        self.put_meant(broken, &mut meant);
+        meant
+    }
+
+    /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it since is
+    /// as that wrote it.
+    pub fn put_meant(&self, broken: &Broken, system: &mut System) {
+        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
+        let _ = system.adopt(&components, &broken.expected);
+        for (_, saved) in self.overwritten(broken) {
+            let written = match saved.slot {
+                Slot::Property(property) => {
+                    let value = self.system.component(property.component).and_then(|node| node.value(property.member));
+                    value.map(|value| Step::PropertySet { property, value: value.clone() })
+                }
+                Slot::Port(port) => {
+                    step::written(port, &self.system).map(|value| Step::PortWrite { port, value: value.cloned() })
+                }
+                _ => None,
+            };
+            let there = |member: MemberRef| {
+                let node = system.component(member.component);
+                node.is_some_and(|node| node.property(member.member).is_some() || node.port(member.member).is_some())
+            };
+            let written = written.filter(|_| matches!(saved.slot, Slot::Property(of) | Slot::Port(of) if there(of)));
+            // Not a step that is done: nothing need allow it.
+            written.iter().for_each(|step| step::effect(step, system));
+        }
+    }
+
+    /// What safe configurations in force overwrote of something broken: the frame of the first of each slot.
+    fn overwritten<'w>(&'w self, broken: &'w Broken) -> impl Iterator<Item = (FrameId, &'w SavedValue)> {
+        let frames = self.stack.frames().iter().filter(|frame| frame.safe);
+        let saved = frames.flat_map(|frame| frame.saved.iter().map(|saved| (frame.id, saved)));
+        let mut met: Vec<Slot> = Vec::new();
+        saved.filter(move |(_, saved)| {
+            let own = broken.components.contains(&saved.slot.components().0) && !met.contains(&saved.slot);
+            met.extend(own.then_some(saved.slot));
+            own
+        })
+    }
+
+    /// Something is broken no more: what safe configurations in force overwrote of it goes back to what the model had there.
+    pub fn hand_meant(&mut self, broken: &Broken) {
+        let meant = |slot: Slot| match slot {
+            Slot::Property(property) => {
+                let one = broken.expected.components.get(&property.component)?;
+                Some(Saved::Property(one.properties.get(&property.member)?.clone()))
+            }
+            Slot::Port(port) => Some(Saved::Port(broken.expected.ports.get(&port).cloned())),
+            _ => None,
+        };
+        let all = self.overwritten(broken).filter_map(|(frame, saved)| Some((frame, saved.slot, meant(saved.slot)?)));
+        let hand = HandOver::to(all.collect());
+        self.stack.hand_over(&hand);
+    }
+
+    /// What mends something broken, on the picture as it is. Nothing of it undoes what a safe configuration in force wrote or
+    /// demanded: those come also to what is broken.
+    pub fn mending(&self, broken: &Broken) -> Vec<Step> {
+        let meant = self.as_meant(broken);
+        let mut steps = diff(&self.system, &meant);
+        let before = steps.len();
+        steps.retain(|step| !self.is_safe_ones(step, &meant));
+        if steps.len() < before {
+            // One that comes after what was left out may not be possible.
+            let mut view = Overlay::new(&self.system);
+            steps.retain(|step| step::apply(step, &mut view).is_ok());
+        }
+        steps
+    }
+
+    /// Whether a step would change what a safe configuration in force wrote or demanded.
+    fn is_safe_ones(&self, step: &Step, wanted: &System) -> bool {
+        let mut safe = self.stack.frames().iter().filter(|frame| frame.safe).peekable();
+        if safe.peek().is_none() {
+            return false;
+        }
+        let touches = touches(step, None, wanted).into_iter().filter(|touch| touch.access != Access::Need).collect();
+        let index = Index::new(&Footprint { touches }, |_| true);
+        let written = absolute(step);
+        safe.any(|frame| {
+            let touches = &frame.footprint.touches;
+            touches.iter().any(|touch| index.shares(touch)) || written.is_some_and(|slot| frame.footprint.writes(slot))
+        })
+    }
+
+    /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be
+    /// mended to be taken back at once, and each goes by itself.
+    pub fn straight(&self, at: usize, frame: FrameId, context: &Context) -> Option<Planned> {
+        let broken = &self.broken[at];
+        let wanted = self.as_meant(broken);
+        let mend = diff(&self.system, &wanted);
+        let out = broken.residual.unsettled.iter().any(|step| self.quarantined.contains(&step.component()));
+        if mend.is_empty() || out {
+            return None;
+        }
+        let undo = transaction(&wanted, &self.stack, &[Op::Undo(frame)], context).ok()?;
+        let mut end = wanted.clone();
+        for planned in undo.steps.iter() {
+            step::apply(&planned.step, &mut end).ok()?;
+        }
+        let mends = mend.len();
+        let alone = |step| Item::bare(step, Stage::Changes, Origin::NONE);
+        let items = mend.into_iter().map(alone).chain(undo.steps.iter().map(Item::of)).collect();
+        let shorter = self.spared(items, mends, &wanted);
+        if shorter.iter().filter(|item| (item.of as usize) < mends).count() == mends {
+            return None;
+        }
+        let calls = undo.steps.iter().any(|planned| matches!(planned.step, Step::Operation(_)));
+        let steps = self.leads_to(shorter, &end).or_else(|| {
+            // What lies between the two does not matter where nothing is called there.
+            let whole = diff(&self.system, &end).into_iter().map(alone).collect();
+            if calls { None } else { self.leads_to(whole, &end) }
+        })?;
+        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted)) {
+            return None;
+        }
+        let mut parts = undo.parts;
+        parts.iter_mut().for_each(|part| part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that"));
+        let revision = self.system.revision();
+        Some(Planned { steps: Arc::new(steps), of: Vec::new(), whole: Vec::new(), parts, revision, ..undo })
+    }
+
+    /// The net of `items`, of which the first so many mend and the others undo, each with its place among them. A call needs
+    /// no run state: nothing moves to be as it was for one, and back.
+    fn spared(&self, mut items: Vec<Item>, mends: usize, wanted: &System) -> Vec<Item> {
+        (0..).zip(&mut items).for_each(|(place, item)| item.of = place);
+        let mended = |item: &Item| (item.of as usize) < mends;
+        let bound = |property: MemberRef| is_bound(property, &self.system, wanted);
+        let mut net = net::reduce(items, Some(&self.system), &bound);
+        let mut at = 0;
+        while at < net.len() {
+            if let Step::State { component, transition } = &net[at].step
+                && mended(&net[at])
+                && step::moves(&net[at].step, wanted)
+            {
+                let next = |item: &Item| matches!(&item.step, Step::State { component: of, .. } if of == component);
+                let back = Step::State { component: *component, transition: transition.inverse() };
+                let later = net[at + 1..].iter().position(next).map(|later| at + 1 + later);
+                if let Some(later) = later.filter(|later| net[*later].step == back && !mended(&net[*later])) {
+                    net.remove(later);
+                    net.remove(at);
+                    continue;
+                }
+            }
+            at += 1;
+        }
+        net
+    }
+
+    /// The steps, one after the other, if they lead from what is there to `end`.
+    fn leads_to(&self, items: Vec<Item>, end: &System) -> Option<Vec<PlannedStep>> {
+        let mut view = Overlay::new(&self.system);
+        let mut script = Script::new(&mut view);
+        for item in items {
+            let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
+            script.add(item, 0, &after).ok()?;
+        }
+        let steps = script.finish().ok()?;
+        let mut reached = self.system.clone();
+        for planned in &steps {
+            step::apply(&planned.step, &mut reached).ok()?;
+        }
+        diff(&reached, end).is_empty().then_some(steps)
+    }
+}
