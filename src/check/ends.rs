@@ -139,7 +139,9 @@ impl Product<'_> {
         let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
         let unknown = (self.tells_all && self.worlds.top(state.world).is_some()).then_some(u8::MAX);
         if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
-            state.unconfirmed.push(Unconfirmed { place, request: Request { why: Why::Asked, ..*request } });
+            // In which state it was asked for means nothing any more.
+            let request = Request { why: Why::Asked, tag: (0, 0), ..*request };
+            state.unconfirmed.push(Unconfirmed { place, request });
         }
     }
 

@@ -66,9 +66,8 @@ impl Shapes {
         }
         // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
         let of = |by: Requester| frames.iter().filter(|frame| frame.requester == by).count();
-        let filling = |a: &Frame, b: &Frame| {
-            a.requester == b.requester && !stack.has_room(a.requester, of(a.requester))
-        };
+        let filling =
+            |a: &Frame, b: &Frame| a.requester == b.requester && !stack.has_room(a.requester, of(a.requester));
         let mut counted = Vec::with_capacity(kept.len());
         let mut ids = Vec::with_capacity(kept.len());
         while !kept.is_empty() {

@@ -180,8 +180,8 @@ pub struct Next {
 pub enum Trouble {
     /// The request is refused.
     Refused(Request, Rc<Findings>),
-    /// Nobody hears that this is lost.
-    Unheard(ConfigId),
+    /// Nobody hears that this is lost, or was taken back unconfirmed.
+    Unheard(ConfigId, Verdict),
 }
 
 /// All that follows from a state.

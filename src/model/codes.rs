@@ -501,6 +501,11 @@ codes! {
          coordinator hears `ID.lost`, in whatever state it is. On the way shown it is in a state in which no transition hears \
          it, so it would go on as if nothing had happened. Add a transition on `ID.lost` to a state around all in which the \
          configuration may be in force.";
+    COORD_REVERTED_UNHEARD = "coord::reverted_unheard", "nobody hears that a configuration was taken back unconfirmed",
+        "A configuration with `confirm` is taken back when its event does not come in time, and the coordinator hears \
+         `ID.reverted`, in whatever state it is: it is no answer to a state. On the way shown it is in a state in which no \
+         transition hears it, so it would go on as if the configuration were in force. Add a transition on `ID.reverted` to a \
+         state around all in which the configuration may wait for its confirmation, or wait for the event before going on.";
     COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
         "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
          neither from inside nor from outside. Only a forced shutdown gets the system out. Where the state waits for answers, \

@@ -134,14 +134,13 @@ impl World {
 }
 
 impl Request {
-    /// A request as it is told of: what took back a frame that was not confirmed tells of that frame's configuration.
+    /// A request as it is told of: what took back a frame that was not confirmed tells of that frame's configuration. Why it
+    /// is there stays with it: so it is no answer to a state.
     pub fn as_told(self, verdict: Verdict) -> (Self, Verdict) {
-        let told = Self { why: Why::Asked, ..self };
         match (self.why, verdict, self.ask) {
             (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
-                (Self { ask: Ask::Apply(id), ..told }, Verdict::Reverted)
+                (Self { ask: Ask::Apply(id), ..self }, Verdict::Reverted)
             }
-            (Why::Unconfirmed(..), ..) => (told, verdict),
             _ => (self, verdict),
         }
     }

@@ -136,8 +136,7 @@ fn a_floor_of_one_coordinator_is_none_for_another() {
 /// waits for neither answer.
 #[test]
 fn a_way_may_give_up_what_has_nothing_to_do() {
-    let configurations =
-        "base = Configuration { create(\"a\", \"Drive\"), create(\"b\", \"Drive\") },
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), create(\"b\", \"Drive\") },
         x = Configuration { property_set(\"a.gain\", 2.0) }, y = Configuration { property_set(\"b.gain\", 3.0) },";
     let states = "idle = state {}, building = state { entry = \"base\" },
         up = state { one = state { entry = \"x\" }, two = state { entry = \"y\" },

@@ -103,6 +103,41 @@ fn what_is_reverted_is_followed() {
     assert!(refused.iter().any(|(_, message)| message.contains("there is no component `b`")), "{:#}", said.0);
 }
 
+/// That a frame was taken back unconfirmed is no answer to the state that asked: it is heard wherever the coordinator is by
+/// then, in the running deployment too (the script of the way), and has to be.
+#[test]
+fn what_is_reverted_is_heard_wherever_the_coordinator_is() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },
+        try = Configuration { create(\"b\", \"Drive\"), confirm = { event = \"e_fine\", within = 1.0 } },
+        use = Configuration { property_set(\"b.gain\", 2.0) },";
+    let said = |heard: &str| {
+        let states = format!(
+            "{STATES} trying = state {{ entry = \"try\" }}, tried = state {{}}, using = state {{ entry = \"use\" }},
+             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_try\" }} }},
+             trans {{ src = \"trying\", tgt = \"tried\", events = {{ \"try.ok\", \"try.failed\", \"try.broken\" }} }},
+             trans {{ src = \"{heard}\", tgt = \"using\", events = {{ \"try.reverted\" }} }},
+             trans {{ src = \"trying\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"tried\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"using\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},"
+        );
+        Small::new(configurations, &states, "").check()
+    };
+    let heard = said("tried");
+    let refused = heard.refused("use");
+    assert!(refused.iter().any(|(_, message)| message.contains("there is no component `b`")), "{:#}", heard.0);
+    // On the way down its own undo takes it back; behind one that failed it is said, and no more.
+    let behind = heard.of("coord::reverted_unheard");
+    assert!(behind.iter().all(|found| found["severity"] == "info"), "{:#}", heard.0);
+    // Only in the state that asked, which is left by then.
+    let deaf = said("trying");
+    assert!(deaf.refused("use").iter().all(|(severity, _)| *severity == "info"), "{:#}", deaf.0);
+    let found = deaf.of("coord::reverted_unheard");
+    assert_eq!(found.len(), 1, "{:#}", deaf.0);
+    assert_eq!(found[0]["severity"], "warning");
+    let message = found[0]["message"].as_str().unwrap();
+    assert!(message.contains("`try.reverted` in root.tried"), "{message}");
+}
+
 /// After something broke, a safety event must be heard still.
 #[test]
 fn after_broken_safety_events_are_heard() {
