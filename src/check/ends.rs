@@ -39,7 +39,12 @@ impl Product<'_> {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
             }
         }
-        for endings in endings(&comes.can_fail, Stopping::Not, self.tells_all) {
+        for (place, reasons) in &comes.hollow {
+            if requests[*place].requester != Requester::Operator {
+                nexts.troubles.push(Trouble::Hollow(requests[*place], reasons.clone()));
+            }
+        }
+        for endings in comes.endings(Stopping::Not, self.tells_all) {
             let from = nexts.all.len();
             self.ends_so(state, number, &requests, &comes, &endings, nexts);
             if endings.iter().all(|ending| *ending == Ending::Done) {
@@ -191,7 +196,7 @@ impl Product<'_> {
         for count in some..=given_up.len() {
             let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
             met.push(k);
-            for endings in endings(&comes.can_fail, Stopping::GivenUp(k), self.tells_all) {
+            for endings in comes.endings(Stopping::GivenUp(k), self.tells_all) {
                 self.ends_so(state, number, &requests, &comes, &endings, nexts);
             }
         }

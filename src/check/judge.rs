@@ -29,6 +29,7 @@ impl Graph<'_, '_> {
     pub fn judge(&mut self) -> Traced {
         let mut found = Traced::new();
         self.refusals(&mut found);
+        self.hollow(&mut found);
         self.growing(&mut found);
         self.unheard(&mut found);
         self.endless(&mut found);
@@ -142,6 +143,33 @@ impl Graph<'_, '_> {
                 "give each coordinator components of its own, or let one ask the other by an event".to_owned()
             }
         })
+    }
+
+    /// What can only fail, since what it stands for is false where it is applied.
+    fn hollow(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<ConfigId> = FxHashSet::default();
+        for (at, trouble) in self.firsts(&self.troubles) {
+            let Trouble::Hollow(request, reasons) = trouble else { continue };
+            let (Ask::Apply(id), Some(reason)) = (request.ask, reasons.first()) else { continue };
+            if !said.insert(id) {
+                continue;
+            }
+            let severity = match self.failed[at as usize] {
+                Failed::Nothing => Severity::Error,
+                Failed::Apply => Severity::Warning,
+                Failed::Undo | Failed::Broken => Severity::Info,
+            };
+            let number = self.product.member(request.requester);
+            let shared =
+                number.is_some_and(|n| self.shares(n, request.ask) || !self.product.members[n].chart.is_pure());
+            let severity = if shared { severity.min(Severity::Warning) } else { severity };
+            let mut trace = self.trace(at);
+            if let Some(last) = trace.last_mut() {
+                let within = self.product.fails_within(request.ask, &reasons);
+                last.replay.then = Some((request.ask.failed().event(request.ask), within));
+            }
+            found.push((Finding { severity, ..reason.clone() }, trace));
+        }
     }
 
     /// Within what time a confirmation was to come, where a request takes back what was not confirmed.

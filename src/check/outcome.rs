@@ -1,7 +1,8 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
 use crate::model::{ConfigId, Findings};
-use crate::stack::{Ending, FrameId, Group, Request};
+use crate::stack::{Ending, Endings, FrameId, Group, Request};
+use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 use std::rc::Rc;
 
@@ -54,6 +55,8 @@ pub struct Comes {
     pub group: Group,
     /// Those that are told because they are refused.
     pub refused: Vec<(usize, Rc<Findings>)>,
+    /// Those that can only fail, since what they stand for is false when all is done.
+    pub hollow: Vec<(usize, Rc<Findings>)>,
     /// Of each part of the group, whether something in it can fail.
     pub can_fail: SmallVec<[bool; 2]>,
     /// When all is done.
@@ -71,6 +74,13 @@ impl Comes {
             Some((part, Ending::Failed)) => self.stopped[part].1.as_ref(),
             _ => None,
         }
+    }
+
+    /// How it may end. What says of itself what is false does not end as done.
+    pub fn endings(&self, stop: Stopping<'_>, each: bool) -> impl Iterator<Item = Endings> + use<> {
+        let hollow = !self.hollow.is_empty();
+        let all_done = |endings: &Endings| endings.iter().all(|ending| *ending == Ending::Done);
+        endings(&self.can_fail, stop, each).into_iter().filter(move |endings| !hollow || !all_done(endings))
     }
 
     /// So many requests are settled then.

@@ -7,9 +7,11 @@
 
 use super::outcome::Beside;
 use super::product::Product;
+use super::stands::takes_time;
 use super::state::{Move, Next, State};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
+use crate::model::codes::CONF_HOLDS_NEVER;
+use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
 use crate::stack::{Request, Why};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
@@ -85,6 +87,13 @@ impl Product<'_> {
                 && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
             {
                 all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
+            }
+            let stands = |(request, verdict): &(Request, Verdict)| match request.ask {
+                Ask::Apply(id) if *verdict == Verdict::Ok => self.worlds.configuration(id).is_some_and(takes_time),
+                _ => false,
+            };
+            if next.answers.iter().any(stands) {
+                all[k].does = Does::Cannot("what it stands for becomes true only with time");
             }
             if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
                 all[k].does = Does::Cannot("what is there is not known any more");
@@ -249,6 +258,12 @@ impl Product<'_> {
         let within = self.worlds.configuration(id)?.confirm?.within;
         let applied = |k: &usize| way[*k].1.answers.iter().any(|(r, verdict)| r.ask == ask && *verdict == Verdict::Ok);
         (0..before).rev().find(applied).map(|k| times[k] + within)
+    }
+
+    /// Within what time a request that is not carried out for these reasons is answered so.
+    pub(super) fn fails_within(&self, ask: Ask, reasons: &[Finding]) -> Duration {
+        let waits = reasons.first().is_some_and(|reason| reason.code == CONF_HOLDS_NEVER);
+        if waits { self.patience(ask) + limits::REPLAY_STEP * 2 } else { Duration::ZERO }
     }
 
     /// How long a step of a request may take.

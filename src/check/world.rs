@@ -47,7 +47,7 @@ struct Exact {
 
 /// All worlds that were met.
 pub struct Worlds<'a> {
-    deployment: &'a Deployment,
+    pub(super) deployment: &'a Deployment,
     pub(super) configurations: FxHashMap<ConfigId, Configuration>,
     operator: FxHashSet<ConfigId>,
     /// What requests may touch, by their text.
@@ -62,6 +62,8 @@ pub struct Worlds<'a> {
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
     pub(super) asked: FxHashSet<ConfigId>,
+    /// Configurations of which it can be told whether what they stand for is true.
+    pub(super) judged: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
     pub(super) warned: FxHashSet<(Code, String)>,
@@ -94,6 +96,7 @@ impl<'a> Worlds<'a> {
             safes: FxHashMap::default(),
             helds: FxHashMap::default(),
             asked: FxHashSet::default(),
+            judged: FxHashSet::default(),
             warnings: Vec::new(),
             warned: FxHashSet::default(),
         };

@@ -238,6 +238,11 @@ codes! {
          what the configuration stands for counts as true there while none of the components that it looks at is faulted, and \
          `davit status` shows the frame as not observed. On a platform whose components run it is evaluated; until then \
          nobody has seen that it ever becomes true.";
+    CONF_HOLDS_NEVER = "conf::holds_never", "a configuration is applied where what it stands for cannot be true",
+        "With `holds` a configuration says what must be true once it has been applied. Run states are known beforehand: on the \
+         way shown the condition is false after its last step, whatever its ports carry, and nobody else can make it true \
+         before its time is over. So the request can only end *failed*, and is taken back. Let the configuration bring the \
+         components there itself (`post_conf_state`), ask for it where they are there already, or correct the condition.";
     CONF_CONFIRM_CONTRADICTED = "conf::confirm_contradicted", "`confirm` stands beside `safe` or `on_failure = \"hold\"`",
         "`confirm` says that the configuration is undone when an event does not come in time. A safe configuration stays in \
          force until somebody undoes it, and `on_failure = \"hold\"` says that nothing is undone unasked: both at once \
