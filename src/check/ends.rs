@@ -270,9 +270,9 @@ impl Product<'_> {
             nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
         }
         // Where a piece of it cannot be planned, it is done as far as it goes, and all is known of that.
-        let (verdict, class) = match comes.troubles.is_empty() {
-            true => (Verdict::Ok, Failed::Nothing),
-            false => (Verdict::Broken, Failed::Broken),
+        let (verdict, class) = match comes.verdict {
+            Verdict::Ok => (Verdict::Ok, Failed::Nothing),
+            other => (other, Failed::Broken),
         };
         let mut next = over.clone();
         self.go(&mut next, &comes.done);

@@ -1,6 +1,6 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
-use crate::model::{ConfigId, Findings};
+use crate::model::{ConfigId, Findings, Verdict};
 use crate::stack::{Ending, Endings, FrameId, Group, Request};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
@@ -99,6 +99,8 @@ impl Comes {
 pub struct SafeComes {
     /// When all of it is done that can be.
     pub done: Went,
+    /// How it is answered then.
+    pub verdict: Verdict,
     /// What of it cannot be done there: then it ends *broken*.
     pub troubles: Rc<Findings>,
     /// Whether a step of it can fail.

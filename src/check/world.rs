@@ -14,7 +14,7 @@ use crate::limits;
 use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
 use crate::plan::{Context, Refusal, plan};
 use crate::stack::claims::Claims;
-use crate::stack::{Effort, Frame, FrameId, Reason, Request, Requester, Rules, Stack, World, effort, take_up};
+use crate::stack::{Effort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -177,6 +177,8 @@ impl<'a> Worlds<'a> {
             at: Time::default(),
             busy: false,
             held: &[],
+            // All that one coordinator asks for is begun after what it asked before, and one operator is followed at a time.
+            places: &[],
             joined: false,
             placed: false,
         }
@@ -197,10 +199,11 @@ impl<'a> Worlds<'a> {
         let mut world = before.clone();
         planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
         let edits = planned.parts[0].edits.clone();
-        let pushed = world.stack.push_safe(edits, Frame { partial: !troubles.is_empty(), ..frame }, held);
+        let how = SafeEnd { left_out: !troubles.is_empty(), ..SafeEnd::default() };
+        let (pushed, verdict) = world.settle_safe(edits, frame, &how, held);
         let may_fail = !planned.steps.is_empty();
         let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
-        let comes = SafeComes { done: self.went(id, world, &[pushed]), troubles, may_fail };
+        let comes = SafeComes { done: self.went(id, world, &[pushed]), verdict, troubles, may_fail };
         let comes = Rc::new(comes);
         self.safes.insert(key, comes.clone());
         comes

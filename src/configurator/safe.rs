@@ -8,7 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Step, Target, Verdict};
 use crate::stack::claims::components as components_of;
-use crate::stack::{Effort, Frame, Stack, effort};
+use crate::stack::{Effort, Frame, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Spec, Touched, Transaction};
@@ -155,12 +155,10 @@ impl Engine {
             broken = Some(part);
         }
         let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
-        let frame = match (&broken, interrupted) {
-            (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
-            _ => Frame { partial: frame.partial || broken.is_some(), ..frame },
-        };
         let held = self.held_frames();
-        let pushed = self.world.stack.push_safe(edits, frame, &held);
+        let failed = broken.as_ref().map(|part| part.frame.as_ref());
+        let how = SafeEnd { failed, left_out: !troubles.is_empty(), interrupts: interrupted };
+        let (pushed, verdict) = self.world.settle_safe(edits, frame, &how, &held);
         if let Some(part) = &broken {
             // Those that came later took what this one was to do for done.
             let later = self.running.iter().filter(|other| other.after.contains(&number));
@@ -169,11 +167,11 @@ impl Engine {
                 troubles.push(Reason::Broken(part.residual.clone()));
             }
         }
-        let (verdict, reason) = match broken {
-            None if troubles.is_empty() => (Verdict::Ok, None),
+        let reason = match broken {
+            None if troubles.is_empty() => None,
             None => {
                 let residual = crate::stack::Residual::of(troubles.swap_remove(0));
-                (Verdict::Broken, Some(Reason::Broken(std::sync::Arc::new(residual))))
+                Some(Reason::Broken(std::sync::Arc::new(residual)))
             }
             Some(part) => {
                 let residual = part.residual.clone();
@@ -182,7 +180,7 @@ impl Engine {
                 if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
                     last.frame = Some(pushed);
                 }
-                (Verdict::Broken, Some(Reason::Broken(residual)))
+                Some(Reason::Broken(residual))
             }
         };
         self.forget_confirmations();

@@ -34,9 +34,9 @@ pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
-pub use settle::{About, Ending, Endings, Settled, Stopped, settle};
+pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, is_kept, shares};
-pub use work::{Op, Part, Planned, transaction};
+pub use work::{Op, Part, Planned, places, transaction};
 pub use world::{Broken, World};
 
 use crate::model::{ConfigId, Finding, Ident, codes};

@@ -3,7 +3,7 @@
 //! The parts of a group end in order: those before one that failed stand, and what stands behind it is taken up anew, since
 //! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
 
-use super::{Edits, FrameId, Group, Request, Why, World};
+use super::{Edits, Frame, FrameId, Group, Request, Why, World};
 use crate::model::{Ask, Verdict};
 use smallvec::SmallVec;
 
@@ -58,6 +58,18 @@ pub struct Settled {
     /// Undos by leaving a state that were not carried out, by their places: their frames stay, and are frames like others.
     /// None: the frame of the visit that there is.
     pub stay: SmallVec<[(usize, Option<FrameId>); 2]>,
+}
+
+/// How a safe configuration has ended.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SafeEnd<'f> {
+    /// A step of it failed, or what became of one is not known; with the frame of what was done, if that is another one than
+    /// was planned.
+    pub failed: Option<Option<&'f Frame>>,
+    /// A piece of it could not even be planned.
+    pub left_out: bool,
+    /// Something is interrupted for its sake.
+    pub interrupts: bool,
 }
 
 /// What it comes to that the parts of `group` have ended so.
@@ -120,6 +132,28 @@ impl World {
         let mut pushed = self.stack.apply_each(done.map(|(edits, _)| edits), busy).into_iter();
         let of = |ending: &Ending| if *ending == Ending::Done { pushed.next().flatten() } else { None };
         endings.iter().map(of).collect()
+    }
+
+    /// A safe configuration has been applied as far as it goes. Its frame comes to stand above those of what it interrupted;
+    /// nothing of it is taken back, so what could not be done leaves it *broken*, with a partial frame. Its own answer comes
+    /// before those of what it interrupted, which end by [`settle`] as stopped for its sake. `busy`: see [`Stack::apply`].
+    ///
+    /// [`Stack::apply`]: super::Stack::apply
+    pub fn settle_safe(
+        &mut self,
+        edits: Edits,
+        frame: Frame,
+        end: &SafeEnd<'_>,
+        busy: &[FrameId],
+    ) -> (FrameId, Verdict) {
+        let broken = end.failed.is_some();
+        let frame = match end.failed {
+            // What was really done; but where something was interrupted, as if that had never been.
+            Some(Some(done)) if !end.interrupts => Frame { partial: true, ..done.clone() },
+            _ => Frame { partial: frame.partial || broken, ..frame },
+        };
+        let verdict = if broken || end.left_out { Verdict::Broken } else { Verdict::Ok };
+        (self.stack.push_safe(edits, frame, busy), verdict)
     }
 
     /// Frames that were to be undone with the state they belong to stay.
