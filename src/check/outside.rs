@@ -180,7 +180,8 @@ impl Product<'_> {
         };
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
         let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
-        if under_way.chain(waiting).any(undoes) {
+        let coming = state.flight.iter().flat_map(|batch| &batch.requests);
+        if under_way.chain(waiting).chain(coming).chain(state.undos()).any(undoes) {
             return None;
         }
         let member = &mut self.members[number];
