@@ -342,6 +342,9 @@ pub const FORCE_ROUNDS: usize = 3;
 /// Batches that one event leads a coordinator to ask for, and that are followed; one that goes round by itself asks without end.
 pub const CHECK_HANDED: usize = 64;
 
+/// Times at which it is looked whether what a configuration stands for may come true by time alone.
+pub const CHECK_STANDS: usize = 64;
+
 /// Ways in which what one step asks for may meet what is under way, and that are followed.
 pub const CHECK_FORKS: usize = 64;
 

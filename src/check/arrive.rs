@@ -6,7 +6,7 @@ use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
-use crate::stack::{Arrival, Batch, Request, Turn, Why, given_up_of};
+use crate::stack::{Arrival, Batch, Request, Requester, Turn, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -65,12 +65,11 @@ impl Product<'_> {
         state.desk.requests_mut().for_each(gone);
         state.safe.iter_mut().for_each(gone);
         state.due.iter_mut().for_each(|(request, _)| gone(request));
-        state.due.retain(|(request, _)| self.tells_all || request.tag.0 != 0);
+        state.due.retain(|(request, _)| self.tells_all || is_for_somebody(request));
         state.telling.iter_mut().for_each(|(request, _)| gone(request));
         if self.tells_all && self.members.len() > 1 {
-            state.telling.retain(|(request, _)| request.tag.0 != 0);
+            state.telling.retain(|(request, _)| is_for_somebody(request));
         }
-        state.unconfirmed.iter_mut().for_each(|waits| gone(&mut waits.request));
         state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
     }
 
@@ -261,7 +260,7 @@ impl Product<'_> {
     fn due(&self, state: &mut State, request: Request, verdict: Verdict) {
         let listens = |number: usize| {
             let event = self.members[number].chart.event(verdict.event(request.ask));
-            request.tag.0 != 0 && event != EventId::OTHER
+            is_for_somebody(&request) && event != EventId::OTHER
         };
         if self.tells_all || self.member(request.requester).is_some_and(listens) {
             state.due.push((request, verdict));
@@ -363,7 +362,7 @@ impl Product<'_> {
         state.telling.extend(answers.iter().copied());
         if self.tells_all && self.members.len() > 1 {
             // Each hears it in its own time: what another one asks for meanwhile may come first.
-            state.telling.retain(|(request, _)| request.tag.0 != 0);
+            state.telling.retain(|(request, _)| is_for_somebody(request));
             let states = if state.flight.is_empty() { SmallVec::from_iter([state]) } else { self.lands(state) };
             for state in states {
                 let state = self.settle(state);
@@ -377,10 +376,11 @@ impl Product<'_> {
             let mut heard = Vec::with_capacity(states.len());
             for mut state in states {
                 let (request, verdict) = state.telling.remove(0);
-                let owner = self.member(request.requester).filter(|_| request.tag.0 != 0);
+                let owner = self.member(request.requester).filter(|_| is_for_somebody(&request));
                 match owner {
                     Some(number) => {
                         let event = self.members[number].chart.event(verdict.event(request.ask));
+                        nexts.troubles.extend(self.unheard_revert(&state, number, &request, verdict));
                         heard.extend(self.react(state, number, event));
                     }
                     None => heard.push(state),
@@ -394,4 +394,9 @@ impl Product<'_> {
             nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
         }
     }
+}
+
+/// Whether an answer is for a coordinator: for the state that asked, while that is not left, or for whatever state there is.
+fn is_for_somebody(request: &Request) -> bool {
+    !request.is_asked() && request.requester != Requester::Operator || request.tag.0 != 0
 }

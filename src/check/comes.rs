@@ -1,8 +1,9 @@
 //! What a batch comes to in a world: asked of the stack once, and followed to each end that it may have.
 
 use super::outcome::{Beside, Comes, Went, WorldId};
+use super::stands::never;
 use super::world::{Worlds, plain};
-use crate::model::Ask;
+use crate::model::{Ask, Findings};
 use crate::plan::PlannedStep;
 use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, settle, take_up};
 use crate::system::step;
@@ -68,7 +69,19 @@ impl Worlds<'_> {
             (cancelled, can_fail[part].then(|| ends(&until(part, Ending::Failed))))
         });
         let stopped = stopped.collect();
-        Comes { group, refused, can_fail, done, stopped }
+        let hollow = self.hollow(done.world, &group, planned.as_ref());
+        Comes { group, refused, hollow, can_fail, done, stopped }
+    }
+
+    /// The requests of a group that say what is false in the world in which all of it is done.
+    fn hollow(&self, done: WorldId, group: &Group, planned: Option<&Planned>) -> Vec<(usize, Rc<Findings>)> {
+        let parts = planned.iter().flat_map(|planned| &planned.parts).enumerate().filter(|(_, part)| part.holds);
+        let says = parts.filter_map(|(at, part)| {
+            let id = part.pushes.filter(|id| self.judged.contains(id))?;
+            let finding = never(self.deployment, self.configuration(id)?, &self.get(done)?.system)?;
+            Some((group.places[at], Rc::new(vec![finding])))
+        });
+        says.collect()
     }
 
     /// The world after a group has ended so, nothing of it being left in between.

@@ -57,17 +57,19 @@ pub fn holds(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> 
     conditions.flat_map(of).collect()
 }
 
-/// That the platform does not show what a configuration stands for: the simulated one shows run states only.
-fn unseen(deployment: &Deployment, holds: &Condition) -> Option<Finding> {
-    if deployment.platform.as_str() != "simulated" {
-        return None;
-    }
+/// Whether the platform does not show what a configuration stands for: the simulated one shows run states only.
+pub fn is_unseen(deployment: &Deployment, holds: &Condition) -> bool {
     let mut values = false;
     holds.for_each(&mut |condition| {
         use ConditionKind as K;
         values |= matches!(condition.kind, K::IsTrue(_) | K::Silent { .. } | K::Compare { .. });
     });
-    values.then(|| {
+    values && deployment.platform.as_str() == "simulated"
+}
+
+/// That it does not show it.
+fn unseen(deployment: &Deployment, holds: &Condition) -> Option<Finding> {
+    is_unseen(deployment, holds).then(|| {
         let message = "the simulated platform does not show values: what this stands for counts as true there";
         Finding::warning(CONF_HOLDS_UNSEEN, message).at(holds.origin).labelled("cannot be seen there").help(
             "check it on the platform whose components run; a fault of a component that it looks at is a loss here too",

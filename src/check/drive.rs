@@ -99,7 +99,7 @@ impl Product<'_> {
             let (number, requests) = (turn.number, turn.batch.requests.clone());
             if self.worlds.get(state.world).is_some() {
                 let comes = self.comes(state, number, &requests);
-                if let Some((place, reasons)) = comes.refused.first() {
+                if let Some((place, reasons)) = comes.refused.first().or(comes.hollow.first()) {
                     return Err((requests[*place], reasons.to_vec()));
                 }
             }

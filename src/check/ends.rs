@@ -39,7 +39,12 @@ impl Product<'_> {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
             }
         }
-        for endings in endings(&comes.can_fail, Stopping::Not, self.tells_all) {
+        for (place, reasons) in &comes.hollow {
+            if requests[*place].requester != Requester::Operator {
+                nexts.troubles.push(Trouble::Hollow(requests[*place], reasons.clone()));
+            }
+        }
+        for endings in comes.endings(Stopping::Not, self.tells_all) {
             let from = nexts.all.len();
             self.ends_so(state, number, &requests, &comes, &endings, nexts);
             if endings.iter().all(|ending| *ending == Ending::Done) {
@@ -139,7 +144,9 @@ impl Product<'_> {
         let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
         let unknown = (self.tells_all && self.worlds.top(state.world).is_some()).then_some(u8::MAX);
         if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
-            state.unconfirmed.push(Unconfirmed { place, request: Request { why: Why::Asked, ..*request } });
+            // In which state it was asked for means nothing any more.
+            let request = Request { why: Why::Asked, tag: (0, 0), ..*request };
+            state.unconfirmed.push(Unconfirmed { place, request });
         }
     }
 
@@ -189,7 +196,7 @@ impl Product<'_> {
         for count in some..=given_up.len() {
             let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
             met.push(k);
-            for endings in endings(&comes.can_fail, Stopping::GivenUp(k), self.tells_all) {
+            for endings in comes.endings(Stopping::GivenUp(k), self.tells_all) {
                 self.ends_so(state, number, &requests, &comes, &endings, nexts);
             }
         }
@@ -263,9 +270,9 @@ impl Product<'_> {
             nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
         }
         // Where a piece of it cannot be planned, it is done as far as it goes, and all is known of that.
-        let (verdict, class) = match comes.troubles.is_empty() {
-            true => (Verdict::Ok, Failed::Nothing),
-            false => (Verdict::Broken, Failed::Broken),
+        let (verdict, class) = match comes.verdict {
+            Verdict::Ok => (Verdict::Ok, Failed::Nothing),
+            other => (other, Failed::Broken),
         };
         let mut next = over.clone();
         self.go(&mut next, &comes.done);

@@ -7,8 +7,8 @@ use super::state::{Failed, State, Trouble};
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
-    COORD_ENDLESS, COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_STACK_GROWS, COORD_STUCK,
-    STACK_FULL,
+    COORD_ENDLESS, COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD,
+    COORD_STACK_GROWS, COORD_STUCK, STACK_FULL,
 };
 use crate::model::{
     Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,
@@ -29,6 +29,7 @@ impl Graph<'_, '_> {
     pub fn judge(&mut self) -> Traced {
         let mut found = Traced::new();
         self.refusals(&mut found);
+        self.hollow(&mut found);
         self.growing(&mut found);
         self.unheard(&mut found);
         self.endless(&mut found);
@@ -142,6 +143,33 @@ impl Graph<'_, '_> {
                 "give each coordinator components of its own, or let one ask the other by an event".to_owned()
             }
         })
+    }
+
+    /// What can only fail, since what it stands for is false where it is applied.
+    fn hollow(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<ConfigId> = FxHashSet::default();
+        for (at, trouble) in self.firsts(&self.troubles) {
+            let Trouble::Hollow(request, reasons) = trouble else { continue };
+            let (Ask::Apply(id), Some(reason)) = (request.ask, reasons.first()) else { continue };
+            if !said.insert(id) {
+                continue;
+            }
+            let severity = match self.failed[at as usize] {
+                Failed::Nothing => Severity::Error,
+                Failed::Apply => Severity::Warning,
+                Failed::Undo | Failed::Broken => Severity::Info,
+            };
+            let number = self.product.member(request.requester);
+            let shared =
+                number.is_some_and(|n| self.shares(n, request.ask) || !self.product.members[n].chart.is_pure());
+            let severity = if shared { severity.min(Severity::Warning) } else { severity };
+            let mut trace = self.trace(at);
+            if let Some(last) = trace.last_mut() {
+                let within = self.product.fails_within(request.ask, &reasons);
+                last.replay.then = Some((request.ask.failed().event(request.ask), within));
+            }
+            found.push((Finding { severity, ..reason.clone() }, trace));
+        }
     }
 
     /// Within what time a confirmation was to come, where a request takes back what was not confirmed.
@@ -300,23 +328,30 @@ impl Graph<'_, '_> {
         self.product.members.iter().any(|member| member.chart.raises().iter().any(of))
     }
 
-    /// What is lost and nobody hears.
+    /// What is lost, or taken back unconfirmed, and nobody hears.
     fn unheard(&mut self, found: &mut Traced) {
-        let mut said: FxHashSet<ConfigId> = FxHashSet::default();
+        let mut said: FxHashSet<(ConfigId, Verdict)> = FxHashSet::default();
         for (at, trouble) in self.firsts(&self.troubles) {
-            let Trouble::Unheard(id) = trouble else { continue };
-            if !said.insert(id) {
+            let Trouble::Unheard(id, verdict) = trouble else { continue };
+            if !said.insert((id, verdict)) {
                 continue;
             }
-            let event = Verdict::Lost.event(Ask::Apply(id));
+            let event = verdict.event(Ask::Apply(id));
+            let (code, what, doubt) = match verdict {
+                Verdict::Reverted => (COORD_REVERTED_UNHEARD, "waits for its confirmation", "may wait to be confirmed"),
+                _ => (COORD_LOST_UNHEARD, "stands for something that can be lost", "may be in force"),
+            };
             let place = self.product.place(&self.states[at as usize]);
             let origin = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
-            let message = format!("nobody hears `{event}` in {place}, where `{id}` may be in force");
-            let finding = Finding::warning(COORD_LOST_UNHEARD, message)
+            let message = format!("nobody hears `{event}` in {place}, where `{id}` {doubt}");
+            // Where an undo has failed not every coordinator can go on.
+            let behind_undo = verdict == Verdict::Reverted && self.failed[at as usize] >= Failed::Undo;
+            let severity = if behind_undo { Severity::Info } else { Severity::Warning };
+            let finding = Finding::new(severity, code, message)
                 .at(origin)
-                .labelled("stands for something that can be lost")
+                .labelled(what)
                 .path(format!("configurations.{id}"))
-                .help(format!("add a transition on `{event}` to a state around all in which `{id}` may be in force"));
+                .help(format!("add a transition on `{event}` to a state around all in which `{id}` {doubt}"));
             let trace = self.trace(at);
             found.push((finding, trace));
         }

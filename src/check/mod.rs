@@ -31,6 +31,7 @@ mod run;
 mod safety;
 mod shape;
 mod simulated;
+mod stands;
 mod state;
 mod told;
 mod trace;

@@ -1,7 +1,8 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
-use crate::model::{ConfigId, Findings};
-use crate::stack::{Ending, FrameId, Group, Request};
+use crate::model::{ConfigId, Findings, Verdict};
+use crate::stack::{Ending, Endings, FrameId, Group, Request};
+use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 use std::rc::Rc;
 
@@ -54,6 +55,8 @@ pub struct Comes {
     pub group: Group,
     /// Those that are told because they are refused.
     pub refused: Vec<(usize, Rc<Findings>)>,
+    /// Those that can only fail, since what they stand for is false when all is done.
+    pub hollow: Vec<(usize, Rc<Findings>)>,
     /// Of each part of the group, whether something in it can fail.
     pub can_fail: SmallVec<[bool; 2]>,
     /// When all is done.
@@ -73,6 +76,13 @@ impl Comes {
         }
     }
 
+    /// How it may end. What says of itself what is false does not end as done.
+    pub fn endings(&self, stop: Stopping<'_>, each: bool) -> impl Iterator<Item = Endings> + use<> {
+        let hollow = !self.hollow.is_empty();
+        let all_done = |endings: &Endings| endings.iter().all(|ending| *ending == Ending::Done);
+        endings(&self.can_fail, stop, each).into_iter().filter(move |endings| !hollow || !all_done(endings))
+    }
+
     /// So many requests are settled then.
     pub fn takes(&self) -> usize {
         self.group.takes.max(1)
@@ -89,6 +99,8 @@ impl Comes {
 pub struct SafeComes {
     /// When all of it is done that can be.
     pub done: Went,
+    /// How it is answered then.
+    pub verdict: Verdict,
     /// What of it cannot be done there: then it ends *broken*.
     pub troubles: Rc<Findings>,
     /// Whether a step of it can fail.

@@ -5,6 +5,7 @@ use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
+use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
@@ -110,7 +111,7 @@ impl Product<'_> {
             match next.inbox[..] {
                 [] if !holds => {}
                 [] => {
-                    nexts.troubles.push(Trouble::Unheard(id));
+                    nexts.troubles.push(Trouble::Unheard(id, Verdict::Lost));
                     nexts.all.push(Next::plain(by, next, class));
                 }
                 [(only, event)] => {
@@ -145,25 +146,49 @@ impl Product<'_> {
         }
         let beside = self.beside(&left, None);
         let comes = self.worlds.comes(state.world, &[request], &beside);
-        let stays = Answers::from_iter([(Request { why: Why::Asked, ..request }, Verdict::UndoFailed)]);
+        let told = |verdict: Verdict| Answers::from_iter([request.as_told(verdict)]);
         if !comes.refused.is_empty() {
-            let told = Request { why: Why::Asked, ..request };
-            nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(told, why.clone())));
-            self.tell(left, stays, Failed::Undo, nexts);
+            nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(request, why.clone())));
+            self.tell(left, told(Verdict::UndoFailed), Failed::Undo, nexts);
             return;
         }
         if comes.can_fail.contains(&true) {
-            self.tell(left.clone(), stays, Failed::Undo, nexts);
+            self.tell(left.clone(), told(Verdict::UndoFailed), Failed::Undo, nexts);
             let mut broken = left.clone();
             broken.unconfirmed.clear();
             broken.world = self.worlds.broken(state.world, std::iter::once(request.ask));
-            let answers = Answers::from_iter([(Request { why: Why::Asked, ..request }, Verdict::UndoBroken)]);
-            self.tell(broken, answers, Failed::Broken, nexts);
+            self.tell(broken, told(Verdict::UndoBroken), Failed::Broken, nexts);
         }
         let mut next = left;
         self.go(&mut next, &comes.done);
-        let told = Request { ask: Ask::Apply(id), why: Why::Asked, ..request };
-        self.tell(next, Answers::from_iter([(told, Verdict::Reverted)]), Failed::Apply, nexts);
+        self.tell(next, told(Verdict::Undone), Failed::Apply, nexts);
+    }
+
+    /// What is told to a coordinator that nobody asked for, and that it does not hear where it is: unless it asks itself for
+    /// what has just been done.
+    pub(super) fn unheard_revert(
+        &mut self,
+        state: &State,
+        number: usize,
+        request: &Request,
+        verdict: Verdict,
+    ) -> Option<Trouble> {
+        let (Verdict::Reverted, Ask::Apply(id)) = (verdict, request.ask) else { return None };
+        let undoes = |other: &Request| {
+            other.requester == request.requester && matches!(other.ask, Ask::UndoOf(of) if of == id)
+                || other.requester == request.requester && other.ask == Ask::Undo
+        };
+        let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
+        let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
+        let coming = state.flight.iter().flat_map(|batch| &batch.requests);
+        if under_way.chain(waiting).chain(coming).chain(state.undos()).any(undoes) {
+            return None;
+        }
+        let member = &mut self.members[number];
+        let event = member.chart.event(verdict.event(request.ask));
+        // That no state at all hears it is told without following anything.
+        let heard = event == EventId::OTHER || member.react(state.leaves[number], event).taken;
+        (!heard).then_some(Trouble::Unheard(id, verdict))
     }
 
     /// What an operator may ask for.

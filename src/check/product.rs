@@ -89,6 +89,7 @@ impl<'a> Product<'a> {
             losable,
             tells_all: false,
         };
+        product.worlds.judged = super::stands::judged(deployment, charts);
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(&views[*number], charts, *number);
             product.members[place].listen(deployment, &own);

@@ -7,9 +7,11 @@
 
 use super::outcome::Beside;
 use super::product::Product;
+use super::stands::takes_time;
 use super::state::{Move, Next, State};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, FaultKind, Step, Verdict};
+use crate::model::codes::CONF_HOLDS_NEVER;
+use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
 use crate::stack::{Request, Why};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
@@ -28,6 +30,8 @@ pub struct Replay {
     pub then: Option<(EventName, Duration)>,
     /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
     pub passes: bool,
+    /// Answers that may be others, and lead to the same: what was given up and has nothing to do may be through before.
+    pub either: SmallVec<[EventName; 1]>,
 }
 
 /// What is to be done for a move.
@@ -67,6 +71,7 @@ impl Product<'_> {
                 does: self.does(next),
                 then: None,
                 passes: false,
+                either: SmallVec::new(),
             })
             .collect();
         // What comes at the instant of something else is armed before that.
@@ -82,6 +87,13 @@ impl Product<'_> {
                 && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
             {
                 all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
+            }
+            let stands = |(request, verdict): &(Request, Verdict)| match request.ask {
+                Ask::Apply(id) if *verdict == Verdict::Ok => self.worlds.configuration(id).is_some_and(takes_time),
+                _ => false,
+            };
+            if next.answers.iter().any(stands) {
+                all[k].does = Does::Cannot("what it stands for becomes true only with time");
             }
             if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
                 all[k].does = Does::Cannot("what is there is not known any more");
@@ -100,6 +112,13 @@ impl Product<'_> {
             if batch.idle && until > times[batch.at] && batch.over.is_some() {
                 all[batch.at].does = Does::Cannot("what has nothing to do is answered at once");
             }
+            for (request, verdict) in answers.iter().filter(|(r, v)| batch.idle && cancels(batch, r, *v)) {
+                let replay = &mut all[batch.over.unwrap_or(batch.at)];
+                match self.leads_to_the_same(batch, request) {
+                    true => replay.either.push(verdict.event(request.ask)),
+                    false => replay.does = Does::Cannot("what has nothing to do is answered at once"),
+                }
+            }
             // At the end of the way it may have become one that is refused.
             let begins = &way[batch.at].1.state;
             let state = batch.over.map_or(&way[way.len() - 1].1.state, |_| begins);
@@ -108,6 +127,14 @@ impl Product<'_> {
             all[armed].arms.extend(arms);
         }
         all
+    }
+
+    /// Whether it makes no difference that a request which is given up, and has nothing to do, is through before that: nobody
+    /// hears the answer any more, and no other frame went for it.
+    fn leads_to_the_same(&self, batch: &Begun, request: &Request) -> bool {
+        let Ask::Apply(id) = request.ask else { return false };
+        let heard = batch.requests.iter().any(|own| own.ask == request.ask && own.tag.0 != 0);
+        !heard && self.worlds.configuration(id).is_some_and(|c| c.group.is_none())
     }
 
     /// When each move happens.
@@ -233,6 +260,12 @@ impl Product<'_> {
         (0..before).rev().find(applied).map(|k| times[k] + within)
     }
 
+    /// Within what time a request that is not carried out for these reasons is answered so.
+    pub(super) fn fails_within(&self, ask: Ask, reasons: &[Finding]) -> Duration {
+        let waits = reasons.first().is_some_and(|reason| reason.code == CONF_HOLDS_NEVER);
+        if waits { self.patience(ask) + limits::REPLAY_STEP * 2 } else { Duration::ZERO }
+    }
+
     /// How long a step of a request may take.
     fn patience(&self, ask: Ask) -> Duration {
         let of = |id: ConfigId| self.worlds.configuration(id).and_then(|c| c.timeout);
@@ -292,6 +325,11 @@ fn races(before: &State, next: &Next) -> bool {
     };
     let stops = |requests| back(requests) || shrinks(requests) || cancelled(requests);
     next.answers.iter().any(through) || under_way(before).iter().any(stops)
+}
+
+/// Whether this answer says that a request of the batch was given up.
+fn cancels(batch: &Begun, request: &Request, verdict: Verdict) -> bool {
+    verdict == Verdict::Cancelled && batch.requests.iter().any(|own| own.ask == request.ask)
 }
 
 /// Whether a move answers all of a batch.

@@ -64,6 +64,10 @@ impl Shapes {
             let blocked = !above.is_empty() && is_kept(frame, above.into_iter());
             kept.push((frame, (self.frames.number(frame), blocked, handed)));
         }
+        // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
+        let of = |by: Requester| frames.iter().filter(|frame| frame.requester == by).count();
+        let filling =
+            |a: &Frame, b: &Frame| a.requester == b.requester && !stack.has_room(a.requester, of(a.requester));
         let mut counted = Vec::with_capacity(kept.len());
         let mut ids = Vec::with_capacity(kept.len());
         while !kept.is_empty() {
@@ -71,7 +75,10 @@ impl Shapes {
             let mut least = 0;
             for at in 1..kept.len() {
                 let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
-                if smaller && (0..at).all(|below| self.commute(kept[below].0, kept[at].0)) {
+                let passes = |below: &Arc<Frame>, frame: &Arc<Frame>, shapes: &mut Self| {
+                    !filling(below, frame) && shapes.commute(below, frame)
+                };
+                if smaller && (0..at).all(|below| passes(kept[below].0, kept[at].0, self)) {
                     least = at;
                 }
             }

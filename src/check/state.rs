@@ -180,8 +180,10 @@ pub struct Next {
 pub enum Trouble {
     /// The request is refused.
     Refused(Request, Rc<Findings>),
-    /// Nobody hears that this is lost.
-    Unheard(ConfigId),
+    /// The request can only fail: what it stands for is false when it has been applied.
+    Hollow(Request, Rc<Findings>),
+    /// Nobody hears that this is lost, or was taken back unconfirmed.
+    Unheard(ConfigId, Verdict),
 }
 
 /// All that follows from a state.

@@ -29,7 +29,12 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
             _ => false,
         };
         let owner = owner(chart, site.when);
-        for answer in bad_answers(ask).into_iter().chain(reverted.then(|| Verdict::Reverted.event(ask))) {
+        // It is told in whatever state the coordinator is: where that matters is followed.
+        if reverted && chart.event(Verdict::Reverted.event(ask)) == EventId::OTHER {
+            let none = missing.entry(site.name).or_insert_with(|| (site, ask, BTreeSet::new()));
+            none.2.insert(Verdict::Reverted.event(ask));
+        }
+        for answer in bad_answers(ask) {
             let event = chart.event(answer);
             let ears = ears.entry(event).or_insert_with(|| hearing(chart, event));
             if !ears.iter().any(|state| chart.is_inside(*state, owner) || chart.is_inside(owner, *state)) {

@@ -9,7 +9,6 @@ use super::trace::{Happened, TraceStep};
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::{Code, Coordinator, Finding, Severity};
 use crate::system::View;
-use std::time::Duration;
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
 pub fn ways(product: &mut Product<'_>) -> Traced {
@@ -69,8 +68,9 @@ fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
         replay,
     }));
     let refused = ways.last().and_then(|way| way.refused.as_ref());
-    if let (Some(last), Some((request, _))) = (steps.last_mut(), refused) {
-        last.replay.then = Some((request.ask.failed().event(request.ask), Duration::ZERO));
+    if let (Some(last), Some((request, reasons))) = (steps.last_mut(), refused) {
+        let within = product.fails_within(request.ask, reasons);
+        last.replay.then = Some((request.ask.failed().event(request.ask), within));
     }
     steps
 }

@@ -14,7 +14,7 @@ use crate::limits;
 use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
 use crate::plan::{Context, Refusal, plan};
 use crate::stack::claims::Claims;
-use crate::stack::{Effort, Frame, FrameId, Reason, Request, Requester, Rules, Stack, World, effort, take_up};
+use crate::stack::{Effort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -47,7 +47,7 @@ struct Exact {
 
 /// All worlds that were met.
 pub struct Worlds<'a> {
-    deployment: &'a Deployment,
+    pub(super) deployment: &'a Deployment,
     pub(super) configurations: FxHashMap<ConfigId, Configuration>,
     operator: FxHashSet<ConfigId>,
     /// What requests may touch, by their text.
@@ -62,6 +62,8 @@ pub struct Worlds<'a> {
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
     pub(super) asked: FxHashSet<ConfigId>,
+    /// Configurations of which it can be told whether what they stand for is true.
+    pub(super) judged: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
     pub(super) warned: FxHashSet<(Code, String)>,
@@ -94,6 +96,7 @@ impl<'a> Worlds<'a> {
             safes: FxHashMap::default(),
             helds: FxHashMap::default(),
             asked: FxHashSet::default(),
+            judged: FxHashSet::default(),
             warnings: Vec::new(),
             warned: FxHashSet::default(),
         };
@@ -174,6 +177,8 @@ impl<'a> Worlds<'a> {
             at: Time::default(),
             busy: false,
             held: &[],
+            // All that one coordinator asks for is begun after what it asked before, and one operator is followed at a time.
+            places: &[],
             joined: false,
             placed: false,
         }
@@ -194,10 +199,11 @@ impl<'a> Worlds<'a> {
         let mut world = before.clone();
         planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
         let edits = planned.parts[0].edits.clone();
-        let pushed = world.stack.push_safe(edits, Frame { partial: !troubles.is_empty(), ..frame }, held);
+        let how = SafeEnd { left_out: !troubles.is_empty(), ..SafeEnd::default() };
+        let (pushed, verdict) = world.settle_safe(edits, frame, &how, held);
         let may_fail = !planned.steps.is_empty();
         let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
-        let comes = SafeComes { done: self.went(id, world, &[pushed]), troubles, may_fail };
+        let comes = SafeComes { done: self.went(id, world, &[pushed]), verdict, troubles, may_fail };
         let comes = Rc::new(comes);
         self.safes.insert(key, comes.clone());
         comes

@@ -52,6 +52,13 @@ pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<Str
             out.wait_until(replay.at + half / 2);
         }
         for answer in answers {
+            if replay.either.iter().any(|either| either.as_str() == answer) {
+                _ = writeln!(
+                    out.text,
+                    "-- Here `{answer}`, or it is through before it is given up, which leads to the same."
+                );
+                continue;
+            }
             _ = writeln!(out.text, "wait_answer({}, 0)", quoted(answer));
         }
     }

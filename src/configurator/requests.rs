@@ -8,7 +8,8 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Rules, Stopped, Why, settle, take_up,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Requester, Rules, Stopped, Why, settle,
+    take_up,
 };
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
@@ -51,6 +52,7 @@ impl Engine {
             let configurations = self.configurations.clone();
             let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
             let held = self.held_frames();
+            let places = self.places_taken();
             let rules = Rules {
                 configurations: &configurations,
                 operator: &self.operator,
@@ -58,6 +60,7 @@ impl Engine {
                 at: self.clock.now(),
                 busy,
                 held: &held,
+                places: &places,
                 joined: false,
                 placed: false,
             };
@@ -267,6 +270,12 @@ impl Engine {
     pub(super) fn held_frames(&self) -> Vec<FrameId> {
         let under_way = self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned()));
         under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
+    }
+
+    /// Who asked for the pushes under way: each has its place on the stack since it began.
+    fn places_taken(&self) -> SmallVec<[Requester; 2]> {
+        let pushes = self.running.iter().filter(|running| !running.over);
+        pushes.flat_map(|running| crate::stack::places(running.machine.planned())).collect()
     }
 
     /// Frames that undos under way are about, also those of which it is known that they stay.

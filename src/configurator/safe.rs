@@ -8,7 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Step, Target, Verdict};
 use crate::stack::claims::components as components_of;
-use crate::stack::{Effort, Frame, Residual, Stack, effort, without};
+use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
@@ -157,13 +157,10 @@ impl Engine {
             broken = Some(part);
         }
         let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
-        let frame = match (&broken, interrupted) {
-            (Some(part), false) => Frame { partial: true, ..part.frame.clone().unwrap_or(frame) },
-            (Some(_), true) => without(frame, &missed),
-            (None, _) => frame,
-        };
         let held = self.held_frames();
-        let pushed = self.world.stack.push_safe(edits, frame, &held);
+        let failed = broken.as_ref().map(|part| part.frame.as_ref());
+        let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };
+        let (pushed, verdict) = self.world.settle_safe(edits, frame, &how, &held);
         if let Some(part) = &broken {
             // Those that came later took what this one was to do for done.
             let later = self.running.iter().filter(|other| other.after.contains(&number));
@@ -172,13 +169,13 @@ impl Engine {
                 troubles.push(Reason::Broken(part.residual.clone()));
             }
         }
-        let (verdict, reason) = match broken {
-            None if troubles.is_empty() => (Verdict::Ok, None),
+        let reason = match broken {
+            None if troubles.is_empty() => None,
             None => {
                 let cause = troubles.remove(0);
                 let residual = Arc::new(Residual { also: troubles, ..Residual::of(cause) });
                 self.partials.push((pushed, residual.clone()));
-                (Verdict::Broken, Some(Reason::Broken(residual)))
+                Some(Reason::Broken(residual))
             }
             Some(part) => {
                 let mut residual = (*part.residual).clone();
@@ -190,7 +187,7 @@ impl Engine {
                 if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
                     last.frame = Some(pushed);
                 }
-                (Verdict::Broken, Some(Reason::Broken(residual)))
+                Some(Reason::Broken(residual))
             }
         };
         self.forget_confirmations();

@@ -238,6 +238,11 @@ codes! {
          what the configuration stands for counts as true there while none of the components that it looks at is faulted, and \
          `davit status` shows the frame as not observed. On a platform whose components run it is evaluated; until then \
          nobody has seen that it ever becomes true.";
+    CONF_HOLDS_NEVER = "conf::holds_never", "a configuration is applied where what it stands for cannot be true",
+        "With `holds` a configuration says what must be true once it has been applied. Run states are known beforehand: on the \
+         way shown the condition is false after its last step, whatever its ports carry, and nobody else can make it true \
+         before its time is over. So the request can only end *failed*, and is taken back. Let the configuration bring the \
+         components there itself (`post_conf_state`), ask for it where they are there already, or correct the condition.";
     CONF_CONFIRM_CONTRADICTED = "conf::confirm_contradicted", "`confirm` stands beside `safe` or `on_failure = \"hold\"`",
         "`confirm` says that the configuration is undone when an event does not come in time. A safe configuration stays in \
          force until somebody undoes it, and `on_failure = \"hold\"` says that nothing is undone unasked: both at once \
@@ -501,6 +506,11 @@ codes! {
          coordinator hears `ID.lost`, in whatever state it is. On the way shown it is in a state in which no transition hears \
          it, so it would go on as if nothing had happened. Add a transition on `ID.lost` to a state around all in which the \
          configuration may be in force.";
+    COORD_REVERTED_UNHEARD = "coord::reverted_unheard", "nobody hears that a configuration was taken back unconfirmed",
+        "A configuration with `confirm` is taken back when its event does not come in time, and the coordinator hears \
+         `ID.reverted`, in whatever state it is: it is no answer to a state. On the way shown it is in a state in which no \
+         transition hears it, so it would go on as if the configuration were in force. Add a transition on `ID.reverted` to a \
+         state around all in which the configuration may wait for its confirmation, or wait for the event before going on.";
     COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
         "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
          neither from inside nor from outside. Only a forced shutdown gets the system out. Where the state waits for answers, \

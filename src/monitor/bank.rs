@@ -2,8 +2,8 @@
 
 use super::compile::{PIECES, compile};
 use super::program::Program;
-use crate::model::monitor::{Counter, Monitor, PortSignal, Sampling};
-use crate::model::{ComponentName, EventName, Ident, MemberRef, RunState};
+use crate::model::monitor::{Condition, Counter, Monitor, PortSignal, Sampling};
+use crate::model::{ComponentName, EventName, Ident, MemberRef, Origin, RunState};
 use crate::time::Time;
 use std::fmt;
 use std::time::Duration;
@@ -139,6 +139,27 @@ impl Bank {
     /// The monitors, with an empty history.
     pub fn new(monitors: &[Monitor]) -> Self {
         Self::with_memory(monitors, PIECES)
+    }
+
+    /// One condition by itself, watched from `now` on: without events, without what was before.
+    ///
+    /// # Panics
+    /// Never: its name is a plain one.
+    pub fn alone(condition: &Condition, now: Time) -> Self {
+        let monitor = Monitor {
+            name: Ident::new("holds").expect("a plain name"),
+            when: condition.clone(),
+            raise: None,
+            cleared: None,
+            repeat: None,
+            sampling: Sampling::OnSample,
+            enabled: false,
+            description: None,
+            origin: Origin::NONE,
+        };
+        let mut bank = Self::new(&[monitor]);
+        bank.enable(0, true, now);
+        bank
     }
 
     /// The same, with another number of pieces that each operator over time may keep (two at least).

@@ -200,7 +200,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
         let (owner, visit) = answer.request.tag;
         let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
         let incoming = match (owner, u32::try_from(visit)) {
-            (Some(owner), Ok(visit)) => Incoming::answer(event, Tag { owner, visit }),
+            (Some(owner), Ok(visit)) if answer.request.is_asked() => Incoming::answer(event, Tag { owner, visit }),
             _ => Incoming::control(event),
         };
         hub.taken(coordinator.deliver(incoming));

@@ -7,8 +7,8 @@
 use super::routes::Junction;
 use crate::configurator::{Conditions, Truth};
 use crate::limits;
-use crate::model::monitor::{Condition, Sampling};
-use crate::model::{Catalogue, ComponentName, ComponentType, Deployment, Ident, Monitor, Origin};
+use crate::model::monitor::Condition;
+use crate::model::{Catalogue, ComponentName, ComponentType, Deployment};
 use crate::monitor::{Bank, Input, Sample};
 use crate::platform::{Platform, Watch};
 use crate::time::{Clock, Signal, Time, lock};
@@ -52,19 +52,7 @@ pub(super) fn needed(deployment: &Deployment, catalogue: &Catalogue) -> bool {
 
 impl Under {
     fn new(condition: &Condition, platform: &dyn Platform, wake: &Signal, now: Time) -> Self {
-        let monitor = Monitor {
-            name: Ident::new("holds").expect("a plain name"),
-            when: condition.clone(),
-            raise: None,
-            cleared: None,
-            repeat: None,
-            sampling: Sampling::OnSample,
-            enabled: false,
-            description: None,
-            origin: Origin::NONE,
-        };
-        let mut bank = Bank::new(&[monitor]);
-        bank.enable(0, true, now);
+        let bank = Bank::alone(condition, now);
         let mut inputs = bank.inputs().to_vec();
         let own = inputs.len();
         let mut components: Vec<ComponentName> = Vec::new();

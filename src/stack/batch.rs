@@ -5,7 +5,7 @@
 //! fails, those before it stand, and those behind it are taken up anew. A request that is refused by itself is answered and
 //! left out, and the rest is planned anew.
 
-use super::work::{Op, Planned, Work};
+use super::work::{Op, Planned, Room, Work};
 use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
@@ -31,6 +31,8 @@ pub struct Rules<'a> {
     pub busy: bool,
     /// Frames that others under way pop or hand over to, and those that wait for their confirmation.
     pub held: &'a [FrameId],
+    /// Who asked for the pushes under way beside it: these have taken their places on the stack ([`places`]).
+    pub places: &'a [Requester],
     /// Undos and pushes of the batch were begun together, though not all of them may be left: some were answered since.
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
@@ -127,7 +129,8 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             }
         }
         if !group.places.is_empty() {
-            match work.finish(&world.system, (!rules.placed).then_some(rules.held)) {
+            let room = (!rules.placed).then_some(Room { held: rules.held, places: rules.places });
+            match work.finish(&world.system, room) {
                 Err(refusal) => {
                     let place = group.places[refusal.request.min(group.places.len() - 1)];
                     refused.push(no(place, &requests[place], Reason::Refused(refusal.findings)));

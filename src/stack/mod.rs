@@ -30,14 +30,14 @@ mod world;
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
 pub use desk::{Arrival, Desk, GivenUp, Gone, Turn, given_up_of};
-pub use effort::{Effort, effort, without};
+pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
-pub use settle::{About, Ending, Endings, Settled, Stopped, settle};
+pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, is_kept, shares};
-pub use work::{Op, Part, Planned, transaction};
+pub use work::{Op, Part, Planned, places, transaction};
 pub use world::{Broken, World};
 
 use crate::model::{ConfigId, Finding, Ident, codes};

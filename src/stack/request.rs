@@ -89,6 +89,12 @@ impl Request {
             tag: (0, 0),
         }
     }
+
+    /// Whether what it is answered is for the state that asked, and for nobody once that has been left. What came of a
+    /// confirmation that did not come answers nothing that was asked: the coordinator hears it in whatever state it is.
+    pub fn is_asked(&self) -> bool {
+        self.why == Why::Asked
+    }
 }
 
 /// Requests that belong together: raised in one step of a coordinator. They are carried out undos first, then pushes, each

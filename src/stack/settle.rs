@@ -3,8 +3,9 @@
 //! The parts of a group end in order: those before one that failed stand, and what stands behind it is taken up anew, since
 //! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
 
-use super::{Edits, FrameId, Group, Request, Why, World};
-use crate::model::{Ask, Verdict};
+use super::effort::without;
+use super::{Edits, Frame, FrameId, Group, Request, Why, World};
+use crate::model::{Ask, Step, Verdict};
 use smallvec::SmallVec;
 
 /// How a part of a group has ended.
@@ -58,6 +59,20 @@ pub struct Settled {
     /// Undos by leaving a state that were not carried out, by their places: their frames stay, and are frames like others.
     /// None: the frame of the visit that there is.
     pub stay: SmallVec<[(usize, Option<FrameId>); 2]>,
+}
+
+/// How a safe configuration has ended.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SafeEnd<'f> {
+    /// A step of it failed, or what became of one is not known; with the frame of what was done, if that is another one than
+    /// was planned.
+    pub failed: Option<Option<&'f Frame>>,
+    /// The steps that were not done.
+    pub missed: &'f [Step],
+    /// A piece of it could not even be planned.
+    pub left_out: bool,
+    /// Something is interrupted for its sake.
+    pub interrupts: bool,
 }
 
 /// What it comes to that the parts of `group` have ended so.
@@ -122,6 +137,29 @@ impl World {
         endings.iter().map(of).collect()
     }
 
+    /// A safe configuration has been applied as far as it goes. Its frame comes to stand above those of what it interrupted;
+    /// nothing of it is taken back, so what could not be done leaves it *broken*, with a partial frame. Its own answer comes
+    /// before those of what it interrupted, which end by [`settle`] as stopped for its sake. `busy`: see [`Stack::apply`].
+    ///
+    /// [`Stack::apply`]: super::Stack::apply
+    pub fn settle_safe(
+        &mut self,
+        edits: Edits,
+        frame: Frame,
+        end: &SafeEnd<'_>,
+        busy: &[FrameId],
+    ) -> (FrameId, Verdict) {
+        let broken = end.failed.is_some();
+        let frame = match end.failed {
+            None => frame,
+            Some(done) if !end.interrupts => Frame { partial: true, ..done.cloned().unwrap_or(frame) },
+            // As if what was interrupted had never been.
+            Some(_) => without(frame, end.missed),
+        };
+        let verdict = if broken || end.left_out { Verdict::Broken } else { Verdict::Ok };
+        (self.stack.push_safe(edits, frame, busy), verdict)
+    }
+
     /// Frames that were to be undone with the state they belong to stay.
     pub fn keep(&mut self, requests: &[Request], settled: &Settled) {
         for (place, frame) in &settled.stay {
@@ -134,14 +172,13 @@ impl World {
 }
 
 impl Request {
-    /// A request as it is told of: what took back a frame that was not confirmed tells of that frame's configuration.
+    /// A request as it is told of: what took back a frame that was not confirmed tells of that frame's configuration. Why it
+    /// is there stays with it: so it is no answer to a state.
     pub fn as_told(self, verdict: Verdict) -> (Self, Verdict) {
-        let told = Self { why: Why::Asked, ..self };
         match (self.why, verdict, self.ask) {
             (Why::Unconfirmed(..), Verdict::Undone, Ask::UndoOf(id)) => {
-                (Self { ask: Ask::Apply(id), ..told }, Verdict::Reverted)
+                (Self { ask: Ask::Apply(id), ..self }, Verdict::Reverted)
             }
-            (Why::Unconfirmed(..), ..) => (told, verdict),
             _ => (self, verdict),
         }
     }

@@ -21,11 +21,6 @@ pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, requester: Requester, bound: usi
     true
 }
 
-/// Whether there are two that could be squashed.
-pub(super) fn possible(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> bool {
-    pair(frames, requester, busy).is_some()
-}
-
 /// The places of the two that are squashed next: the oldest, but such that as much as possible stays possible. The upper
 /// one moves down to the lower, so nothing between may share with it.
 fn pair(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> Option<(usize, usize)> {

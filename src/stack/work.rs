@@ -104,7 +104,28 @@ pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Con
     for (i, op) in ops.iter().enumerate() {
         work.add(op, context).map_err(|refusal| Refusal { request: i, ..refusal })?;
     }
-    work.finish(system, Some(&[]))
+    work.finish(system, Some(Room { held: &[], places: &[] }))
+}
+
+/// What is taken of the stack by others.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room<'a> {
+    /// Frames that are not squashed.
+    pub held: &'a [FrameId],
+    /// Who asked for the pushes under way: so many more frames there will be of each.
+    pub places: &'a [Requester],
+}
+
+/// Who asks for the frames that a plan under way pushes, without those whose place another one of its requester leaves.
+pub fn places(planned: &Planned) -> SmallVec<[Requester; 2]> {
+    let pushes = planned.parts.iter().filter_map(|part| part.edits.push.as_ref());
+    let mut places: SmallVec<[Requester; 2]> = pushes.map(|frame| frame.requester).collect();
+    for popped in &planned.popped {
+        if let Some(at) = places.iter().position(|by| *by == popped.requester) {
+            places.remove(at);
+        }
+    }
+    places
 }
 
 /// A plan in the making.
@@ -314,12 +335,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         Ok(())
     }
 
-    /// Ends the plan: the net of what is undone and pushed, and room on the stack, where `held` frames are not squashed; none:
-    /// its place was taken when it began.
+    /// Ends the plan: the net of what is undone and pushed, and room on the stack, which each push takes when it begins, beside
+    /// those of others; none: it has begun, and has its place.
     ///
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
-    pub(super) fn finish(self, system: &System, held: Option<&[FrameId]>) -> Result<Planned, Refusal> {
+    pub(super) fn finish(self, system: &System, room: Option<Room<'_>>) -> Result<Planned, Refusal> {
         let Self { mut script, lone, frames, warnings, popped, parts, pushed, stack, replaced } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
         let undone = parts.iter().any(|part| part.pushes.is_none());
@@ -328,11 +349,14 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let whole = script.finish().map_err(|found| drifted(&found))?;
         let net = end.and_then(|end| shorter(system, &end, &whole));
         let waiting = parts.iter().filter(|part| part.edits.waits).filter_map(|part| part.edits.push.as_ref());
-        let busy: Vec<FrameId> = held.into_iter().flatten().copied().chain(waiting.map(|frame| frame.id)).collect();
-        for id in pushed.iter().filter(|_| held.is_some()) {
+        let held = room.iter().flat_map(|room| room.held).copied();
+        let busy: Vec<FrameId> = held.chain(waiting.map(|frame| frame.id)).collect();
+        for (id, room) in pushed.iter().flat_map(|id| room.map(|room| (id, room))) {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
-            let own = frames.iter().filter(|f| f.requester == frame.requester).count();
-            if own > stack.bound && !squash::possible(&frames, frame.requester, &busy) {
+            let taken = room.places.iter().filter(|by| **by == frame.requester).count();
+            let own = taken + frames.iter().filter(|f| f.requester == frame.requester).count();
+            let fits = || squash::fit(&mut frames.clone(), frame.requester, stack.bound.saturating_sub(taken), &busy);
+            if own > stack.bound && !fits() {
                 let message = format!("there are {own} frames of `{}`, and none can be squashed", frame.requester);
                 let finding = Finding::error(codes::STACK_FULL, message)
                     .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");

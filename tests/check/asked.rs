@@ -1,6 +1,6 @@
 //! Who asks besides the coordinators, what piles up, and what has no end.
 
-use crate::support::Small;
+use crate::support::{Said, Small};
 
 /// After many switches that nobody undoes the oldest frames are squashed, and one of them is asked to be undone.
 #[test]
@@ -130,4 +130,34 @@ fn a_floor_of_one_coordinator_is_none_for_another() {
         assert!(said.refused(request).iter().all(|(severity, _)| *severity == "info"), "{request}: {:#}", said.0);
     }
     assert!(said.of("coord::refused_by_other").is_empty(), "{:#}", said.0);
+}
+
+/// What has nothing to do may be through before its undo gives it up: that is the same, and the script that goes that way
+/// waits for neither answer.
+#[test]
+fn a_way_may_give_up_what_has_nothing_to_do() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), create(\"b\", \"Drive\") },
+        x = Configuration { property_set(\"a.gain\", 2.0) }, y = Configuration { property_set(\"b.gain\", 3.0) },";
+    let states = "idle = state {}, building = state { entry = \"base\" },
+        up = state { one = state { entry = \"x\" }, two = state { entry = \"y\" },
+            trans { src = \"initial\", tgt = \"one\" }, trans { src = \"one\", tgt = \"two\", events = { \"e_turn\" } },
+            trans { src = \"two\", tgt = \"one\", events = { \"e_turn\" } } },
+        first = state { entry = \"y.undo\" }, second = state { entry = \"x.undo\" }, last = state { entry = \"base.undo\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"first\", events = { \"e_shutdown\" } },
+        trans { src = \"first\", tgt = \"second\", events = { \"y.undone\" } },
+        trans { src = \"second\", tgt = \"last\", events = { \"x.undone\" } },
+        trans { src = \"last\", tgt = \"idle\", events = { \"base.undone\" } },";
+    let small = Small::new(configurations, states, "limits: { stack: 3 }\n");
+    let said = small.check();
+    let all = said.0["findings"].as_array().unwrap();
+    let gone = |finding: &&serde_json::Value| {
+        finding["trace"].is_array() && Said::answers(finding).iter().any(|answer| answer == "x.cancelled")
+    };
+    assert!(all.iter().any(|finding| gone(&finding)), "{:#}", said.0);
+    let numbered = (1..).zip(all).filter(|(_, finding)| gone(finding));
+    let scripts = numbered.map(|(number, _)| std::fs::read_to_string(small.demo.path(&format!("way{number}.lua"))));
+    assert!(scripts.flatten().any(|text| text.contains("which leads to the same")), "{:#}", said.0);
 }

@@ -103,6 +103,41 @@ fn what_is_reverted_is_followed() {
     assert!(refused.iter().any(|(_, message)| message.contains("there is no component `b`")), "{:#}", said.0);
 }
 
+/// That a frame was taken back unconfirmed is no answer to the state that asked: it is heard wherever the coordinator is by
+/// then, in the running deployment too (the script of the way), and has to be.
+#[test]
+fn what_is_reverted_is_heard_wherever_the_coordinator_is() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },
+        try = Configuration { create(\"b\", \"Drive\"), confirm = { event = \"e_fine\", within = 1.0 } },
+        use = Configuration { property_set(\"b.gain\", 2.0) },";
+    let said = |heard: &str| {
+        let states = format!(
+            "{STATES} trying = state {{ entry = \"try\" }}, tried = state {{}}, using = state {{ entry = \"use\" }},
+             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_try\" }} }},
+             trans {{ src = \"trying\", tgt = \"tried\", events = {{ \"try.ok\", \"try.failed\", \"try.broken\" }} }},
+             trans {{ src = \"{heard}\", tgt = \"using\", events = {{ \"try.reverted\" }} }},
+             trans {{ src = \"trying\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"tried\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"using\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},"
+        );
+        Small::new(configurations, &states, "").check()
+    };
+    let heard = said("tried");
+    let refused = heard.refused("use");
+    assert!(refused.iter().any(|(_, message)| message.contains("there is no component `b`")), "{:#}", heard.0);
+    // On the way down its own undo takes it back; behind one that failed it is said, and no more.
+    let behind = heard.of("coord::reverted_unheard");
+    assert!(behind.iter().all(|found| found["severity"] == "info"), "{:#}", heard.0);
+    // Only in the state that asked, which is left by then.
+    let deaf = said("trying");
+    assert!(deaf.refused("use").iter().all(|(severity, _)| *severity == "info"), "{:#}", deaf.0);
+    let found = deaf.of("coord::reverted_unheard");
+    assert_eq!(found.len(), 1, "{:#}", deaf.0);
+    assert_eq!(found[0]["severity"], "warning");
+    let message = found[0]["message"].as_str().unwrap();
+    assert!(message.contains("`try.reverted` in root.tried"), "{message}");
+}
+
 /// After something broke, a safety event must be heard still.
 #[test]
 fn after_broken_safety_events_are_heard() {
@@ -174,4 +209,59 @@ fn advice_names_what_never_comes() {
     let message = stuck[0]["message"].as_str().unwrap();
     assert!(message.contains("never comes") && message.contains("`base.undone`"), "{message}");
     assert!(stuck[0]["help"].as_str().unwrap().contains("on the entry"), "{:#}", stuck[0]);
+}
+
+/// What a configuration stands for is known beforehand where it rests on run states: applied where that is false, it can only
+/// fail. The script of the way sees it fail.
+#[test]
+fn what_can_never_hold_is_found_where_it_is_applied() {
+    let configurations = |holds: &str| {
+        format!(
+            "base = Configuration {{ create(\"a\", \"Drive\"), create(\"b\", \"Drive\"), post_conf_state = {{ \"a:running\", \"b:stopped\" }} }},
+             start = Configuration {{ post_conf_state = {{ \"b:running\" }} }},
+             try = Configuration {{ timeout = 0.5, property_set(\"a.gain\", 2.0), holds = {holds} }},"
+        )
+    };
+    let states = |more: &str| {
+        format!(
+            "{STATES} trying = state {{ entry = \"try\" }}, starting = state {{ entry = \"start\" }},
+             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_try\" }} }},
+             trans {{ src = \"up\", tgt = \"starting\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"trying\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"starting\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = {{ \"try.undo\", \"start.undo\" }} }},
+             {more}"
+        )
+    };
+    let said = |holds: &str, more: &str| Small::new(&configurations(holds), &states(more), "").check();
+    let severities = |said: &crate::support::Said| -> Vec<String> {
+        said.of("conf::holds_never").iter().map(|found| found["severity"].as_str().unwrap().to_owned()).collect()
+    };
+    let never = said("in_state(\"b\", \"running\")", "");
+    assert_eq!(severities(&never), ["error"], "{:#}", never.0);
+    let found = never.of("conf::holds_never")[0];
+    assert!(found["file"].as_str().unwrap().ends_with("conf.lua") && found["line"].is_number(), "{found:#}");
+    assert!(found["trace"].as_array().unwrap().len() > 2, "{found:#}");
+    // Nothing follows that only comes when it was applied: what it stands for cannot be lost.
+    assert!(never.of("coord::lost_unheard").is_empty(), "{:#}", never.0);
+    for (holds, wrong) in [
+        ("in_state(\"b\", \"stopped\")", false),
+        ("all { in_state(\"a\", \"running\"), no(faulted(\"b\")) }", false),
+        ("faulted(\"b\")", true),
+        ("any { in_state(\"b\", \"running\"), in_state(\"a\", \"stopped\") }", true),
+        ("in_state(\"a\", \"running\"):for_at_least(0.1)", false),
+        ("in_state(\"b\", \"running\"):for_at_least(0.1)", true),
+        // Values are not shown by this platform: then it counts as true.
+        ("all { above(\"a.out\", 1), in_state(\"b\", \"running\") }", false),
+    ] {
+        let said = said(holds, "");
+        assert_eq!(!severities(&said).is_empty(), wrong, "{holds}: {:#}", said.0);
+    }
+    // Asked for where another one has brought that about, it is applied; and where not, it is found still.
+    let after = said(
+        "in_state(\"b\", \"running\")",
+        "second = state { entry = \"try\" }, trans { src = \"starting\", tgt = \"second\", events = { \"start.ok\" } },
+         trans { src = \"second\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = { \"try.undo\", \"start.undo\" } },",
+    );
+    assert!(!after.of("coord::lost_unheard").is_empty(), "it may be in force: {:#}", after.0);
+    assert_eq!(severities(&after), ["error"], "{:#}", after.0);
 }

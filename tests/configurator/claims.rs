@@ -3,7 +3,7 @@
 
 use crate::rig::*;
 use davit::configurator::Requester;
-use davit::model::{Configuration, DeploymentLimits};
+use davit::model::{Configuration, Confirm, DeploymentLimits};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -132,4 +132,46 @@ fn what_is_carried_out_at_the_same_time_ends_as_one_after_the_other() {
     }
     let (compared, overlapped) = (compared.into_inner(), overlapped.into_inner());
     assert!(compared > 100 && overlapped > 150, "{compared} compared, {overlapped} came while something was under way");
+}
+
+/// All operators are one requester: what one connection is applying has its place on the stack, and counts for another one.
+#[test]
+fn what_operators_push_at_once_has_no_more_places_than_there_are() {
+    let waits = Configuration {
+        confirm: Some(Confirm { event: event("e_fine"), within: Duration::from_secs(1000) }),
+        ..configuration("waits", "", "set A.k 1", "")
+    };
+    let all = vec![
+        configuration("make", "", "create A; create B; create C", ""),
+        waits,
+        configuration("b", "", "set B.k 1", ""),
+        configuration("c", "", "set C.k 1", ""),
+        Configuration { group: Some(ident("gain")), ..configuration("one", "", "set B.k 2", "") },
+        Configuration { group: Some(ident("gain")), ..configuration("two", "", "set B.k 3", "") },
+    ];
+    let limits = DeploymentLimits { stack: 2, ..DeploymentLimits::default() };
+    let delays = || Delays { base: Duration::from_millis(500), ..Delays::default() };
+    let options = || Options { delays: delays(), ..Options::default() };
+    let rig = Rig::full(all.clone(), options(), |platform| Arc::new(platform), limits.clone());
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    // Neither of two can be squashed: one waits for its confirmation, and the other one is the newest.
+    assert_eq!(rig.ask_as("waits", Requester::Operator), ["waits.ok"]);
+    rig.submit_as("b", Requester::Operator).unwrap();
+    rig.submit_as("c", Requester::Operator).unwrap();
+    // Another requester has places of its own.
+    rig.submit("one");
+    rig.wait(100.0);
+    assert_eq!(rig.events()[2..], ["c.failed", "b.ok", "one.ok"]);
+    let told = rig.view();
+    assert_eq!(told.stack.iter().filter(|frame| frame.by == Requester::Operator).count(), 2, "{:?}", rig.frames());
+    rig.each_answered_once();
+
+    // A group's frame leaves its place to the one that comes for it.
+    let rig = Rig::full(all, options(), |platform| Arc::new(platform), limits);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    assert_eq!(rig.ask_as("one", Requester::Operator), ["one.ok"]);
+    rig.submit_as("two", Requester::Operator).unwrap();
+    rig.submit_as("waits", Requester::Operator).unwrap();
+    rig.wait(100.0);
+    assert_eq!(rig.events()[2..], ["two.ok", "waits.ok"]);
 }

@@ -70,7 +70,7 @@ fn passes(at: &Path) -> Option<bool> {
             .args(["test", "--locked", "--offline", "--test", "oracle"])
             .args(more)
             .current_dir(at)
-            .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "3000".to_owned()))
+            .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "5000".to_owned()))
             .env("DAVIT_ORACLE_ENOUGH", "1")
             .stdout(Stdio::null())
             .stderr(Stdio::null())
