@@ -387,33 +387,6 @@ impl Transaction {
         }
     }
 
-    /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
-    fn settle(&mut self, live: &mut System) -> Option<Poll> {
-        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
-        {
-            return None;
-        }
-        if self.reading {
-            let Some(seen) = self.seen.take() else { return Some(Poll::Wait) };
-            self.reading = false;
-            self.in_hand_mut().settle_by(seen.as_ref(), live);
-            return None;
-        }
-        if let Some(poll) = self.settle_by_questions(live) {
-            return Some(poll);
-        }
-        if !self.in_hand_mut().settle_blind(live) {
-            return None;
-        }
-        self.reading = true;
-        let run = self.in_hand();
-        let of = |i: u32| crate::system::touch::components(&run.list[i as usize].step);
-        let mut components: Vec<ComponentName> = run.unread.iter().flat_map(|(i, _)| of(*i)).collect();
-        components.sort_unstable();
-        components.dedup();
-        Some(Poll::Read(components))
-    }
-
     /// Whether nothing further of the list in hand is to begin.
     fn is_stopped(&self) -> bool {
         match self.phase {

@@ -2,7 +2,7 @@
 
 use super::messages::{Poll, Question};
 use super::run::Run;
-use super::{Asked, Transaction};
+use super::{Asked, Phase, Transaction};
 use crate::model::{ComponentName, Effect, RunState, Snapshot, Step};
 use crate::system::touch::components;
 use crate::system::{System, View as _};
@@ -22,6 +22,33 @@ fn is_asked(step: &Step, live: &System) -> bool {
 }
 
 impl Transaction {
+    /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
+    pub(super) fn settle(&mut self, live: &mut System) -> Option<Poll> {
+        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
+        {
+            return None;
+        }
+        if self.reading {
+            let Some(seen) = self.seen.take() else { return Some(Poll::Wait) };
+            self.reading = false;
+            self.in_hand_mut().settle_by(seen.as_ref(), live);
+            return None;
+        }
+        if let Some(poll) = self.settle_by_questions(live) {
+            return Some(poll);
+        }
+        if !self.in_hand_mut().settle_blind(live) {
+            return None;
+        }
+        self.reading = true;
+        let run = self.in_hand();
+        let of = |i: u32| components(&run.list[i as usize].step);
+        let mut about: Vec<ComponentName> = run.unread.iter().flat_map(|(i, _)| of(*i)).collect();
+        about.sort_unstable();
+        about.dedup();
+        Some(Poll::Read(about))
+    }
+
     /// The components of steps that failed.
     pub(super) fn failed_ones(&self) -> Vec<ComponentName> {
         let run = self.in_hand();
@@ -42,7 +69,7 @@ impl Transaction {
     }
 
     /// Settles the calls that name the condition that settles them. None: there are none.
-    pub(super) fn settle_by_questions(&mut self, live: &mut System) -> Option<Poll> {
+    fn settle_by_questions(&mut self, live: &mut System) -> Option<Poll> {
         let mut waits = false;
         let mut at = 0;
         while at < self.in_hand().unread.len() {

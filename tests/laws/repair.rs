@@ -8,7 +8,7 @@ use crate::plans::operator;
 use crate::settings;
 use davit::model::{ComponentName, Step, Transition};
 use davit::stack::{Broken, FrameId, Op, Reason, Residual, Stack, World, transaction};
-use davit::system::{View as _, diff, step, touch};
+use davit::system::{diff, step, touch};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rustc_hash::FxHashSet;
