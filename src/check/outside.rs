@@ -128,12 +128,11 @@ impl Product<'_> {
     /// A frame is taken back, since its confirmation did not come in time.
     fn unconfirmed(&mut self, state: &State, at: usize, id: ConfigId, nexts: &mut Nexts) {
         let waits = state.unconfirmed[at];
-        let confirm = self.worlds.configuration(id).and_then(|c| c.confirm);
         // In a world that is not known it may be any frame, or none any more.
         let unknown = self.worlds.top(state.world).filter(|_| self.tells_all).map(|_| FrameId(0));
         let frame = self.worlds.frame(state.world, waits.place).or(unknown);
-        let (Some(confirm), Some(frame)) = (confirm, frame) else { return };
-        let why = Why::Unconfirmed(frame, confirm.event, confirm.within);
+        let Some(frame) = frame else { return };
+        let why = Why::Unconfirmed(frame);
         let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
         let mut left = state.clone();
         left.unconfirmed.remove(at);

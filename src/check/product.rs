@@ -227,10 +227,10 @@ impl<'a> Product<'a> {
         if let Some(places) = &went.places {
             // Frames have the numbers of their world.
             for request in state.desk.requests_mut() {
-                if let Why::Unconfirmed(frame, event, within) = request.why {
+                if let Why::Unconfirmed(frame) = request.why {
                     let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
                     let frame = place.and_then(|place| self.worlds.frame(went.world, place));
-                    request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)), event, within);
+                    request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)));
                 }
             }
         }

@@ -24,14 +24,12 @@ use std::collections::{BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// A frame that waits for its confirmation.
 pub(super) struct Confirming {
     pub request: Request,
     pub frame: FrameId,
     pub event: EventName,
-    pub within: Duration,
     pub until: Time,
 }
 
@@ -251,7 +249,8 @@ impl Engine {
         while let Ok(mail) = self.inbox.try_recv() {
             self.take_in(mail);
         }
-        if self.counts.reports_lost.swap(false, Ordering::AcqRel) {
+        // Nearly never, and to look costs less than to take.
+        if self.counts.reports_lost.load(Ordering::Acquire) && self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.clear();
             self.suspects.extend(self.world.system.graph().node_weights().map(|node| node.name));
             self.returned = true;
@@ -260,7 +259,8 @@ impl Engine {
 
     fn take_in(&mut self, mail: Mail) {
         match mail {
-            Mail::Batch(batch) => self.arrive(batch),
+            Mail::Request(request) => self.arrive(Batch::one(request)),
+            Mail::Batch(batch) => self.arrive(*batch),
             Mail::Reply(ticket, reply) => {
                 if self.given_up.remove(&ticket) {
                     self.pool.came_back();

@@ -3,11 +3,11 @@
 //! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
 //! gets in when the queue of requests is full, and the reply of a worker always does.
 
-use super::request::Batch;
+use super::request::{Batch, Request};
 use crate::limits;
 use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
 use crate::platform::{Ended, ObserveError, PlatformEvent};
-use crate::time::{Clock, Receiver, Sender};
+use crate::time::{Clock, Receiver, Sender, TrySendError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -25,7 +25,9 @@ pub(super) enum Reply {
 
 /// What comes in.
 pub(super) enum Mail {
-    Batch(Batch),
+    /// A request alone: nearly all are, and what every letter takes in the box is what the largest kind takes.
+    Request(Request),
+    Batch(Box<Batch>),
     Reply(Ticket, Reply),
     /// A component became faulted, or came back.
     Platform(PlatformEvent),
@@ -98,13 +100,19 @@ impl Post {
             self.counts.requests.fetch_sub(plain, Ordering::AcqRel);
             return Err(batch);
         }
-        self.sender.try_send(Mail::Batch(batch)).map_err(|refused| {
+        let mail = match batch.requests[..] {
+            [request] => Mail::Request(request),
+            _ => Mail::Batch(Box::new(batch)),
+        };
+        self.sender.try_send(mail).map_err(|refused| {
             self.counts.requests.fetch_sub(plain, Ordering::AcqRel);
             self.counts.safe.fetch_sub(safe, Ordering::AcqRel);
             match refused {
-                crate::time::TrySendError::Full(Mail::Batch(batch))
-                | crate::time::TrySendError::Closed(Mail::Batch(batch)) => batch,
-                _ => Batch::default(),
+                TrySendError::Full(mail) | TrySendError::Closed(mail) => match mail {
+                    Mail::Request(request) => Batch::one(request),
+                    Mail::Batch(batch) => *batch,
+                    _ => Batch::default(),
+                },
             }
         })
     }

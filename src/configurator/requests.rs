@@ -220,14 +220,18 @@ impl Engine {
     fn finish(&mut self, request: Request, verdict: Option<Verdict>, reason: Option<Reason>) {
         match (request.why, verdict) {
             (_, None) | (Why::Down, _) => self.forget(request),
-            (Why::Unconfirmed(_, event, within), Some(verdict)) => {
+            (Why::Unconfirmed(_), Some(verdict)) => {
                 let begun =
                     self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
                 self.forget(request);
                 // It carries the number of the request that had pushed the frame.
                 let (told, verdict) = request.as_told(verdict);
-                let late = verdict == Verdict::Reverted;
-                let reason = if late { Some(Reason::NotConfirmed(event, within)) } else { reason };
+                let confirm = match told.ask {
+                    Ask::Apply(id) => self.configurations.get(&id).and_then(|c| c.confirm),
+                    _ => None,
+                };
+                let late = confirm.filter(|_| verdict == Verdict::Reverted);
+                let reason = late.map(|confirm| Reason::NotConfirmed(confirm.event, confirm.within)).or(reason);
                 self.tell_answer(told, verdict, reason.map(Arc::new), begun);
             }
             (Why::Asked, Some(verdict)) => self.answer(request, verdict, reason),
@@ -352,7 +356,7 @@ impl Engine {
         let begun = self.current.iter().find(|(r, _)| r.id == request.id).map_or(Time::default(), |(_, begun)| *begun);
         if !self.heard.iter().any(|(event, at)| *event == confirm.event && *at >= begun) {
             let until = self.clock.now() + confirm.within;
-            self.confirming.push(Confirming { request, frame, event: confirm.event, within: confirm.within, until });
+            self.confirming.push(Confirming { request, frame, event: confirm.event, until });
         }
     }
 
@@ -367,10 +371,9 @@ impl Engine {
         let now = self.clock.now();
         let mut some = false;
         while let Some(at) = self.confirming.iter().position(|waiting| waiting.until <= now) {
-            let Confirming { request, frame, event, within, .. } = self.confirming.remove(at);
+            let Confirming { request, frame, .. } = self.confirming.remove(at);
             let Ask::Apply(id) = request.ask else { continue };
-            let why = Why::Unconfirmed(frame, event, within);
-            let revert = Request { ask: Ask::UndoOf(id), scope: None, why, ..request };
+            let revert = Request { ask: Ask::UndoOf(id), scope: None, why: Why::Unconfirmed(frame), ..request };
             let _ = self.desk.arrive(Batch::one(revert), |_| false, &self.claims);
             some = true;
         }

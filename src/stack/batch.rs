@@ -244,7 +244,7 @@ fn resolve<'a>(
                 return tell(failed, Reason::Unknown(id));
             }
             let found = match (request.why, request.scope) {
-                (Why::Unconfirmed(frame, ..), _) => match work.frames.iter().find(|f| f.id == frame) {
+                (Why::Unconfirmed(frame), _) => match work.frames.iter().find(|f| f.id == frame) {
                     Some(frame) => Some(frame),
                     None => return Resolved::Tell(None, None),
                 },

@@ -1,9 +1,8 @@
 //! What is asked of a configurator: requests, who makes them, and which belong together (design §6).
 
-use crate::model::{Ask, ComponentName, EventName, OPERATOR, RequestId};
+use crate::model::{Ask, ComponentName, OPERATOR, RequestId};
 use smallvec::SmallVec;
 use std::fmt;
-use std::time::Duration;
 
 /// Who asked for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -42,8 +41,8 @@ pub struct Scope(pub u32);
 pub enum Why {
     /// Somebody asked for it.
     Asked,
-    /// The frame of an earlier request was not confirmed by this event within this time: it is taken back.
-    Unconfirmed(FrameId, EventName, Duration),
+    /// This frame of an earlier request was not confirmed in time: it is taken back.
+    Unconfirmed(FrameId),
     /// The coordinator has come to its *down* state.
     Down,
 }
