@@ -129,6 +129,36 @@ impl<'o, 's> Script<'o, 's> {
         self.push(item, wave, after).map(Some)
     }
 
+    /// Adds a step of what is left of something that was taken back in part: what had brought its component to where a property
+    /// may be set may be gone without it, so that is done for it and taken back.
+    ///
+    /// # Errors
+    /// The false preconditions.
+    pub fn add_left(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
+        let Step::PropertySet { property, value } = &item.step else { return self.add(item, wave, after) };
+        let component = property.component;
+        let Some(node) = self.view.component(component) else { return self.add(item, wave, after) };
+        let (state, declared) = (node.state, node.property(property.member).map(|(_, declared)| declared.tunable));
+        let lower = [Wanted::Stopped, Wanted::Unconfigured];
+        let goal = lower.into_iter().find(|goal| declared.is_some_and(|tunable| tunable.allows((*goal).into())));
+        let (Some(goal), Some(back)) = (goal, state.wanted()) else { return self.add(item, wave, after) };
+        if declared.is_none_or(|tunable| tunable.allows(state)) || node.value(property.member) == Some(value) {
+            return self.add(item, wave, after);
+        }
+        let (stage, origin) = (item.stage, item.origin);
+        let go = |script: &mut Self, from: RunState, to: Wanted, after: &[StepId]| {
+            let mut last: SmallVec<[StepId; 1]> = SmallVec::from_slice(after);
+            for transition in from.path_to(to) {
+                let step = Step::State { component, transition: *transition };
+                last = SmallVec::from_elem(script.push(Item::bare(step, stage, origin), wave, &last)?, 1);
+            }
+            Ok::<_, Vec<Violation>>(last)
+        };
+        let down = go(self, state, goal, after)?;
+        let Some(id) = self.add(item, wave, &down)? else { return Ok(None) };
+        Ok(go(self, goal.into(), back, &[id])?.last().copied())
+    }
+
     /// Brings a failed component to where it is to be.
     fn settle(&mut self, component: ComponentName, wave: u32) -> Result<(), Vec<Violation>> {
         let Some((goal, stage, origin)) = self.goals.remove(&component) else { return Ok(()) };

@@ -248,7 +248,10 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                     }
                     let after: SmallVec<[StepId; 1]> =
                         self.script.steps.last().filter(|s| s.wave == wave).map(|s| s.id).into_iter().collect();
-                    self.script.add(item.clone(), wave, &after)?;
+                    match frame.partial {
+                        true => self.script.add_left(item.clone(), wave, &after)?,
+                        false => self.script.add(item.clone(), wave, &after)?,
+                    };
                 }
                 self.script.settle_all()
             }

@@ -94,7 +94,7 @@ impl Transaction {
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut way = WayBack::default();
         let held = self.holds(part);
-        if self.taken_down || held && part == 0 {
+        if self.taken_down || held && part == 0 && !self.interrupted {
             return way;
         }
         let mut ends: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
@@ -126,7 +126,7 @@ impl Transaction {
         // A call that was given up and may have happened counts as done: its compensation takes it back. Of one that nobody
         // gave up it is not known, and stays so; where it may have moved, nothing goes back past it.
         let perhaps = self.perhaps_done();
-        if !self.asked_back {
+        if !self.asked_back && !held {
             let moves =
                 |i: &&u32| !self.may_move(**i) && self.steps_back(**i, part).iter().any(|back| step::moves(back, live));
             if let Some(i) = perhaps.iter().find(moves) {
@@ -136,7 +136,12 @@ impl Transaction {
         }
         let perhaps = perhaps.into_iter().filter(|_| self.asked_back).rev();
         for i in perhaps.chain(forward.done.iter().rev().copied()) {
-            if held || self.taken_back.contains(&i) || self.part_of(i) < part {
+            if self.taken_back.contains(&i) || self.part_of(i) < part {
+                continue;
+            }
+            // What is held stays as it is, but for what safe configurations want of it.
+            if held && !self.goes_all_the_same(i, part) {
+                way.superseded.extend(self.is_theirs(i, part).then_some(i));
                 continue;
             }
             let late = self.late(i);
@@ -201,6 +206,23 @@ impl Transaction {
     /// Whether what was done of a part stays when it fails.
     fn holds(&self, part: usize) -> bool {
         self.planned.parts[part].on_failure == OnFailure::Hold && !self.asked_back
+    }
+
+    /// Whether a step that is held goes back all the same: it came in after a safe configuration had begun that wants it
+    /// otherwise.
+    fn goes_all_the_same(&self, i: u32, part: usize) -> bool {
+        let overwritten = |revision| self.touched.overwrote(&self.forward_step(i).step, revision);
+        self.late(i).is_some_and(|(_, revision)| !overwritten(revision)) && self.is_theirs(i, part)
+    }
+
+    /// Whether safe configurations have touched all that taking a step back would: it is theirs, and they restore it.
+    fn is_theirs(&self, i: u32, part: usize) -> bool {
+        let back = self.steps_back(i, part);
+        self.interrupted && !back.is_empty() && back.iter().all(|back| self.touched.has(back))
+    }
+
+    fn forward_step(&self, i: u32) -> &PlannedStep {
+        &self.forward.as_ref().expect("something was carried out").list[i as usize]
     }
 
     /// Whether the way back of a forward step may move.

@@ -177,6 +177,12 @@ impl Transaction {
         };
         // What may have happened is taken back by the frame.
         let whole = self.mends(part) && self.perhaps.is_empty() && remaining.iter().all(plain);
+        // What cannot be taken back beside what safe configurations want is left, and told.
+        let whole = whole
+            && (!self.interrupted
+                || self.between.is_some()
+                || self.origin.is_some()
+                || self.take_back(&remaining, part, &mut wanted.clone()));
         let origin = self.origin.as_ref().filter(|_| self.interrupted);
         match (&self.between, origin, whole) {
             (Some(between), _, true) => {
@@ -190,7 +196,7 @@ impl Transaction {
                     let _ = step::apply(step, &mut wanted);
                 }
             }
-            (None, None, true) => self.take_back(&remaining, part, &mut wanted),
+            (None, None, true) => _ = self.take_back(&remaining, part, &mut wanted),
             // Of what was taken back in part the rest belongs to what should be.
             (_, _, false) => {
                 let partly: Vec<u32> = remaining.iter().copied().filter(|i| self.is_partly_back(*i)).collect();
@@ -200,15 +206,18 @@ impl Transaction {
         (wanted, whole)
     }
 
-    /// Takes `remaining` back on `system`, latest first, as far as that goes.
-    fn take_back(&self, remaining: &[u32], part: usize, system: &mut System) {
+    /// Takes `remaining` back on `system`, latest first, as far as that goes. False: not all of it may be done there, since safe
+    /// configurations have led elsewhere.
+    fn take_back(&self, remaining: &[u32], part: usize, system: &mut System) -> bool {
+        let mut all = true;
         let forward = self.forward.as_ref().expect("it was carried out");
         let mut heed = Heed::new(&self.touched, remaining.iter().map(|i| &forward.list[*i as usize].step));
         for back in remaining.iter().rev().flat_map(|i| self.steps_back(*i, part)) {
             for back in heed.instead_of(back, &*system) {
-                let _ = step::apply(&back, system);
+                all &= step::apply(&back, system).is_ok();
             }
         }
+        all
     }
 
     /// Compares what was seen of its components with what should be; mends the difference once; names what remains.

@@ -18,6 +18,7 @@ types:
       look: { effect: none }
   M:
     moves: [start, stop]
+    properties: { n: { type: float, default: 0.0, tunable: unconfigured } }
     operations:
       open: { effect: { undo: close } }
       close: { effect: { undo: open } }
@@ -40,6 +41,9 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   go    = Configuration { post_conf_state = { "c:running" } },
   work  = Configuration { pre_conf_state = { "c:running" }, property_set("b.k", 3), operation_call("c.open") },
   halt  = Configuration { post_conf_state = { "c:stopped" } },
+  held  = Configuration { on_failure = "hold", post_conf_state = { "c:running" } },
+  keep  = Configuration { on_failure = "hold", pre_conf_state = { "c:stopped" }, operation_call("b.open") },
+  swap  = Configuration { pre_conf_state = { "c:unconfigured" }, property_set("c.n", 4), post_conf_state = { "c:running" } },
   both  = Configuration { operation_call("a.up"), operation_call("b.open") },
   safe  = Configuration { safe = true, property_set("b.k", 9) },
   rest  = Configuration { safe = true, post_conf_state = { "c:stopped" } },
@@ -190,6 +194,43 @@ fn what_starts_late_is_stopped_where_a_safe_configuration_wants_it_stopped() {
         fault('start c', 'slow', 1, 0.8) apply('go', {force = true}) wait(0.4)
         apply('rest') wait_answer('rest.ok', 0.1) wait_answer('go.failed', 5) assert(state('c') == 'stopped')");
     assert_eq!(steps(&log, "go.failed"), ["start c", "undo: stop c"]);
+}
+
+/// `hold` keeps nothing that a safe configuration wants otherwise.
+#[test]
+fn what_is_held_and_starts_late_is_stopped_where_a_safe_configuration_wants_it_stopped() {
+    let log = run(
+        "apply('build', {force = true}) wait_answer('build.ok', 1)
+        fault('start c', 'slow', 1, 0.8) apply('held', {force = true}) wait(0.4)
+        apply('rest') wait_answer('rest.ok', 0.1) wait_answer('held.failed', 5) assert(state('c') == 'stopped')
+        undo('rest') wait_answer('rest.undone', 1) assert(state('c') == 'stopped' and #drift() == 0 and #stack() == 2)",
+    );
+    assert_eq!(steps(&log, "held.failed"), ["start c", "undo: stop c"]);
+}
+
+/// What a safe configuration restores is not restored once more with what is held.
+#[test]
+fn what_a_safe_configuration_restores_is_not_in_the_frame_of_what_is_held() {
+    let log = run(
+        "apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)
+        fault('operation_call b.open', 'slow', 1, 0.8) apply('keep', {force = true}) wait(0.4)
+        apply('rest') wait_answer('rest.ok', 0.1) wait_answer('keep.broken', 5) assert(state('c') == 'stopped')
+        undo('rest', {force = true}) wait_answer('rest.undone', 1) assert(state('c') == 'running')
+        undo('keep') wait_answer('keep.undone', 1) assert(state('c') == 'running' and #drift() == 0 and #stack() == 3)",
+    );
+    assert_eq!(steps(&log, "keep.undone"), ["operation_call b.close"]);
+}
+
+/// What cannot be taken back beside what a safe configuration wants is left, told, and taken back when that is undone.
+#[test]
+fn what_is_left_beside_a_safe_configuration_is_told_and_can_be_undone() {
+    let log = run("apply('build', {force = true}) wait_answer('build.ok', 1)
+        fault('configure c', 'slow', 1, 0.8) apply('swap', {force = true}) wait(0.4)
+        apply('rest') wait_answer('rest.ok', 5) wait_answer('swap.broken', 5)
+        assert(state('c') == 'stopped' and property('c.n') == 4 and #stack() == 4)
+        undo('rest') wait_answer('rest.undone', 1) undo('swap') wait_answer('swap.undone', 1)
+        assert(state('c') == 'stopped' and property('c.n') == 0 and #drift() == 0 and #stack() == 2)");
+    assert_eq!(steps(&log, "swap.undone"), ["cleanup c", "property_set c.n", "configure c"]);
 }
 
 /// While a safe configuration is in force, who recovers moves nothing.
