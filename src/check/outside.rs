@@ -174,8 +174,8 @@ impl Product<'_> {
     ) -> Option<Trouble> {
         let (Verdict::Reverted, Ask::Apply(id)) = (verdict, request.ask) else { return None };
         let undoes = |other: &Request| {
-            other.requester == request.requester && matches!(other.ask, Ask::UndoOf(of) if of == id)
-                || other.requester == request.requester && other.ask == Ask::Undo
+            let undo = other.ask == Ask::Undo || matches!(other.ask, Ask::UndoOf(of) if of == id);
+            undo && other.requester == request.requester
         };
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
         let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);

@@ -152,7 +152,7 @@ fn what_operators_push_at_once_has_no_more_places_than_there_are() {
     let limits = DeploymentLimits { stack: 2, ..DeploymentLimits::default() };
     let delays = || Delays { base: Duration::from_millis(500), ..Delays::default() };
     let options = || Options { delays: delays(), ..Options::default() };
-    let rig = Rig::full(all.clone(), options(), |platform| Arc::new(platform), limits.clone());
+    let rig = Rig::full(all.clone(), options(), |platform| Arc::new(platform), limits);
     assert_eq!(rig.ask("make"), ["make.ok"]);
     // Neither of two can be squashed: one waits for its confirmation, and the other one is the newest.
     assert_eq!(rig.ask_as("waits", Requester::Operator), ["waits.ok"]);
