@@ -275,6 +275,13 @@ fn what_a_safe_configuration_wrote_is_over_with_it_though_a_call_was_lost_meanwh
         undo('rise') wait_answer('rise.undone', 1) assert(property('c.k') == 0 and #drift() == 0)"
     ));
     assert_eq!(steps(&log, "rise.undone"), ["operation_call c.dn"], "{log}");
+    // What somebody has written since is not the safe configuration's.
+    run(&format!(
+        "{BUILT} apply('slow') apply('tune', {{force = true}}) wait_answer('tune.ok', 1)
+        fault('operation_call c.up', 'lost', 1) apply('rise', {{force = true}}) wait_answer('rise.broken', 5)
+        undo('slow', {{force = true}}) wait_answer('slow.undone', 1) assert(property('c.k') == 7)
+        undo('rise') wait_answer('rise.undone', 1) assert(property('c.k') == 7 and #drift() == 0)"
+    ));
 }
 
 /// Found while it is in force, or before it came: what it stopped is no difference.
