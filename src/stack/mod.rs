@@ -122,7 +122,7 @@ impl Frame {
             _ => None,
         });
         let last = back.next()?;
-        Some((back.last().unwrap_or(last).target(), last.inverse().target()))
+        Some((back.next_back().unwrap_or(last).target(), last.inverse().target()))
     }
 
     /// Whether several frames were squashed into it.
