@@ -157,7 +157,7 @@ impl Engine {
         let cause = Reason::SeenOtherwise(steps.clone());
         let residual = Arc::new(Residual { difference: steps, ..Residual::of(cause.clone()) });
         let culprit = losers.first().map(|frame| (frame.configuration, frame.requester));
-        self.world.broken.push(Broken {
+        self.world.breaks(Broken {
             residual: residual.clone(),
             components: components.into_iter().collect(),
             culprit,

@@ -227,7 +227,7 @@ impl Engine {
         if !residual.is_settled() {
             let expected = expected.snapshot();
             let residual = residual.clone();
-            self.world.broken.push(Broken { residual, components, culprit, frame: None, mendable: true, expected });
+            self.world.breaks(Broken { residual, components, culprit, frame: None, mendable: true, expected });
         }
         while let Some((request, begun)) = self.current.pop() {
             let reason = Arc::new(Reason::Broken(residual.clone()));

@@ -138,7 +138,7 @@ impl Engine {
             let out = |step: &Step| self.world.quarantined.contains(&step.component());
             broken.residual.unsettled.iter().any(out)
         };
-        if observed && system::diff::reached(&self.world.system, &wanted) && !out() {
+        if observed && system::diff::reached(&self.world.system, &wanted) && !out() && !self.world.is_hidden(&broken) {
             self.world.hand_meant(&broken);
             self.drop_empty(broken.frame);
             self.changed();

@@ -259,7 +259,7 @@ impl Engine {
                 _ => None,
             };
             let broken = Broken { residual, components, culprit, frame, mendable: true, expected };
-            self.world.broken.push(broken);
+            self.world.breaks(broken);
         }
         self.changed();
     }

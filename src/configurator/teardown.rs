@@ -80,7 +80,7 @@ impl Engine {
                 ..Residual::of(cause)
             };
             let components = down.left.components.keys().copied().chain(down.quarantined.iter().copied()).collect();
-            self.world.broken.push(Broken {
+            self.world.breaks(Broken {
                 residual: Arc::new(residual),
                 components,
                 culprit: None,

@@ -7,7 +7,7 @@
 
 use super::work::{Op, Planned, is_bound, transaction};
 use super::{Broken, FrameId, HandOver, World, net};
-use crate::model::{ComponentName, MemberRef, Origin, Step};
+use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{Item, Script, absolute};
 use crate::plan::{Context, PlannedStep, SavedValue, Stage, StepId};
@@ -24,8 +24,36 @@ impl World {
         meant
     }
 
-    /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it since is
-    /// as that wrote it.
+    /// Something is broken from now on. What the model has of it may have been written by safe configurations in force: what is
+    /// expected is without that, since their undo is to lead there.
+    pub fn breaks(&mut self, mut broken: Broken) {
+        let written = self.overwritten(&broken).map(|(_, saved)| (saved.slot, saved.value.clone()));
+        for (slot, value) in written.collect::<Vec<_>>() {
+            match (slot, value) {
+                (Slot::Property(property), Saved::Property(value)) => {
+                    let one = broken.expected.components.get_mut(&property.component);
+                    let there = one.and_then(|one| one.properties.get_mut(&property.member));
+                    there.into_iter().for_each(|there| *there = value.clone());
+                }
+                (Slot::Port(port), Saved::Port(Some(value)))
+                    if broken.expected.components.contains_key(&port.component) =>
+                {
+                    broken.expected.ports.insert(port, value);
+                }
+                (Slot::Port(port), Saved::Port(None)) => drop(broken.expected.ports.remove(&port)),
+                _ => {}
+            }
+        }
+        for (name, one) in &mut broken.expected.components {
+            if let Some((before, _)) = self.moved_by_safe(*name).filter(|(_, after)| *after == one.state) {
+                one.state = before;
+            }
+        }
+        self.broken.push(broken);
+    }
+
+    /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it is as
+    /// that wrote it.
     pub fn put_meant(&self, broken: &Broken, system: &mut System) {
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let _ = system.adopt(&components, &broken.expected);
@@ -48,18 +76,46 @@ impl World {
             // Not a step that is done: nothing need allow it.
             written.iter().for_each(|step| step::effect(step, system));
         }
+        for component in components {
+            // Where their undo leads somewhere else than is expected, that is told all the time.
+            let state = system.component(component).map(|node| node.state);
+            if let Some((_, after)) = self.moved_by_safe(component).filter(|(before, _)| Some(*before) == state) {
+                system.set_state(component, after);
+            }
+        }
     }
 
-    /// What safe configurations in force overwrote of something broken: the frame of the first of each slot.
+    /// What safe configurations in force overwrote of something broken, and nobody after them: the frame of the first of each
+    /// slot.
     fn overwritten<'w>(&'w self, broken: &'w Broken) -> impl Iterator<Item = (FrameId, &'w SavedValue)> {
-        let frames = self.stack.frames().iter().filter(|frame| frame.safe);
-        let saved = frames.flat_map(|frame| frame.saved.iter().map(|saved| (frame.id, saved)));
-        let mut met: Vec<Slot> = Vec::new();
-        saved.filter(move |(_, saved)| {
-            let own = broken.components.contains(&saved.slot.components().0) && !met.contains(&saved.slot);
-            met.extend(own.then_some(saved.slot));
-            own
+        let all = self.stack.frames().iter().filter(|frame| frame.safe).flat_map(|frame| &frame.saved);
+        let mut slots: Vec<Slot> = all.map(|saved| saved.slot).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        slots.retain(|slot| broken.components.contains(&slot.components().0));
+        slots.into_iter().filter_map(|slot| {
+            let frames = self.stack.frames().iter().rev();
+            let writes =
+                frames.filter_map(move |frame| Some((frame, frame.saved.iter().find(|saved| saved.slot == slot)?)));
+            writes.take_while(|(frame, _)| frame.safe).last().map(|(frame, saved)| (frame.id, saved))
         })
+    }
+
+    /// Whether safe configurations in force have brought something broken to where it is expected, though their undo leads
+    /// elsewhere: then it is broken still, and mended when they are undone.
+    pub fn is_hidden(&self, broken: &Broken) -> bool {
+        let mut expected = broken.expected.components.iter();
+        expected.any(|(name, one)| {
+            self.moved_by_safe(*name).is_some_and(|(before, after)| after == one.state && before != one.state)
+        })
+    }
+
+    /// From where to where safe configurations in force moved a component, if nobody has moved it since.
+    fn moved_by_safe(&self, component: ComponentName) -> Option<(RunState, RunState)> {
+        let moves = self.stack.frames().iter().rev().filter_map(|frame| Some((frame, frame.moved(component)?)));
+        let mut safe = moves.take_while(|(frame, _)| frame.safe).map(|(_, moved)| moved);
+        let (before, after) = safe.next()?;
+        Some((safe.last().map_or(before, |(before, _)| before), after))
     }
 
     /// Something is broken no more: what safe configurations in force overwrote of it goes back to what the model had there.

@@ -40,7 +40,7 @@ pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, places, transaction};
 pub use world::{Broken, World};
 
-use crate::model::{ConfigId, Finding, Ident, codes};
+use crate::model::{ComponentName, ConfigId, Finding, Ident, RunState, Step, codes};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::plan::{PlannedStep, SavedValue};
@@ -108,6 +108,21 @@ impl Frame {
             Inverse::Steps(steps) => steps,
             Inverse::List(_) => &[],
         }
+    }
+
+    /// From where to where it moved a component, as far as its undo takes that back.
+    pub(crate) fn moved(&self, component: ComponentName) -> Option<(RunState, RunState)> {
+        let (steps, items) = match &self.inverse {
+            Inverse::Steps(steps) => (steps.as_slice(), [].as_slice()),
+            Inverse::List(items) => ([].as_slice(), items.as_slice()),
+        };
+        let undone = steps.iter().rev().flat_map(|done: &PlannedStep| done.undo.steps());
+        let mut back = undone.chain(items.iter().map(|item: &Item| &item.step)).filter_map(|step| match step {
+            Step::State { component: of, transition } if *of == component => Some(*transition),
+            _ => None,
+        });
+        let last = back.next()?;
+        Some((back.next_back().unwrap_or(last).target(), last.inverse().target()))
     }
 
     /// Whether several frames were squashed into it.

@@ -18,8 +18,10 @@ types:
       look: { effect: none }
   M:
     moves: [start, stop]
-    properties: { n: { type: float, default: 0.0, tunable: unconfigured } }
+    properties: { k: { type: float, default: 0.0 }, n: { type: float, default: 0.0, tunable: unconfigured } }
     operations:
+      up: { effect: { undo: dn }, moves: true }
+      dn: { effect: { undo: up }, moves: true }
       open: { effect: { undo: close } }
       close: { effect: { undo: open } }
 configurations: [conf.lua]
@@ -47,6 +49,9 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   both  = Configuration { operation_call("a.up"), operation_call("b.open") },
   safe  = Configuration { safe = true, property_set("b.k", 9) },
   rest  = Configuration { safe = true, post_conf_state = { "c:stopped" } },
+  tune  = Configuration { property_set("c.k", 7) },
+  rise  = Configuration { operation_call("c.up") },
+  slow  = Configuration { safe = true, property_set("c.k", 9) },
   meant = Configuration { confirm = { event = "e_conf", within = 1.0 }, on_failure = "rollback", operation_call("a.up") },
 }
 "#;
@@ -279,4 +284,66 @@ fn what_is_undone_is_not_mended_first() {
         fault('stop c', 'lie') apply('halt', {force = true}) wait_answer('halt.ok', 1) wait(8) assert(state('c') == 'running')
         undo('halt') wait_answer('halt.undone', 1) assert(state('c') == 'running' and #drift() == 0)");
     assert!(steps(&log, "halt.undone").is_empty(), "{log}");
+}
+
+/// `c` runs.
+const BUILT: &str = "apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)";
+/// Nothing is told of a state of `c`.
+const STILL: &str = "for _, d in ipairs(drift()) do assert(not d.text:find('st[oa][pr]t? c'), d.text) end";
+
+/// What is broken while a safe configuration is in force is expected as it was without that: once that is undone, nothing is
+/// brought to where that had wanted it.
+#[test]
+fn what_a_safe_configuration_stopped_runs_again_though_a_call_was_lost_meanwhile() {
+    let log = run(&format!(
+        "{BUILT} fault('operation_call c.up', 'lost', 1) apply('rise', {{force = true}}) wait(0.1)
+        apply('rest') wait_answer('rise.broken', 5) assert(state('c') == 'stopped') {STILL}
+        undo('rest', {{force = true}}) wait_answer('rest.undone', 1) assert(state('c') == 'running') {STILL}
+        undo('rise') wait_answer('rise.undone', 1) assert(state('c') == 'running' and #drift() == 0)
+        undo('go') wait_answer('go.undone', 1)"
+    ));
+    assert_eq!(steps(&log, "rest.undone"), ["start c"], "{log}");
+    assert_eq!(steps(&log, "rise.undone"), ["operation_call c.dn"], "{log}");
+}
+
+#[test]
+fn what_a_safe_configuration_wrote_is_over_with_it_though_a_call_was_lost_meanwhile() {
+    let log = run(&format!(
+        "{BUILT} fault('operation_call c.up', 'lost', 1) apply('rise', {{force = true}}) wait(0.1)
+        apply('slow') wait_answer('rise.broken', 5) assert(property('c.k') == 9)
+        undo('slow') wait_answer('slow.undone', 1) assert(property('c.k') == 0)
+        undo('rise') wait_answer('rise.undone', 1) assert(property('c.k') == 0 and #drift() == 0)"
+    ));
+    assert_eq!(steps(&log, "rise.undone"), ["operation_call c.dn"], "{log}");
+    // What somebody has written since is not the safe configuration's.
+    run(&format!(
+        "{BUILT} apply('slow') apply('tune', {{force = true}}) wait_answer('tune.ok', 1)
+        fault('operation_call c.up', 'lost', 1) apply('rise', {{force = true}}) wait_answer('rise.broken', 5)
+        undo('slow', {{force = true}}) wait_answer('slow.undone', 1) assert(property('c.k') == 7)
+        undo('rise') wait_answer('rise.undone', 1) assert(property('c.k') == 7 and #drift() == 0)"
+    ));
+}
+
+/// Found while it is in force, or before it came: what it stopped is no difference.
+#[test]
+fn what_a_safe_configuration_stopped_runs_again_though_a_lie_was_found_meanwhile() {
+    for (before, within) in [(2, 7), (8, 1)] {
+        let lied = format!(
+            "{BUILT} fault('property_set c.k', 'lie', 1) apply('tune', {{force = true}}) wait({before})
+            apply('rest') wait({within}) assert(state('c') == 'stopped' and #drift() == 1) {STILL}
+            undo('rest', {{force = true}}) wait_answer('rest.undone', 1) assert(state('c') == 'running') {STILL}"
+        );
+        let log = run(&format!(
+            "{lied} undo('tune') wait_answer('tune.undone', 1) assert(state('c') == 'running' and #drift() == 0)"
+        ));
+        assert!(steps(&log, "tune.undone").is_empty(), "{log}");
+        run(&format!("{lied} recover('back') assert(state('c') == 'running' and property('c.k') == 7)"));
+    }
+    // Its own lie is told: it is to be stopped, and runs. Its undo has nothing to do.
+    let log = run(&format!(
+        "{BUILT} fault('stop c', 'lie', 1) apply('rest') wait(8) assert(state('c') == 'running')
+        local told for _, d in ipairs(drift()) do told = told or d.text:find('start c', 1, true) end assert(told)
+        undo('rest', {{force = true}}) wait_answer('rest.undone', 1) assert(state('c') == 'running' and #drift() == 0)"
+    ));
+    assert!(steps(&log, "rest.undone").is_empty(), "{log}");
 }
