@@ -46,6 +46,7 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   held  = Configuration { on_failure = "hold", post_conf_state = { "c:running" } },
   keep  = Configuration { on_failure = "hold", pre_conf_state = { "c:stopped" }, operation_call("b.open") },
   swap  = Configuration { pre_conf_state = { "c:unconfigured" }, property_set("c.n", 4), post_conf_state = { "c:running" } },
+  again = Configuration { pre_conf_state = { "c:stopped" }, operation_call("b.open"), post_conf_state = { "c:running" } },
   both  = Configuration { operation_call("a.up"), operation_call("b.open") },
   safe  = Configuration { safe = true, property_set("b.k", 9) },
   rest  = Configuration { safe = true, post_conf_state = { "c:stopped" } },
@@ -224,6 +225,20 @@ fn what_a_safe_configuration_restores_is_not_in_the_frame_of_what_is_held() {
         undo('keep') wait_answer('keep.undone', 1) assert(state('c') == 'running' and #drift() == 0 and #stack() == 3)",
     );
     assert_eq!(steps(&log, "keep.undone"), ["operation_call b.close"]);
+}
+
+/// A safe configuration brings something broken to where it is expected, and its undo takes it away from there again: an undo
+/// that is refused meanwhile does not take it for mended.
+#[test]
+fn what_a_safe_configuration_hides_stays_broken() {
+    let log = run("apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)
+        fault('stop c', 'lie') apply('again', {force = true}) wait_answer('again.broken', 1) assert(state('c') == 'running')
+        apply('rest') wait_answer('rest.ok', 1) assert(state('c') == 'stopped')
+        undo('again') wait_answer('again.undo.broken', 1)
+        undo('rest', {force = true}) wait_answer('rest.undone', 1) assert(state('c') == 'running')
+        undo('again', {force = true}) wait_answer('again.undone', 1)
+        assert(state('c') == 'running' and #drift() == 0 and #stack() == 3)");
+    assert!(steps(&log, "again.undone").is_empty(), "{log}");
 }
 
 /// What cannot be taken back beside what a safe configuration wants is left, told, and taken back when that is undone.
