@@ -326,9 +326,17 @@ impl Transaction {
                 ..Residual::of(self.reason())
             }
         };
+        // Given up before anything of it began: what is doubtful is whether those before it could be finished.
+        let of_it = |i: &u32| self.part_of(*i) >= part;
+        let touched = forward.done.iter().chain(&forward.unsettled).chain(&self.perhaps).any(of_it);
+        let finishing = part > 0 && !clean && !touched && !self.interrupted && self.given_up.contains(&part);
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
-            parts.push(if at < part {
+            parts.push(if finishing && at + 1 == part {
+                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole)
+            } else if finishing && at == part {
+                self.taken_back_whole(at)
+            } else if at < part {
                 if missing.contains(&at) {
                     self.broken(at, Residual::of(self.reason()), Snapshot::default(), false)
                 } else {
