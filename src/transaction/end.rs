@@ -328,7 +328,9 @@ impl Transaction {
         };
         // Given up before anything of it began: what is doubtful is whether those before it could be finished.
         let of_it = |i: &u32| self.part_of(*i) >= part;
-        let touched = forward.done.iter().chain(&forward.unsettled).chain(&self.perhaps).any(of_it);
+        // A step of it that failed may have left its component faulted.
+        let failed = forward.failures.iter().map(|(i, _)| i);
+        let touched = forward.done.iter().chain(&forward.unsettled).chain(&self.perhaps).chain(failed).any(of_it);
         let finishing = part > 0 && !clean && !touched && !self.interrupted && self.given_up.contains(&part);
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
