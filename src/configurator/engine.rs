@@ -69,7 +69,7 @@ pub(super) struct Engine {
     pub context: Context,
     pub claims: Claims,
     pub pool: Pool,
-    inbox: Receiver<Mail>,
+    pub inbox: Receiver<Mail>,
     pub counts: Arc<Counts>,
     answers: AnswerSink,
     pub progress: Option<ProgressSink>,
@@ -222,18 +222,21 @@ impl Engine {
             let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
             let (observed, idle) = self.observing.until();
             let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
-            self.pump_or_idle(until, idle);
+            match self.inbox.recv_or_idle(until, idle) {
+                Ok(Mail::Request(request)) if self.is_idle() => self.comes_alone(request),
+                received => self.received(received),
+            }
         }
     }
 
     /// Takes in what has come, waiting for something until `until`.
     pub fn pump(&mut self, until: Time) {
-        self.pump_or_idle(until, Time::NEVER);
+        let received = self.inbox.recv_or_idle(until, Time::NEVER);
+        self.received(received);
     }
 
-    /// The same, and no longer than until `idle`, for which simulated time does not move on by itself.
-    fn pump_or_idle(&mut self, until: Time, idle: Time) {
-        match self.inbox.recv_or_idle(until, idle) {
+    fn received(&mut self, received: Result<Mail, RecvError>) {
+        match received {
             Ok(mail) => self.take_in(mail),
             Err(RecvError::Timeout) => return,
             Err(RecvError::Closed) => {
@@ -257,7 +260,7 @@ impl Engine {
         }
     }
 
-    fn take_in(&mut self, mail: Mail) {
+    pub fn take_in(&mut self, mail: Mail) {
         match mail {
             Mail::Request(request) => self.arrive(Batch::one(request)),
             Mail::Batch(batch) => self.arrive(*batch),
@@ -302,7 +305,7 @@ impl Engine {
     }
 
     /// A batch comes: what it overtakes, gives up or cancels is answered, the rest waits its turn.
-    fn arrive(&mut self, batch: Batch) {
+    pub fn arrive(&mut self, batch: Batch) {
         let configurations = self.configurations.clone();
         let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
         let arrival = self.desk.arrive(batch, safe, &self.claims);
@@ -391,13 +394,17 @@ impl Engine {
 
     /// A request makes room in the queue and is owed an answer.
     pub fn owe(&mut self, request: Request) {
+        self.owe_since(request, self.clock.now());
+    }
+
+    pub fn owe_since(&mut self, request: Request, begun: Time) {
         if request.why == Why::Asked {
             let safe = matches!(request.ask, Ask::Apply(id) if self.configurations.get(&id).is_some_and(|c| c.safe));
             let count = if safe { &self.counts.safe } else { &self.counts.requests };
             count.fetch_sub(1, Ordering::AcqRel);
             self.down.remove(&request.requester);
         }
-        self.current.push((request, self.clock.now()));
+        self.current.push((request, begun));
     }
 
     /// Answers a request that has begun.

@@ -12,7 +12,7 @@ use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{Ask, Cause, Outcome, Step};
-use crate::stack::{Group, HandOver, Planned, Resolved, Switch, World, may_apply};
+use crate::stack::{Batch, Group, HandOver, Planned, Resolved, Switch, Why, World, may_apply};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -36,8 +36,29 @@ impl Engine {
         }
     }
 
-    /// Carries out a request that has begun by a prepared switch, `number` being its batch on the desk.
-    pub(super) fn handle_fast(&mut self, number: u32, request: Request) -> Fared {
+    /// Whether nothing waits and nothing is under way.
+    pub(super) fn is_idle(&self) -> bool {
+        self.running.is_empty() && self.desk.is_empty() && self.suspects.is_empty()
+    }
+
+    /// A request comes while the configurator is idle: with a prepared switch it begins and ends at once, and needs no place
+    /// on the desk.
+    pub(super) fn comes_alone(&mut self, request: Request) {
+        let next = self.inbox.try_recv();
+        let plain = request.why == Why::Asked && next.is_err();
+        if plain && self.handle_fast(None, request) != Fared::Not {
+            return;
+        }
+        self.arrive(Batch::one(request));
+        if let Ok(mail) = next {
+            self.take_in(mail);
+        }
+        self.glance();
+    }
+
+    /// Carries out a request by a prepared switch: one that has begun, `number` being its batch on the desk, or one that comes
+    /// alone.
+    pub(super) fn handle_fast(&mut self, number: Option<u32>, request: Request) -> Fared {
         if self.switches.is_empty()
             || !self.world.broken.is_empty()
             || !self.world.quarantined.is_empty()
@@ -52,7 +73,8 @@ impl Engine {
             _ => return Fared::Not,
         };
         let allowed = self.configurations.get(&id).is_some_and(|c| may_apply(&request, c, &self.operator));
-        let begun = self.current.last().map_or_else(|| self.clock.now(), |(_, begun)| *begun);
+        let known = number.and(self.current.last());
+        let begun = known.map_or_else(|| self.clock.now(), |(_, begun)| *begun);
         let World { system, stack, .. } = &self.world;
         let own = || {
             let top = stack.top();
@@ -68,9 +90,13 @@ impl Engine {
         let Some(kept) = self.switches.get_mut(&id) else { return Fared::Not };
         let Some(place) = kept.iter_mut().position(fits) else { return Fared::Not };
         let mut fast = kept.remove(place);
+        if number.is_none() {
+            self.owe_since(request, begun);
+        }
         let mut at = begun;
         if let Err((sent, outcome)) = self.switch_over(&mut fast, request, undoing, &mut at) {
-            self.go_on_from(number, &fast.switch, request, undoing, (sent, outcome));
+            let number = number.or_else(|| self.takes_place(request));
+            self.go_on_from(number.expect("the desk is empty"), &fast.switch, request, undoing, (sent, outcome));
             self.switches.entry(id).or_default().push(fast);
             return Fared::GoesOn;
         }
@@ -88,9 +114,17 @@ impl Engine {
             conditions.nudge();
         }
         self.switches.entry(id).or_default().push(fast);
-        self.desk.over(number);
+        if let Some(number) = number {
+            self.desk.over(number);
+        }
         self.answer(request, request.ask.done(), None);
         Fared::Done
+    }
+
+    /// A request that came alone is under way on the empty desk.
+    fn takes_place(&mut self, request: Request) -> Option<u32> {
+        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.claims);
+        self.desk.turn(&self.claims).map(|turn| turn.number)
     }
 
     /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a

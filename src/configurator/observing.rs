@@ -143,8 +143,14 @@ impl Engine {
         let mut components: Vec<ComponentName> = steps.iter().flat_map(touch::components).collect();
         components.sort_unstable();
         components.dedup();
+        // What only leads to where something may be set, and back, is no difference.
+        let state = |of: &system::System, name| of.component(name).map(|node| node.state);
+        let differs = |step: &&Step| {
+            !matches!(step, Step::State { component, .. }
+                if state(&self.world.system, *component) == state(&actual, *component))
+        };
         let mut losers: Vec<Arc<Frame>> = Vec::new();
-        for step in &steps {
+        for step in steps.iter().filter(differs) {
             if let Some(frame) = self.wrote(step)
                 && losers.iter().all(|known| known.configuration != frame.configuration)
             {
@@ -157,7 +163,7 @@ impl Engine {
         let cause = Reason::SeenOtherwise(steps.clone());
         let residual = Arc::new(Residual { difference: steps, ..Residual::of(cause.clone()) });
         let culprit = losers.first().map(|frame| (frame.configuration, frame.requester));
-        self.world.breaks(Broken {
+        self.world.is_otherwise(Broken {
             residual: residual.clone(),
             components: components.into_iter().collect(),
             culprit,
@@ -165,6 +171,7 @@ impl Engine {
             // What a stranger did is not taken back unasked.
             mendable: false,
             expected,
+            seen: None,
         });
         self.changed();
         if let Some(progress) = &self.progress {

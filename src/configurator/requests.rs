@@ -30,7 +30,7 @@ impl Engine {
         if let [request] = requests[..]
             && self.running.is_empty()
             && request.why == Why::Asked
-            && self.handle_fast(number, request) != Fared::Not
+            && self.handle_fast(Some(number), request) != Fared::Not
         {
             return;
         }
@@ -258,7 +258,7 @@ impl Engine {
                 Ask::Apply(id) | Ask::UndoOf(id) => Some((id, request.requester)),
                 _ => None,
             };
-            let broken = Broken { residual, components, culprit, frame, mendable: true, expected };
+            let broken = Broken { residual, components, culprit, frame, mendable: true, expected, seen: None };
             self.world.breaks(broken);
         }
         self.changed();

@@ -87,6 +87,7 @@ impl Engine {
                 frame: None,
                 mendable: true,
                 expected: crate::model::Snapshot::default(),
+                seen: None,
             });
         }
         down.in_time = self.clock.now() <= deadline;

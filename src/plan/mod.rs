@@ -3,6 +3,7 @@
 //! Pure and deterministic: the planner does no I/O, reads no clock, and the same system and configuration give the same
 //! plan. It never changes the system it is given. A [`Plan`] can come only from here, and only when nothing is wrong.
 
+pub mod backwards;
 mod builder;
 mod changes;
 mod conflicts;

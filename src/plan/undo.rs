@@ -3,6 +3,7 @@
 //! An inverse restores what was, as far as it can be: a component that has failed meanwhile is not brought back into the
 //! fault, and is not started to be stopped; it goes from the fault to where the inverse wants it, at once.
 
+use super::backwards::Backwards;
 use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
@@ -291,20 +292,16 @@ pub fn undo(
     if made + connected > 64 {
         script.view.reserve(made, connected);
     }
-    let last_wave = steps.last().map_or(0, |s| s.wave);
+    let mut back = Backwards::of(steps);
     let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
     let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();
     unwritten.sort_by_key(|s| s.at);
-    // What the undo of each step waits for: the undos of the steps that waited for it.
-    let mut waits: Vec<SmallVec<[StepId; 4]>> = vec![SmallVec::new(); steps.len()];
     for (i, done) in steps.iter().enumerate().rev() {
-        let wave = first_wave + (last_wave - done.wave);
+        let wave = first_wave + back.wave(done);
         while unwritten.last().is_some_and(|s| s.at as usize > i) {
             restore(script, unwritten.pop().expect("it was just seen"), skip, wave)?;
         }
-        let mut last = std::mem::take(&mut waits[i]);
-        last.sort_unstable();
-        last.dedup();
+        let mut last = back.waits(i);
         let slot = absolute(&done.step);
         if slot.is_none_or(|slot| !skip(slot)) {
             let kept = slot.and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
@@ -315,11 +312,9 @@ pub fn undo(
                 }
             }
         }
-        for earlier in &done.after {
-            waits[*earlier as usize].extend_from_slice(&last);
-        }
+        back.leave(done, &last);
     }
-    let wave = first_wave + last_wave;
+    let wave = first_wave + back.waves();
     while let Some(entry) = unwritten.pop() {
         restore(script, entry, skip, wave)?;
     }

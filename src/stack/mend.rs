@@ -6,7 +6,7 @@
 //! leads to (design §6).
 
 use super::work::{Op, Planned, is_bound, transaction};
-use super::{Broken, FrameId, HandOver, World, net};
+use super::{Broken, Frame, FrameId, HandOver, Seen, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{Item, Script, absolute};
@@ -15,6 +15,25 @@ use crate::system::touch::{Access, touches};
 use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
 use std::sync::Arc;
+
+impl Broken {
+    /// What is expected to be there.
+    fn expects(&self, slot: Slot) -> Option<Saved> {
+        match slot {
+            Slot::Property(property) => {
+                let one = self.expected.components.get(&property.component)?;
+                Some(Saved::Property(one.properties.get(&property.member)?.clone()))
+            }
+            Slot::Port(port) => Some(Saved::Port(self.expected.ports.get(&port).cloned())),
+            _ => None,
+        }
+    }
+
+    /// Whether it is expected as this safe configuration had left it: that came before it was seen otherwise.
+    fn goes_by(&self, frame: &Frame) -> bool {
+        self.seen.as_ref().is_some_and(|seen| frame.id <= seen.newest)
+    }
+}
 
 impl World {
     /// The picture with something broken as the model has it.
@@ -52,20 +71,43 @@ impl World {
         self.broken.push(broken);
     }
 
+    /// The same of what was seen by looking, while the model had everything as it was wanted: also what safe configurations in
+    /// force had written, which is not there then.
+    pub fn is_otherwise(&mut self, mut broken: Broken) {
+        let slots = self.overwritten(&broken).map(|(_, saved)| saved.slot);
+        let written = slots.filter_map(|slot| Some((slot, broken.expects(slot)?))).collect();
+        broken.seen =
+            self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| Seen { newest, written });
+        self.breaks(broken);
+    }
+
+    /// What safe configurations in force wrote of something broken.
+    fn written(&self, broken: &Broken, slot: Slot) -> Option<Saved> {
+        let mut frames = self.stack.frames().iter().rev();
+        let last = frames.find(|frame| frame.safe && frame.saved.iter().any(|saved| saved.slot == slot))?;
+        let seen = broken.seen.as_ref().filter(|_| broken.goes_by(last));
+        if let Some((_, value)) = seen.and_then(|seen| seen.written.iter().find(|(of, _)| *of == slot)) {
+            return Some(value.clone());
+        }
+        match slot {
+            Slot::Property(property) => {
+                let value = self.system.component(property.component).and_then(|node| node.value(property.member));
+                value.cloned().map(Saved::Property)
+            }
+            Slot::Port(port) => step::written(port, &self.system).map(|value| Saved::Port(value.cloned())),
+            _ => None,
+        }
+    }
+
     /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it is as
     /// that wrote it.
     pub fn put_meant(&self, broken: &Broken, system: &mut System) {
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let _ = system.adopt(&components, &broken.expected);
         for (_, saved) in self.overwritten(broken) {
-            let written = match saved.slot {
-                Slot::Property(property) => {
-                    let value = self.system.component(property.component).and_then(|node| node.value(property.member));
-                    value.map(|value| Step::PropertySet { property, value: value.clone() })
-                }
-                Slot::Port(port) => {
-                    step::written(port, &self.system).map(|value| Step::PortWrite { port, value: value.cloned() })
-                }
+            let written = match (saved.slot, self.written(broken, saved.slot)) {
+                (Slot::Property(property), Some(Saved::Property(value))) => Some(Step::PropertySet { property, value }),
+                (Slot::Port(port), Some(Saved::Port(value))) => Some(Step::PortWrite { port, value }),
                 _ => None,
             };
             let there = |member: MemberRef| {
@@ -120,15 +162,8 @@ impl World {
 
     /// Something is broken no more: what safe configurations in force overwrote of it goes back to what the model had there.
     pub fn hand_meant(&mut self, broken: &Broken) {
-        let meant = |slot: Slot| match slot {
-            Slot::Property(property) => {
-                let one = broken.expected.components.get(&property.component)?;
-                Some(Saved::Property(one.properties.get(&property.member)?.clone()))
-            }
-            Slot::Port(port) => Some(Saved::Port(broken.expected.ports.get(&port).cloned())),
-            _ => None,
-        };
-        let all = self.overwritten(broken).filter_map(|(frame, saved)| Some((frame, saved.slot, meant(saved.slot)?)));
+        let all = self.overwritten(broken);
+        let all = all.filter_map(|(frame, saved)| Some((frame, saved.slot, broken.expects(saved.slot)?)));
         let hand = HandOver::to(all.collect());
         self.stack.hand_over(&hand);
     }
@@ -139,7 +174,7 @@ impl World {
         let meant = self.as_meant(broken);
         let mut steps = diff(&self.system, &meant);
         let before = steps.len();
-        steps.retain(|step| !self.is_safe_ones(step, &meant));
+        steps.retain(|step| !self.is_safe_ones(step, &meant, broken, None));
         if steps.len() < before {
             // One that comes after what was left out may not be possible.
             let mut view = Overlay::new(&self.system);
@@ -148,9 +183,11 @@ impl World {
         steps
     }
 
-    /// Whether a step would change what a safe configuration in force wrote or demanded.
-    fn is_safe_ones(&self, step: &Step, wanted: &System) -> bool {
-        let mut safe = self.stack.frames().iter().filter(|frame| frame.safe).peekable();
+    /// Whether a step would change what a safe configuration in force, other than the one that is `undone`, wrote or demanded.
+    fn is_safe_ones(&self, step: &Step, wanted: &System, broken: &Broken, undone: Option<FrameId>) -> bool {
+        let frames = self.stack.frames().iter();
+        let mut safe =
+            frames.filter(|frame| frame.safe && Some(frame.id) != undone && !broken.goes_by(frame)).peekable();
         if safe.peek().is_none() {
             return false;
         }
@@ -191,7 +228,7 @@ impl World {
             let whole = diff(&self.system, &end).into_iter().map(alone).collect();
             if calls { None } else { self.leads_to(whole, &end) }
         })?;
-        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted)) {
+        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted, broken, Some(frame))) {
             return None;
         }
         let mut parts = undo.parts;

@@ -38,7 +38,7 @@ pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, is_kept, shares};
 pub use work::{Op, Part, Planned, places, transaction};
-pub use world::{Broken, World};
+pub use world::{Broken, Seen, World};
 
 use crate::model::{ComponentName, ConfigId, Finding, Ident, RunState, Step, codes};
 use crate::plan::footprint::Footprint;

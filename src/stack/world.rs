@@ -2,6 +2,7 @@
 
 use super::{FrameId, Request, Requester, Residual, Stack};
 use crate::model::{Ask, ComponentName, ConfigId, Snapshot};
+use crate::plan::footprint::{Saved, Slot};
 use crate::system::System;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -21,6 +22,18 @@ pub struct Broken {
     pub mendable: bool,
     /// The components as the model has them.
     pub expected: Snapshot,
+    /// What safe configurations had done, where what is broken was seen by looking: the model had that too. None: what is there
+    /// of theirs is as they left it.
+    pub seen: Option<Seen>,
+}
+
+/// What safe configurations in force had done when something was seen that is otherwise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// The newest frame of that time.
+    pub newest: FrameId,
+    /// What they had written.
+    pub written: Vec<(Slot, Saved)>,
 }
 
 /// The configurator's half of a running deployment.

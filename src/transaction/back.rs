@@ -6,10 +6,11 @@ use super::heed::Heed;
 use super::run::Run;
 use super::touched::Touched;
 use crate::model::{Cause, OnFailure, Origin, RunState, Step};
+use crate::plan::backwards::Backwards;
 use crate::plan::{PlannedStep, Stage, StepId};
 use crate::stack::Reason;
 use crate::system::touch::components;
-use crate::system::{Overlay, Reversibility, System, Undo, View as _, diff, step};
+use crate::system::{Overlay, Reversibility, System, Undo, View, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
@@ -87,6 +88,26 @@ impl WayBack {
     }
 }
 
+/// How a step goes back beside safe configurations.
+pub(super) struct GoesBack<'t> {
+    /// It came in after they had begun: what takes it back leads to what they have led to.
+    pub late: bool,
+    /// They have written the same since: nothing takes it back.
+    pub overwritten: bool,
+    /// What is still to be done for it.
+    pub steps: &'t [Step],
+}
+
+impl GoesBack<'_> {
+    /// What is done for one of its steps, where `view` is what the ones before have led to.
+    pub fn instead_of(&self, back: &Step, heed: &mut Heed<'_>, view: &impl View) -> SmallVec<[Step; 2]> {
+        match self.late {
+            true => Heed::instead_of_late(back, view),
+            false => heed.instead_of(back, view),
+        }
+    }
+}
+
 impl Transaction {
     /// The way back from where the forward list stands: for all that was done of parts from `part` on and was not taken back,
     /// latest first; then what is missing of the parts before.
@@ -97,14 +118,7 @@ impl Transaction {
         if self.taken_down || held && part == 0 && !self.interrupted {
             return way;
         }
-        let mut ends: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
-        let mut followers: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); forward.list.len()];
-        for (i, step) in (0..).zip(forward.list.iter()) {
-            for before in &step.after {
-                followers[*before as usize].push(i);
-            }
-        }
-        let waves = forward.list.iter().map(|step| step.wave).max().unwrap_or(0);
+        let mut order = Backwards::of(&forward.list);
         // What a component that is made again does is known only then.
         let mut view = Overlay::new(live);
         let open = forward.done.iter().filter(|i| !self.taken_back.contains(i));
@@ -139,39 +153,30 @@ impl Transaction {
             if self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
+            let original = &forward.list[i as usize];
+            let mut after = order.waits(i as usize);
             // What is held stays as it is, but for what safe configurations want of it.
             if held && !self.goes_all_the_same(i, part) {
                 way.superseded.extend(self.is_theirs(i, part).then_some(i));
+                order.leave(original, &after);
                 continue;
             }
-            let late = self.late(i);
-            let original = &forward.list[i as usize];
-            let mut after: SmallVec<[u32; 4]> =
-                followers[i as usize].iter().flat_map(|f| ends[*f as usize].clone()).collect();
-            after.sort_unstable();
-            after.dedup();
-            let overwritten = late.is_some_and(|(_, revision)| self.touched.overwrote(&original.step, revision));
-            if late.is_some() {
-                heed.came_late(&original.step);
-            }
+            let goes_back = self.goes_back(i, part, &self.touched, &mut heed);
             let before = way.list.len();
-            let mut left_out = overwritten;
-            for back in self.steps_back(i, part).iter().filter(|_| !overwritten) {
-                let goes = match late {
-                    Some(_) => Heed::instead_of_late(back, &view),
-                    None => heed.instead_of(back, &view),
-                };
+            let mut left_out = goes_back.overwritten;
+            for back in goes_back.steps {
+                let goes = goes_back.instead_of(back, &mut heed, &view);
                 left_out |= goes.is_empty();
                 let last = goes.len().saturating_sub(1);
                 for (at, back) in goes.into_iter().enumerate() {
                     // What came in late goes back where safe configurations want that; nothing else of it moves either.
-                    let wanted = late.is_some() && at == last && self.touched.wants_step(&back);
+                    let wanted = goes_back.late && at == last && self.touched.wants_step(&back);
                     if !wanted && !self.may_move(i) && step::moves(&back, &view) {
                         way.withheld = Some(back);
                         return way;
                     }
                     let _ = step::apply(&back, &mut view);
-                    let id = way.add(back, waves - original.wave, after, (at == last).then_some(i), None);
+                    let id = way.add(back, order.wave(original), after, (at == last).then_some(i), None);
                     after = SmallVec::from_iter([id]);
                 }
             }
@@ -180,7 +185,7 @@ impl Transaction {
                 true if left_out => way.superseded.push(i),
                 _ => way.left_out.extend(left_out.then_some(i)),
             }
-            ends[i as usize] = after;
+            order.leave(original, &after);
         }
         if self.interrupted {
             self.bring_as_wanted(&mut view, &mut way);
@@ -246,6 +251,19 @@ impl Transaction {
         let late = forward.late.iter().find(|late| late.step == i)?;
         let known = touched.knew(&forward.list[i as usize].step, late.revision);
         (!known).then_some((&late.undo, late.revision))
+    }
+
+    /// How a step of the forward list, the next on a way back, goes back beside what safe configurations have `touched`.
+    pub(super) fn goes_back(&self, i: u32, part: usize, touched: &Touched, heed: &mut Heed<'_>) -> GoesBack<'_> {
+        let step = self.forward_step(i);
+        let late = self.late_beside(i, touched);
+        if late.is_some() {
+            heed.came_late(&step.step);
+        }
+        let overwritten = late.is_some_and(|(_, revision)| touched.overwrote(&step.step, revision));
+        let undo = late.map_or_else(|| self.undo_of(i, part), |(undo, _)| undo).steps();
+        let done = self.partly.get(&i).map_or(0, |done| *done.min(&undo.len()));
+        GoesBack { late: late.is_some(), overwritten, steps: if overwritten { &[] } else { &undo[done..] } }
     }
 
     /// The steps that are still to be done to take a step of the forward list back.
@@ -370,21 +388,9 @@ impl Transaction {
         let forward = self.forward.as_ref().expect("something was carried out");
         let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
-            let step = &forward.list[*i as usize].step;
-            let late = self.late_beside(*i, &theirs);
-            if late.is_some() {
-                heed.came_late(step);
-            }
-            if late.is_some_and(|(_, revision)| theirs.overwrote(step, revision)) {
-                continue;
-            }
-            for back in late.map_or_else(|| self.undo_of(*i, 0), |(undo, _)| undo).steps() {
-                // What came in late goes back to what safe ones had led to.
-                let goes = match late {
-                    Some(_) => Heed::instead_of_late(back, &*picture),
-                    None => heed.instead_of(back, &*picture),
-                };
-                for back in goes {
+            let goes_back = self.goes_back(*i, 0, &theirs, &mut heed);
+            for back in goes_back.steps {
+                for back in goes_back.instead_of(back, &mut heed, &*picture) {
                     let _ = step::apply(&back, picture);
                 }
             }

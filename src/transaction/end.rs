@@ -212,9 +212,12 @@ impl Transaction {
         let mut all = true;
         let forward = self.forward.as_ref().expect("it was carried out");
         let mut heed = Heed::new(&self.touched, remaining.iter().map(|i| &forward.list[*i as usize].step));
-        for back in remaining.iter().rev().flat_map(|i| self.steps_back(*i, part)) {
-            for back in heed.instead_of(back, &*system) {
-                all &= step::apply(&back, system).is_ok();
+        for i in remaining.iter().rev() {
+            let goes_back = self.goes_back(*i, part, &self.touched, &mut heed);
+            for back in goes_back.steps {
+                for back in goes_back.instead_of(back, &mut heed, &*system) {
+                    all &= step::apply(&back, system).is_ok();
+                }
             }
         }
         all

@@ -10,6 +10,7 @@ mod explored;
 mod faults;
 mod force;
 mod hot_swap;
+mod lies;
 mod listed;
 mod lost;
 mod monitor;

@@ -69,7 +69,7 @@ const COORDINATOR: &str = r#"return state {
 "#;
 
 /// What a script says on stdout, with the steps of each answer; it must end well.
-fn run(script: &str) -> String {
+pub fn run(script: &str) -> String {
     let demo = Demo::new();
     demo.write("deployment.yaml", DEPLOYMENT);
     demo.write("conf.lua", CONFIGURATIONS);
@@ -81,7 +81,7 @@ fn run(script: &str) -> String {
 }
 
 /// The steps of an answer, as the log has them.
-fn steps(log: &str, answer: &str) -> Vec<String> {
+pub fn steps(log: &str, answer: &str) -> Vec<String> {
     let lines = log.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let mut answered = lines.filter(|line| line["answer"] == answer);
     let found = answered.next().unwrap_or_else(|| panic!("no `{answer}`: {log}"));
@@ -302,7 +302,7 @@ fn what_is_undone_is_not_mended_first() {
 }
 
 /// `c` runs.
-const BUILT: &str = "apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)";
+pub const BUILT: &str = "apply('build', {force = true}) apply('go', {force = true}) wait_answer('go.ok', 1)";
 /// Nothing is told of a state of `c`.
 const STILL: &str = "for _, d in ipairs(drift()) do assert(not d.text:find('st[oa][pr]t? c'), d.text) end";
 

@@ -294,6 +294,8 @@ fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
     out
 }
 
+/// Fewest frames a deployment may ask for: the newest, and the one that all others are squashed into.
+const FEWEST_FRAMES: i64 = 2;
 /// Most frames a deployment may ask for: each holds its inverse in memory.
 const MOST_FRAMES: i64 = 100_000;
 
@@ -303,7 +305,7 @@ fn limits(cx: &mut Cx, node: Node) -> DeploymentLimits {
         return out;
     };
     if let Some(node) = fields.take("stack")
-        && let Some(v) = whole(cx, &node, "`stack`", 1..=MOST_FRAMES, "stack: 64")
+        && let Some(v) = whole(cx, &node, "`stack`", FEWEST_FRAMES..=MOST_FRAMES, "stack: 64")
     {
         out.stack = usize::try_from(v).unwrap_or(out.stack);
     }
