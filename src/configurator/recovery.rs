@@ -227,7 +227,15 @@ impl Engine {
         if !residual.is_settled() {
             let expected = expected.snapshot();
             let residual = residual.clone();
-            self.world.breaks(Broken { residual, components, culprit, frame: None, mendable: true, expected, seen: None });
+            self.world.breaks(Broken {
+                residual,
+                components,
+                culprit,
+                frame: None,
+                mendable: true,
+                expected,
+                seen: None,
+            });
         }
         while let Some((request, begun)) = self.current.pop() {
             let reason = Arc::new(Reason::Broken(residual.clone()));

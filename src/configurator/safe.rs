@@ -6,8 +6,7 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, Step, Target, Verdict};
-use crate::stack::claims::components as components_of;
+use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
 use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::time::Time;
@@ -45,7 +44,7 @@ impl Engine {
         let before = self.interrupt(id);
         let at = self.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
-        let (earlier, comes_after) = self.earlier_safe(configuration);
+        let (earlier, comes_after) = self.earlier_safe(&request);
         let plan = |system: &System, stack: &Stack, earlier: &[Step]| {
             effort(&with(system, earlier), stack, configuration, &request, at, &self.context)
         };
@@ -56,7 +55,7 @@ impl Engine {
             yields |= other.machine.yield_to(planned.steps.iter().map(|planned| &planned.step));
         }
         if yields {
-            let (left, _) = self.earlier_safe(configuration);
+            let (left, _) = self.earlier_safe(&request);
             planned = plan(&self.world.system, &self.world.stack, &left).planned;
         }
         let mut touched = Touched::default();
@@ -88,13 +87,12 @@ impl Engine {
     }
 
     /// The steps that safe configurations under way have still to do about what this one is about, and their numbers.
-    fn earlier_safe(&self, configuration: &Configuration) -> (Vec<Step>, SmallVec<[u64; 1]>) {
-        let about = components_of(configuration);
+    fn earlier_safe(&self, request: &Request) -> (Vec<Step>, SmallVec<[u64; 1]>) {
+        let about = self.claims.of([request]);
         let (mut steps, mut numbers) = (Vec::new(), SmallVec::new());
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             let Purpose::Safe(safe) = &other.purpose else { continue };
-            let theirs = self.configurations.get(&safe.1.configuration).map(components_of).unwrap_or_default();
-            if theirs.iter().any(|component| about.contains(component)) {
+            if self.claims.of([&safe.0]).meets(&about) {
                 steps.extend(other.machine.open_steps().cloned());
                 numbers.push(other.number);
             }

@@ -76,8 +76,7 @@ impl World {
     pub fn is_otherwise(&mut self, mut broken: Broken) {
         let slots = self.overwritten(&broken).map(|(_, saved)| saved.slot);
         let written = slots.filter_map(|slot| Some((slot, broken.expects(slot)?))).collect();
-        broken.seen =
-            self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| Seen { newest, written });
+        broken.seen = self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| Seen { newest, written });
         self.breaks(broken);
     }
 
@@ -183,21 +182,28 @@ impl World {
         steps
     }
 
-    /// Whether a step would change what a safe configuration in force, other than the one that is `undone`, wrote or demanded.
+    /// Whether a step would change what a safe configuration in force, other than the one that is `undone`, wrote or demanded,
+    /// and nobody after it. A component that ends as it is now is only brought to where something may be set, and back.
     fn is_safe_ones(&self, step: &Step, wanted: &System, broken: &Broken, undone: Option<FrameId>) -> bool {
-        let frames = self.stack.frames().iter();
-        let mut safe =
-            frames.filter(|frame| frame.safe && Some(frame.id) != undone && !broken.goes_by(frame)).peekable();
-        if safe.peek().is_none() {
+        let mut frames = self.stack.frames().iter().rev().filter(|frame| Some(frame.id) != undone);
+        if self.stack.safe().next().is_none() {
+            return false;
+        }
+        let state = |of: &System, name| of.component(name).map(|node| node.state);
+        if let Step::State { component, .. } = step
+            && state(&self.system, *component) == state(wanted, *component)
+        {
             return false;
         }
         let touches = touches(step, None, wanted).into_iter().filter(|touch| touch.access != Access::Need).collect();
         let index = Index::new(&Footprint { touches }, |_| true);
         let written = absolute(step);
-        safe.any(|frame| {
-            let touches = &frame.footprint.touches;
-            touches.iter().any(|touch| index.shares(touch)) || written.is_some_and(|slot| frame.footprint.writes(slot))
-        })
+        let newest = frames.find(|frame| {
+            // What others need is not wanted by them.
+            let mut touches = frame.footprint.touches.iter().filter(|t| frame.safe || t.access != Access::Need);
+            touches.any(|touch| index.shares(touch)) || written.is_some_and(|slot| frame.footprint.writes(slot))
+        });
+        newest.is_some_and(|frame| frame.safe && !broken.goes_by(frame))
     }
 
     /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be

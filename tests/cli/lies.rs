@@ -30,8 +30,10 @@ fn what_a_safe_configuration_did_not_write_after_all_is_told() {
         apply('slow') wait_answer('slow.ok', 1) wait_answer('slow.lost', 8)
         assert(property('c.k') == 7 and #drift() == 1, #drift())"
     );
-    let rest = "undo('tune') wait_answer('tune.undone', 1) assert(property('c.k') == 0 and #drift() == 0 and #stack() == 2)";
-    let undone = "undo('slow', {force = true}) wait_answer('slow.undone', 1) assert(property('c.k') == 7 and #drift() == 0)";
+    let rest =
+        "undo('tune') wait_answer('tune.undone', 1) assert(property('c.k') == 0 and #drift() == 0 and #stack() == 2)";
+    let undone =
+        "undo('slow', {force = true}) wait_answer('slow.undone', 1) assert(property('c.k') == 7 and #drift() == 0)";
     let log = run(&format!("{lied} {undone} {rest}"));
     assert!(steps(&log, "slow.undone").is_empty(), "{log}");
     let log = run(&format!("{lied} recover('back') assert(property('c.k') == 9 and #drift() == 0) {undone} {rest}"));

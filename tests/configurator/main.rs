@@ -13,3 +13,4 @@ mod safe_ends;
 mod survival;
 mod table;
 mod teardown;
+mod way_out;

@@ -1,0 +1,233 @@
+//! Whatever has gone wrong, with safe configurations in between: once nothing goes wrong any more the model is the platform, and
+//! undo, newest first, with `recover` where something is broken, leads back to the beginning.
+
+use crate::rig::*;
+use davit::configurator::{Progress, Recovery};
+use davit::model::{
+    Catalogue, Configuration, DeploymentLimits, Effect, Moves, OnFailure, OperationType, PropertyType, Tunable, Verdict,
+};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A node whose start and stop move, with a property that is set unconfigured and a call that moves.
+fn moving() -> Catalogue {
+    let plain = catalogue();
+    let mut node = plain.get(davit::model::TypeName::new("Node").unwrap()).unwrap().as_ref().clone();
+    node.moves = Moves { start: true, stop: true };
+    let stopped: PropertyType = node.properties[&ident("s")].clone();
+    node.properties.insert(ident("n"), PropertyType { tunable: Tunable::Unconfigured, ..stopped });
+    for (word, undo) in [("up", "down"), ("down", "up")] {
+        let operation = OperationType { moves: true, ..OperationType::new(Effect::Undo(ident(undo))) };
+        node.operations.insert(ident(word), operation);
+    }
+    let mut catalogue = Catalogue::new();
+    assert!(catalogue.insert(node).is_none());
+    catalogue
+}
+
+const MAKE: &str = "make";
+const PLAIN: [&str; 11] = ["swap", "go", "halt", "work", "lift", "tune", "write", "hold", "roll", "again", "other"];
+const SAFE: [&str; 4] = ["rest", "quiet", "slow", "brake"];
+
+fn configurations() -> Vec<Configuration> {
+    let mut all = vec![
+        configuration(MAKE, "", "create A; create B; create C", "A:running B:stopped C:running"),
+        configuration("swap", "B:unconfigured", "set B.n 4", "B:running"),
+        configuration("go", "", "", "B:running"),
+        configuration("halt", "", "", "A:stopped"),
+        configuration("work", "A:stopped", "set A.s 2; call C.open", "A:running"),
+        configuration("lift", "", "call A.up", ""),
+        configuration("tune", "", "set A.k 7; set B.k 8", ""),
+        configuration("write", "", "write C.w 4; set C.k 3", ""),
+        configuration("hold", "C:unconfigured", "set C.n 5; call B.open", "C:running"),
+        configuration("roll", "C:stopped", "set C.s 5; call A.up", "C:running"),
+        configuration("again", "", "destroy C; create C", "C:running"),
+        configuration("other", "", "write A.u 2; write B.u 3; connect A.y B.w", ""),
+        configuration("rest", "", "", "A:stopped B:stopped"),
+        configuration("quiet", "", "", "_default:stopped"),
+        configuration("slow", "", "set A.k 9; set B.k 9; write C.w 0", ""),
+        configuration("brake", "", "call A.down; set C.k 9", "C:stopped"),
+    ];
+    for configuration in &mut all {
+        configuration.safe = SAFE.contains(&configuration.id.as_str());
+        configuration.on_failure = match configuration.id.as_str() {
+            "hold" => OnFailure::Hold,
+            "roll" => OnFailure::Rollback,
+            _ => OnFailure::default(),
+        };
+    }
+    all
+}
+
+const STEPS: [&str; 20] = [
+    "start A",
+    "stop A",
+    "start B",
+    "stop B",
+    "cleanup B",
+    "configure B",
+    "start C",
+    "stop C",
+    "cleanup C",
+    "configure C",
+    "create C",
+    "destroy C",
+    "property_set A.k",
+    "property_set B.n",
+    "property_set A.s",
+    "port_write C.w",
+    "operation_call A.up",
+    "operation_call A.down",
+    "operation_call C.open",
+    "operation_call B.close",
+];
+
+fn fault(kind: usize) -> Fault {
+    let seconds = Duration::from_secs_f64;
+    match kind {
+        0 => Fault::Fail,
+        1 => Fault::LostRequest,
+        2 => Fault::LostAnswer,
+        3 => Fault::Slow(seconds(0.25)),
+        4 => Fault::Slow(seconds(0.7)),
+        5 => Fault::Hang { returns: Some(seconds(2.0)) },
+        6 => Fault::Deaf,
+        7 => Fault::FalseDone,
+        8 => Fault::FalseNotDone,
+        _ => Fault::Panic,
+    }
+}
+
+/// What is done, and how long is waited then.
+#[derive(Debug, Clone, Copy)]
+enum Act {
+    Apply(usize),
+    Undo(usize),
+    Safe(usize),
+    UndoSafe(usize),
+}
+
+impl Act {
+    fn word(self) -> String {
+        match self {
+            Self::Apply(n) => PLAIN[n].to_owned(),
+            Self::Undo(n) => format!("{}.undo", PLAIN[n]),
+            Self::Safe(n) => SAFE[n].to_owned(),
+            Self::UndoSafe(n) => format!("{}.undo", SAFE[n]),
+        }
+    }
+}
+
+fn acts() -> impl Strategy<Value = Vec<(Act, usize)>> {
+    let act = prop_oneof![
+        4 => (0..PLAIN.len()).prop_map(Act::Apply),
+        2 => (0..PLAIN.len()).prop_map(Act::Undo),
+        3 => (0..SAFE.len()).prop_map(Act::Safe),
+        2 => (0..SAFE.len()).prop_map(Act::UndoSafe),
+    ];
+    prop::collection::vec((act, 0usize..6), 1..6)
+}
+
+/// What has come of it so far, for whoever has to find out why.
+fn told(rig: &Rig) -> String {
+    let told = rig.answers.lock().unwrap();
+    let lines = told.iter().map(|answer| {
+        format!(
+            "{:?} {} {}",
+            answer.at,
+            answer.event(),
+            answer.reason.as_deref().map(ToString::to_string).unwrap_or_default()
+        )
+    });
+    let view = rig.view();
+    let broken: Vec<String> = view.residuals.iter().map(ToString::to_string).collect();
+    let frames: Vec<String> = view
+        .stack
+        .iter()
+        .map(|f| format!("{}{}", f.configuration, if f.partial { " (partial)" } else { "" }))
+        .collect();
+    let steps = rig.progress.lock().unwrap().iter().filter_map(|told| match told {
+        Progress::Ended { request, step, end, undoing, .. } => {
+            Some(format!("{} {}{step} {end:?}", request.0, if *undoing { "undo " } else { "" }))
+        }
+        Progress::Differs(of) => Some(format!("differs: {of}")),
+        _ => None,
+    }).collect::<Vec<_>>();
+    let lines = lines.collect::<Vec<_>>().join("\n");
+    format!("{lines}\nframes {frames:?}\nbroken {broken:?}\n{}", steps.join("\n"))
+}
+
+fn leads_out(acts: &[(Act, usize)], faults: &[(usize, usize, u32)]) -> Result<&'static str, TestCaseError> {
+    let limits = DeploymentLimits { step_timeout: Duration::from_millis(500), ..DeploymentLimits::default() };
+    let of = [("start", 0.1), ("stop", 0.05), ("cleanup", 0.05), ("configure", 0.1), ("operation_call", 0.3)];
+    let of = of.map(|(pattern, seconds)| (StepPattern::new(pattern), Duration::from_secs_f64(seconds))).to_vec();
+    let options = Options { delays: Delays { of, ..Delays::default() }, ..Options::default() };
+    let rig = Rig::of(moving(), BTreeSet::new(), configurations(), options, |platform| Arc::new(platform), limits);
+    let start = rig.see();
+    prop_assert_eq!(rig.ask(MAKE), ["make.ok"]);
+    let rules = faults.iter().map(|(step, kind, times)| FaultRule::on(STEPS[*step], fault(*kind)).times(*times));
+    rig.platform.set_faults(Faults::new(rules.collect::<Vec<_>>()));
+    for (act, wait) in acts {
+        rig.submit(&act.word());
+        rig.wait([0.0, 0.02, 0.12, 0.3, 1.0, 8.0][*wait]);
+    }
+    // Whatever is out comes back or is given up, and what was lied about is seen.
+    rig.wait(30.0);
+    rig.platform.set_faults(Faults::default());
+    rig.platform.set_delays(Delays::default());
+    rig.wait(30.0);
+    rig.each_answered_once();
+    prop_assert!(rig.platform_quarantined().is_empty());
+    prop_assert_eq!(&*rig.view().system.clone().unwrap(), &rig.see(), "the model is the platform: {}", told(&rig));
+    let bad = rig.answers.lock().unwrap().iter().any(|a| matches!(a.verdict, Verdict::Broken | Verdict::UndoBroken));
+    let broken = bad || !rig.view().residuals.is_empty();
+    // A round: undo the newest frame; where that is refused, have what is broken repaired, by the undo of whose it is or else
+    // by who recovers.
+    let standing = |rig: &Rig| (rig.frames(), rig.view().residuals.iter().map(ToString::to_string).collect::<Vec<_>>());
+    while let (frames, residuals) = standing(&rig)
+        && !frames.is_empty()
+    {
+        let top = frames.last().expect("there is one");
+        let answers = rig.ask(&format!("{top}.undo"));
+        let gone = rig.frames().len() < frames.len();
+        prop_assert!(broken || gone && answers == [format!("{top}.undone")], "{answers:?}: {}", told(&rig));
+        if !gone {
+            prop_assert!(!residuals.is_empty(), "`{top}` stays, and nothing is broken: {}", told(&rig));
+            for frame in frames.iter().rev().skip(1) {
+                rig.ask(&format!("{frame}.undo"));
+            }
+            let _ = rig.handle.recover(Recovery::Back, rig.clock.now() + Duration::from_secs(60)).expect("an answer");
+            prop_assert!(standing(&rig) != (frames, residuals), "no way out: {}", told(&rig));
+        }
+    }
+    prop_assert!(rig.frames().is_empty(), "{}", told(&rig));
+    prop_assert!(rig.view().residuals.is_empty(), "{}", told(&rig));
+    let end = rig.see();
+    prop_assert_eq!(end, start, "{}", told(&rig));
+    let safe = acts.iter().any(|(act, _)| matches!(act, Act::Safe(_)));
+    Ok(match (broken, safe) {
+        (true, true) => "broken, with a safe configuration",
+        (true, false) => "broken",
+        (false, true) => "whole, with a safe configuration",
+        (false, false) => "whole",
+    })
+}
+
+#[test]
+fn there_is_a_way_out_of_whatever_goes_wrong() {
+    let cases = std::env::var("DAVIT_WAY_OUT_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(400);
+    let met = std::cell::RefCell::new(std::collections::BTreeMap::<&str, u32>::new());
+    let faults = prop::collection::vec((0..STEPS.len(), 0usize..10, 1u32..3), 0..4);
+    let mut runner = TestRunner::new(Config { cases, failure_persistence: None, ..Config::default() });
+    let ran = runner.run(&(acts(), faults), |(acts, faults)| {
+        *met.borrow_mut().entry(leads_out(&acts, &faults)?).or_default() += 1;
+        Ok(())
+    });
+    ran.unwrap_or_else(|failed| panic!("{failed}"));
+    let met = met.into_inner();
+    assert!(met.len() == 4 && met.values().all(|n| *n >= cases / 50), "{met:?}");
+}
