@@ -105,7 +105,9 @@ impl<'o, 's> Script<'o, 's> {
             }
             Step::State { transition, .. } => {
                 let state = self.view.component(component).map(|n| n.state);
-                if state == Some(RunState::Faulted) || self.failed.contains(&component) {
+                // Cleaned up after a fault, and that taken back: a fault is never restored, so it is down here.
+                let cleaned = state == Some(RunState::Unconfigured) && *transition != Transition::Configure;
+                if state == Some(RunState::Faulted) || cleaned || self.failed.contains(&component) {
                     self.failed.insert(component);
                     self.goals.insert(component, (transition.wanted(), item.stage, item.origin));
                     return Ok(None);

@@ -190,17 +190,28 @@ impl World {
             return false;
         }
         let state = |of: &System, name| of.component(name).map(|node| node.state);
-        if let Step::State { component, .. } = step
-            && state(&self.system, *component) == state(wanted, *component)
-        {
+        // Of what is gone they have nothing: it is made, and does not move.
+        let leads_there = match step {
+            Step::State { component, .. } => match state(&self.system, *component) {
+                None => !step::moves(step, wanted),
+                now => now == state(wanted, *component),
+            },
+            _ => false,
+        };
+        if leads_there {
             return false;
         }
-        let touches = touches(step, None, wanted).into_iter().filter(|touch| touch.access != Access::Need).collect();
+        let mut touches = touches(step, None, wanted).into_vec();
+        touches.retain(|touch| touch.access != Access::Need);
+        let made = if let Step::Create { component, .. } = step { Some(Slot::Component(*component)) } else { None };
         let index = Index::new(&Footprint { touches }, |_| true);
         let written = absolute(step);
         let newest = frames.find(|frame| {
             // What others need is not wanted by them.
             let mut touches = frame.footprint.touches.iter().filter(|t| frame.safe || t.access != Access::Need);
+            if let Some(made) = made {
+                return touches.any(|touch| touch.slot == made && touch.access != Access::Need);
+            }
             touches.any(|touch| index.shares(touch)) || written.is_some_and(|slot| frame.footprint.writes(slot))
         });
         newest.is_some_and(|frame| frame.safe && !broken.goes_by(frame))

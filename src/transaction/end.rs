@@ -8,7 +8,7 @@ use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
-use crate::system::{System, Undo, View as _, moves_any, step, touch};
+use crate::system::{Overlay, System, Undo, View as _, moves_any, step, touch};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -87,7 +87,7 @@ impl Transaction {
         let unsettled = self.unsettled.clone();
         let residual = Residual { left, also, unsettled, quarantined: self.hung(can), ..Residual::of(cause) };
         let own = self.own();
-        let broken = self.broken(0, residual, live.snapshot_some(&own), false);
+        let broken = self.broken(0, residual, live.snapshot_some(&own), false, live);
         self.over(vec![broken]);
     }
 
@@ -144,7 +144,7 @@ impl Transaction {
     }
 
     /// Steps of the forward list that were done, belong to `part` or a later one, and were not taken back.
-    fn remaining(&self, part: usize) -> Vec<u32> {
+    pub(super) fn remaining(&self, part: usize) -> Vec<u32> {
         let forward = self.forward.as_ref().expect("it was carried out");
         let left = |i: &u32| {
             let needs = !matches!(self.undo_of(*i, part), Undo::Nothing);
@@ -338,25 +338,25 @@ impl Transaction {
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if finishing && at + 1 == part {
-                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole)
+                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live)
             } else if finishing && at == part {
                 self.taken_back_whole(at)
             } else if at < part {
                 if missing.contains(&at) {
-                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false)
+                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false, live)
                 } else {
                     PartEnd::Done
                 }
             } else if !clean && self.interrupted {
                 match at == blamed {
-                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
-                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole),
+                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
+                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, live),
                     false => self.taken_back_whole(at),
                 }
             } else if at == part {
                 match clean {
                     true => self.taken_back_whole(at),
-                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole),
+                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
                 }
             } else if self.interrupted || self.taken_down {
                 self.taken_back_whole(at)
@@ -399,9 +399,31 @@ impl Transaction {
         missing
     }
 
+    /// What takes back what is left of a part, as far as safe configurations have left it to that.
+    fn items_left(&self, part: usize, live: &System) -> Vec<Item> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let left: Vec<u32> = (self.remaining(part).into_iter())
+            .chain(self.perhaps.iter().copied())
+            .filter(|i| self.part_of(*i) == part)
+            .collect();
+        let mut heed = Heed::new(&self.touched, left.iter().map(|i| &forward.list[*i as usize].step));
+        let mut view = Overlay::new(live);
+        let mut items = Vec::new();
+        for i in left.iter().rev() {
+            let goes_back = self.goes_back(*i, part, &self.touched, &mut heed);
+            for back in goes_back.steps {
+                for back in goes_back.instead_of(back, &mut heed, &view) {
+                    let _ = step::apply(&back, &mut view);
+                    items.push(Item::undoing(&back, &forward.list[*i as usize]));
+                }
+            }
+        }
+        items
+    }
+
     /// A part that is neither done nor taken back. `whole`: going to `expected` takes all of it back, and its frame has
     /// nothing to add to that.
-    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool) -> PartEnd {
+    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, live: &System) -> PartEnd {
         let planned = &self.planned.parts[part];
         let forward = self.forward.as_ref().expect("it was carried out");
         let undone = planned.pushes.is_none();
@@ -416,17 +438,7 @@ impl Transaction {
             let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));
             open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
         } else {
-            let left = self
-                .remaining(part)
-                .into_iter()
-                .chain(self.perhaps.iter().copied())
-                .filter(|i| self.part_of(*i) == part)
-                .rev();
-            left.flat_map(|i| {
-                let of = &forward.list[i as usize];
-                self.steps_back(i, part).iter().map(|step| Item::undoing(step, of)).collect::<Vec<_>>()
-            })
-            .collect()
+            self.items_left(part, live)
         };
         let components: FxHashSet<ComponentName> =
             items.iter().flat_map(|item| touch::components(&item.step)).chain(residual.components()).collect();

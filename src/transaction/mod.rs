@@ -116,6 +116,8 @@ pub struct Transaction {
     cancels: Vec<u32>,
     /// What the components are compared with after mending, and whether that has nothing of what was done.
     target: Option<Box<(System, bool)>>,
+    /// What was interrupted was mending all that is left.
+    mended: bool,
     end: Option<End>,
 }
 
@@ -156,6 +158,7 @@ impl Transaction {
             fallen: None,
             cancels: Vec::new(),
             target: None,
+            mended: false,
             end: None,
         }
     }
@@ -286,7 +289,7 @@ impl Transaction {
                 // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
                 let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
                 if self.between.take().is_some() || looks {
-                    self.target = None;
+                    self.mended = self.target.take().is_some_and(|target| target.1);
                     self.phase = Phase::Stopping;
                 }
             }
@@ -437,6 +440,9 @@ impl Transaction {
             (failed, whole) = (self.took_back(&run, &way), back::whole(&run));
         }
         let part = self.failed_part();
+        if std::mem::take(&mut self.mended) && whole {
+            self.taken_back.extend(self.remaining(part));
+        }
         if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
             self.origin = Some(Box::new(self.before_all(live)));
