@@ -196,7 +196,8 @@ impl Engine {
         let places = SmallVec::from_iter([0]);
         let group = Group { takes: 1, places, visits: SmallVec::from_iter([visit]), ..Group::default() };
         let purpose = Purpose::Requests(number, group);
-        let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
+        let running =
+            Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]), self.world.stack.next());
         self.running.push(running);
     }
 }

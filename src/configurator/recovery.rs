@@ -186,7 +186,7 @@ impl Engine {
             Some(PartEnd::Broken(part)) => {
                 let residual = part.residual.clone();
                 let ask = crate::model::Ask::UndoOf(frame.configuration);
-                self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part);
+                self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part, self.world.stack.next());
                 Err(residual)
             }
             Some(PartEnd::Cancelled | PartEnd::Anew) => Err(Arc::new(Residual::of(Reason::Busy))),

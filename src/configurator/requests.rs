@@ -16,6 +16,17 @@ use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
+/// What was carried out of a group.
+struct Carried<'c> {
+    planned: &'c Planned,
+    /// Parts that stand for what they should, with the numbers of their conditions.
+    stood: &'c [(usize, u64)],
+    /// The safe configuration that interrupted it.
+    reason: Option<Reason>,
+    /// The number of the first frame that could come after it began.
+    since: FrameId,
+}
+
 impl Engine {
     /// A batch begins.
     pub(super) fn begin(&mut self, number: u32) {
@@ -118,7 +129,8 @@ impl Engine {
             self.prepare(&planned);
             let spec = self.spec(&planned, false);
             let machine = Transaction::new(planned, spec);
-            let running = Running::new(self.number(), machine, Purpose::Requests(number, group), serves);
+            let running =
+                Running::new(self.number(), machine, Purpose::Requests(number, group), serves, self.world.stack.next());
             self.running.push(running);
             return;
         }
@@ -137,7 +149,7 @@ impl Engine {
 
     /// A transaction is over.
     pub(super) fn ended(&mut self, running: Running) {
-        let Running { number: own, mut machine, purpose, asked, stood, .. } = running;
+        let Running { number: own, mut machine, purpose, asked, stood, since, .. } = running;
         self.forget_conditions(asked.iter().map(|asked| asked.number));
         if let Some(conditions) = &self.conditions {
             conditions.nudge();
@@ -146,7 +158,13 @@ impl Engine {
             Purpose::Requests(number, group) => {
                 let end = machine.end();
                 // It is dropped when everybody has been answered: a long plan takes its time for that.
-                self.book(number, group, end.parts, Some((machine.planned(), &stood, machine.interrupted())));
+                let reason = machine.interrupted();
+                self.book(
+                    number,
+                    group,
+                    end.parts,
+                    Some(Carried { planned: machine.planned(), stood: &stood, reason, since }),
+                );
                 self.take_up(number);
             }
             Purpose::Safe(safe) => {
@@ -157,19 +175,13 @@ impl Engine {
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(
-        &mut self,
-        number: u32,
-        group: Group,
-        parts: Vec<PartEnd>,
-        planned: Option<(&Planned, &[(usize, u64)], Option<Reason>)>,
-    ) {
+    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, carried: Option<Carried<'_>>) {
         let Some(turn) = self.desk.turn_of(number) else { return };
         let requests = turn.batch.requests.clone();
         let busy = self.held_frames();
-        let parts = self.mended(&group, parts, planned.as_ref().is_some_and(|(.., by)| by.is_some()));
+        let parts = self.mended(&group, parts, carried.as_ref().is_some_and(|carried| carried.reason.is_some()));
         let endings: Endings = parts.iter().map(PartEnd::ending).collect();
-        let interrupted = planned.as_ref().and_then(|(.., reason)| reason.clone());
+        let interrupted = carried.as_ref().and_then(|carried| carried.reason.clone());
         let stopped = match &interrupted {
             Some(_) => Stopped::Safe,
             None if parts.iter().any(was_taken_down) => Stopped::Down,
@@ -178,7 +190,7 @@ impl Engine {
         let settled = settle(&requests, &group, &endings, stopped);
         let mut confirm: Vec<(Request, FrameId)> = Vec::new();
         let mut reasons: Vec<Option<Reason>> = Vec::new();
-        if let Some((planned, stood, _)) = planned {
+        if let Some(Carried { planned, stood, since, .. }) = carried {
             let edits = planned.parts.iter().map(|part| &part.edits);
             let pushed = self.world.take_over(edits, &endings, &busy);
             for (part, ended) in parts.into_iter().enumerate() {
@@ -192,7 +204,7 @@ impl Engine {
                 }
                 confirm.extend(pushed[part].map(|frame| (request, frame)));
                 if let PartEnd::Broken(broken) = ended {
-                    self.left_broken(&request, *broken);
+                    self.left_broken(&request, *broken, since);
                 }
             }
         }
@@ -239,14 +251,14 @@ impl Engine {
     }
 
     /// What is left of a request that ended *broken*: its partial frame, and what is not known.
-    pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart) {
+    pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart, since: FrameId) {
         let BrokenPart { residual, frame, instead, expected } = broken;
         let frame = match (frame, instead) {
             (Some(frame), Some(of)) => {
                 self.world.stack.replace(Frame { id: of, ..frame });
                 Some(of)
             }
-            (Some(frame), None) => Some(self.push_partial(frame)),
+            (Some(frame), None) => Some(self.push_partial(frame, since)),
             (None, of) => of,
         };
         self.partials.extend(frame.map(|frame| (frame, residual.clone())));
@@ -265,9 +277,9 @@ impl Engine {
     }
 
     /// A partial frame lies below those of the safe configurations that interrupted what it is left of.
-    fn push_partial(&mut self, frame: Frame) -> FrameId {
+    fn push_partial(&mut self, frame: Frame, since: FrameId) -> FrameId {
         let held = self.held_frames();
-        self.world.stack.push_below_safe(frame, &held)
+        self.world.stack.push_below_safe(frame, since, &held)
     }
 
     /// Frames that those under way pop or hand over to, and those that wait for their confirmation.

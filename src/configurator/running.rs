@@ -3,7 +3,7 @@
 use super::inbox::Ticket;
 use crate::limits;
 use crate::model::RequestId;
-use crate::stack::{Frame, Group, Request};
+use crate::stack::{Frame, FrameId, Group, Request};
 use crate::time::Time;
 use crate::transaction::{Question, Touched, Transaction};
 use smallvec::SmallVec;
@@ -53,13 +53,21 @@ pub(super) struct Running {
     pub stood: Vec<(usize, u64)>,
     /// Safe configurations that came before and do something about the same components: its end comes after theirs.
     pub after: SmallVec<[u64; 1]>,
+    /// The number of the first frame that could come after it began: a safe configuration's from there on interrupted it.
+    pub since: FrameId,
     /// Quarantine does not keep its steps out.
     pub enters_quarantine: bool,
     pub over: bool,
 }
 
 impl Running {
-    pub fn new(number: u64, machine: Transaction, purpose: Purpose, serves: SmallVec<[RequestId; 2]>) -> Self {
+    pub fn new(
+        number: u64,
+        machine: Transaction,
+        purpose: Purpose,
+        serves: SmallVec<[RequestId; 2]>,
+        since: FrameId,
+    ) -> Self {
         Self {
             number,
             machine,
@@ -71,6 +79,7 @@ impl Running {
             asked: Vec::new(),
             stood: Vec::new(),
             after: SmallVec::new(),
+            since,
             over: false,
         }
     }

@@ -79,7 +79,8 @@ impl Engine {
         };
         let purpose = Purpose::Safe(Box::new((request, frame, touched)));
         let machine = Transaction::new(planned, spec);
-        let running = Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]));
+        let running =
+            Running::new(self.number(), machine, purpose, SmallVec::from_iter([request.id]), self.world.stack.next());
         self.running.insert(0, Running { after: comes_after, ..running });
         self.review_standings();
         // Now, not after what else waits to go on.
@@ -181,7 +182,7 @@ impl Engine {
                 let residual = Arc::new(residual);
                 self.partials.push((pushed, residual.clone()));
                 let part = BrokenPart { frame: None, instead: None, residual: residual.clone(), ..*part };
-                self.left_broken(&request, part);
+                self.left_broken(&request, part, pushed);
                 if let (Some(last), false) = (self.world.broken.last_mut(), residual.is_settled()) {
                     last.frame = Some(pushed);
                 }

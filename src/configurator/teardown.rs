@@ -189,14 +189,20 @@ impl Engine {
     /// The same, with the steps told among those of a request.
     pub(super) fn carry_out_for(&mut self, request: RequestId, machine: Transaction) -> Transaction {
         let number = self.number();
-        self.running.push(Running::new(number, machine, Purpose::Own, SmallVec::from_iter([request])));
+        self.running.push(Running::new(
+            number,
+            machine,
+            Purpose::Own,
+            SmallVec::from_iter([request]),
+            self.world.stack.next(),
+        ));
         self.complete(number).machine
     }
 
     /// The same with what quarantine does not keep out.
     fn carry_out_safe(&mut self, machine: Transaction) -> Transaction {
         let number = self.number();
-        let running = Running::new(number, machine, Purpose::Own, SmallVec::new());
+        let running = Running::new(number, machine, Purpose::Own, SmallVec::new(), self.world.stack.next());
         self.running.push(Running { enters_quarantine: true, ..running });
         self.complete(number).machine
     }

@@ -8,6 +8,7 @@ use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 pub use crate::system::step::absolute;
+use crate::system::touch::components;
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -72,12 +73,21 @@ pub struct Script<'o, 's> {
     goals: BTreeMap<ComponentName, (Wanted, Stage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
     failed: BTreeSet<ComponentName>,
+    /// What concerns a component that is not there is left out: nothing of it is to be taken back.
+    pub leaves_out_gone: bool,
 }
 
 impl<'o, 's> Script<'o, 's> {
     /// An empty list over `view`.
     pub fn new(view: &'o mut Overlay<'s>) -> Self {
-        Self { view, steps: Vec::new(), of: Vec::new(), goals: BTreeMap::new(), failed: BTreeSet::new() }
+        Self {
+            view,
+            steps: Vec::new(),
+            of: Vec::new(),
+            goals: BTreeMap::new(),
+            failed: BTreeSet::new(),
+            leaves_out_gone: false,
+        }
     }
 
     /// The system after the steps so far.
@@ -92,6 +102,12 @@ impl<'o, 's> Script<'o, 's> {
     /// The false preconditions.
     pub fn add(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
         let component = item.step.component();
+        if self.leaves_out_gone && !matches!(item.step, Step::Create { .. }) {
+            let gone = |name: &ComponentName| self.view.component(*name).is_none();
+            if components(&item.step).iter().any(gone) {
+                return Ok(None);
+            }
+        }
         match &item.step {
             Step::PropertySet { property, value } => {
                 if self.view.component(component).and_then(|n| n.value(property.member)) == Some(value) {

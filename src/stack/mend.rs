@@ -194,7 +194,11 @@ impl World {
         let leads_there = match step {
             Step::State { component, .. } => match state(&self.system, *component) {
                 None => !step::moves(step, wanted),
-                now => now == state(wanted, *component),
+                // Where they moved it to, it goes for them.
+                now => {
+                    let goal = state(wanted, *component);
+                    now == goal || self.moved_by_safe(*component).is_some_and(|(_, after)| goal == Some(after))
+                }
             },
             _ => false,
         };

@@ -305,11 +305,18 @@ impl Stack {
         }
     }
 
-    /// Pushes a frame, but below those of safe configurations at the top: they stand above what they interrupted.
-    pub fn push_below_safe(&mut self, frame: Frame, busy: &[FrameId]) -> FrameId {
+    /// The number that the next frame gets.
+    pub fn next(&self) -> FrameId {
+        FrameId(self.next)
+    }
+
+    /// Pushes a frame of what began before the frame `since`, but below those of safe configurations at the top that came after
+    /// that: they stand above what they interrupted.
+    pub fn push_below_safe(&mut self, frame: Frame, since: FrameId, busy: &[FrameId]) -> FrameId {
         let id = self.push_beside(frame, busy);
         let mut at = self.frames.len() - 1;
-        while at > 0 && self.frames[at - 1].safe && self.frames[at].id == id {
+        let interrupts = |frame: &Frame| frame.safe && frame.id >= since;
+        while at > 0 && interrupts(&self.frames[at - 1]) && self.frames[at].id == id {
             self.frames.swap(at - 1, at);
             at -= 1;
         }

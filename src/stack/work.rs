@@ -223,7 +223,11 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     fn pop(&mut self, at: usize, edits: &mut Edits) -> Result<(), Refusal> {
         let hand = share::examine(&self.frames, at).map_err(|finding| Refusal::one(*finding))?;
         let frame = self.frames[at].clone();
-        self.take_back(&frame, &hand).map_err(|found| drifted(&found))?;
+        // What a safe configuration interrupted may have taken a component away from under it.
+        self.script.leaves_out_gone = frame.safe;
+        let taken_back = self.take_back(&frame, &hand);
+        self.script.leaves_out_gone = false;
+        taken_back.map_err(|found| drifted(&found))?;
         share::hand_over(&mut self.frames, &hand, &|id| id);
         self.frames.remove(at);
         // A frame that this very transaction pushes and pops leaves no trace.

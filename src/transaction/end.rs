@@ -166,7 +166,8 @@ impl Transaction {
         let forward = self.forward.as_ref().expect("it was carried out");
         // The last fault of a component first: between two of them the way back may have brought it somewhere else.
         for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
-            if wanted.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
+            let on_its_way = self.broke_off && self.touched.wants(*component).is_none();
+            if wanted.component(*component).is_some_and(|node| on_its_way || node.state == RunState::Faulted) {
                 wanted.set_state(*component, *state);
             }
         }

@@ -116,8 +116,10 @@ pub struct Transaction {
     cancels: Vec<u32>,
     /// What the components are compared with after mending, and whether that has nothing of what was done.
     target: Option<Box<(System, bool)>>,
-    /// What was interrupted was mending all that is left.
-    mended: bool,
+    /// Mending was interrupted; whether that was of all that is left.
+    mended: Option<bool>,
+    /// Mending has broken off: what had failed may be on its way to where it should be.
+    broke_off: bool,
     end: Option<End>,
 }
 
@@ -158,7 +160,8 @@ impl Transaction {
             fallen: None,
             cancels: Vec::new(),
             target: None,
-            mended: false,
+            mended: None,
+            broke_off: false,
             end: None,
         }
     }
@@ -289,7 +292,7 @@ impl Transaction {
                 // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
                 let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
                 if self.between.take().is_some() || looks {
-                    self.mended = self.target.take().is_some_and(|target| target.1);
+                    self.mended = self.target.take().map(|target| target.1);
                     self.phase = Phase::Stopping;
                 }
             }
@@ -440,8 +443,14 @@ impl Transaction {
             (failed, whole) = (self.took_back(&run, &way), back::whole(&run));
         }
         let part = self.failed_part();
-        if std::mem::take(&mut self.mended) && whole {
-            self.taken_back.extend(self.remaining(part));
+        match self.mended.take() {
+            Some(true) if whole => {
+                self.taken_back.extend(self.remaining(part));
+                self.faulted.clear();
+                self.forward.iter_mut().for_each(|forward| forward.faulted.clear());
+            }
+            Some(_) => self.broke_off = true,
+            None => {}
         }
         if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
