@@ -4,6 +4,7 @@ use davit::configurator::*;
 use davit::model::*;
 use davit::platform::Platform;
 use davit::platform::simulated::{Fault, FaultRule, Faults, Options, Simulated};
+use davit::stack::Why;
 use davit::time::{Clock, Guard};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -315,7 +316,7 @@ impl Rig {
     #[track_caller]
     pub fn each_answered_once(&self) {
         let mut open: BTreeMap<u64, i32> = self.submitted.lock().unwrap().iter().map(|r| (r.id.0, 1)).collect();
-        for answer in self.answers.lock().unwrap().iter().filter(|a| a.verdict != Verdict::Reverted) {
+        for answer in self.answers.lock().unwrap().iter().filter(|a| a.request.why == Why::Asked) {
             *open.get_mut(&answer.request.id.0).expect("an answer to a request") -= 1;
             assert_eq!(answer.request.tag, (answer.request.id.0, 7), "the tag comes back");
         }

@@ -2,9 +2,10 @@
 //! undo, newest first, with `recover` where something is broken, leads back to the beginning.
 
 use crate::rig::*;
-use davit::configurator::{Progress, Recovery};
+use davit::configurator::{Progress, Recovery, Requester};
 use davit::model::{
-    Catalogue, Configuration, DeploymentLimits, Effect, Moves, OnFailure, OperationType, PropertyType, Tunable, Verdict,
+    Catalogue, Configuration, Confirm, DeploymentLimits, Effect, Moves, OnFailure, OperationType, PropertyType,
+    Tunable, Verdict,
 };
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
 use proptest::prelude::*;
@@ -30,7 +31,10 @@ fn moving() -> Catalogue {
 }
 
 const MAKE: &str = "make";
-const PLAIN: [&str; 11] = ["swap", "go", "halt", "work", "lift", "tune", "write", "hold", "roll", "again", "other"];
+const PLAIN: [&str; 15] = [
+    "swap", "go", "halt", "work", "lift", "tune", "write", "hold", "roll", "again", "other", "left", "right", "meant",
+    "tried",
+];
 const SAFE: [&str; 4] = ["rest", "quiet", "slow", "brake"];
 
 fn configurations() -> Vec<Configuration> {
@@ -47,16 +51,25 @@ fn configurations() -> Vec<Configuration> {
         configuration("roll", "C:stopped", "set C.s 5; call A.up", "C:running"),
         configuration("again", "", "destroy C; create C", "C:running"),
         configuration("other", "", "write A.u 2; write B.u 3; connect A.y B.w", ""),
+        configuration("left", "", "set A.k 4; call B.open", "B:running"),
+        configuration("right", "A:stopped", "set A.k 6; set A.s 6", "A:running"),
+        configuration("meant", "", "set C.k 2; call A.up", ""),
+        configuration("tried", "", "set A.k 2; write C.w 2", "B:running"),
         configuration("rest", "", "", "A:stopped B:stopped"),
         configuration("quiet", "", "", "_default:stopped"),
         configuration("slow", "", "set A.k 9; set B.k 9; write C.w 0", ""),
         configuration("brake", "", "call A.down; set C.k 9", "C:stopped"),
     ];
     for configuration in &mut all {
+        let word = configuration.id.as_str();
+        configuration.group = ["left", "right"].contains(&word).then(|| ident("side"));
+        configuration.confirm = ["meant", "tried"]
+            .contains(&word)
+            .then(|| Confirm { event: event("e_good"), within: Duration::from_millis(400) });
         configuration.safe = SAFE.contains(&configuration.id.as_str());
         configuration.on_failure = match configuration.id.as_str() {
             "hold" => OnFailure::Hold,
-            "roll" => OnFailure::Rollback,
+            "roll" | "meant" => OnFailure::Rollback,
             _ => OnFailure::default(),
         };
     }
@@ -109,13 +122,19 @@ enum Act {
     Undo(usize),
     Safe(usize),
     UndoSafe(usize),
+    /// One is undone and another applied, in one step.
+    Instead(usize, usize),
+    /// An operator's, who means it.
+    Operator(usize),
+    OperatorUndo(usize),
 }
 
 impl Act {
     fn word(self) -> String {
         match self {
-            Self::Apply(n) => PLAIN[n].to_owned(),
-            Self::Undo(n) => format!("{}.undo", PLAIN[n]),
+            Self::Apply(n) | Self::Operator(n) => PLAIN[n].to_owned(),
+            Self::Instead(a, b) => format!("{}.undo {}", PLAIN[a], PLAIN[b]),
+            Self::Undo(n) | Self::OperatorUndo(n) => format!("{}.undo", PLAIN[n]),
             Self::Safe(n) => SAFE[n].to_owned(),
             Self::UndoSafe(n) => format!("{}.undo", SAFE[n]),
         }
@@ -128,6 +147,9 @@ fn acts() -> impl Strategy<Value = Vec<(Act, usize)>> {
         2 => (0..PLAIN.len()).prop_map(Act::Undo),
         3 => (0..SAFE.len()).prop_map(Act::Safe),
         2 => (0..SAFE.len()).prop_map(Act::UndoSafe),
+        1 => (0..PLAIN.len(), 0..PLAIN.len()).prop_map(|(a, b)| Act::Instead(a, b)),
+        1 => (0..PLAIN.len()).prop_map(Act::Operator),
+        1 => (0..PLAIN.len()).prop_map(Act::OperatorUndo),
     ];
     prop::collection::vec((act, 0usize..6), 1..6)
 }
@@ -178,7 +200,9 @@ fn leads_out(acts: &[(Act, usize)], faults: &[(usize, usize, u32)]) -> Result<&'
     let rules = faults.iter().map(|(step, kind, times)| FaultRule::on(STEPS[*step], fault(*kind)).times(*times));
     rig.platform.set_faults(Faults::new(rules.collect::<Vec<_>>()));
     for (act, wait) in acts {
-        rig.submit(&act.word());
+        let operator = matches!(act, Act::Operator(_) | Act::OperatorUndo(_));
+        let by = if operator { Requester::Operator } else { coordinator(COORDINATOR) };
+        rig.submit_as(&act.word(), by).unwrap();
         rig.wait([0.0, 0.02, 0.12, 0.3, 1.0, 8.0][*wait]);
     }
     // Whatever is out comes back or is given up, and what was lied about is seen.
@@ -208,13 +232,13 @@ fn leads_out(acts: &[(Act, usize)], faults: &[(usize, usize, u32)]) -> Result<&'
         && !frames.is_empty()
     {
         let top = frames.last().expect("there is one");
-        let answers = rig.ask(&format!("{top}.undo"));
+        let answers = rig.ask_as(&format!("{top}.undo"), Requester::Operator);
         let gone = rig.frames().len() < frames.len();
         prop_assert!(broken || gone && answers == [format!("{top}.undone")], "{answers:?}: {}", told(&rig));
         if !gone {
             prop_assert!(!residuals.is_empty(), "`{top}` stays, and nothing is broken: {}", told(&rig));
             for frame in frames.iter().rev().skip(1) {
-                rig.ask(&format!("{frame}.undo"));
+                rig.ask_as(&format!("{frame}.undo"), Requester::Operator);
             }
             let _ = rig.handle.recover(Recovery::Back, rig.clock.now() + Duration::from_secs(60)).expect("an answer");
             prop_assert!(standing(&rig) != (frames, residuals), "no way out: {}", told(&rig));
@@ -246,4 +270,41 @@ fn there_is_a_way_out_of_whatever_goes_wrong() {
     ran.unwrap_or_else(|failed| panic!("{failed}"));
     let met = met.into_inner();
     assert!(met.len() == 4 && met.values().all(|n| *n >= cases / 50), "{met:?}");
+}
+
+/// What the law has found, each as small as it could be made.
+#[test]
+fn there_is_a_way_out_of_what_was_found() {
+    let place = |of: &[&str], word: &str| of.iter().position(|one| *one == word).unwrap();
+    let apply = |word: &str| Act::Apply(place(&PLAIN, word));
+    let safe = |word: &str| Act::Safe(place(&SAFE, word));
+    let on = |step: &str, kind: usize| (place(&STEPS, step), kind, 1);
+    let (late, lie, silent, panic) = (4, 7, 8, 9);
+    let found = [
+        // `_default` is about what another safe configuration under way is about.
+        (vec![(safe("rest"), 0), (safe("quiet"), 0)], vec![]),
+        // Mending brings what was demanded stopped down to where a property may be set, and back.
+        (vec![(safe("rest"), 0), (apply("halt"), 0), (apply("swap"), 0)], vec![on("start B", late)]),
+        // A partial frame does not undo what the safe configuration above it does.
+        (vec![(apply("roll"), 0), (apply("swap"), 2), (safe("quiet"), 0)], vec![]),
+        // What was cleaned up after a fault is not brought down once more.
+        (vec![(safe("slow"), 0), (apply("hold"), 0)], vec![on("port_write C.w", panic)]),
+        // Interrupted while it was mended: that is done.
+        (vec![(apply("swap"), 3), (safe("quiet"), 0)], vec![on("configure B", silent)]),
+        // What is gone is made again, though a safe configuration had demanded its run state.
+        (vec![(apply("again"), 0), (apply("swap"), 2), (safe("quiet"), 0)], vec![on("create C", late)]),
+        // A partial frame stands above a safe configuration that had not interrupted it.
+        (vec![(safe("quiet"), 0), (apply("hold"), 0)], vec![on("start C", late)]),
+        // What a safe configuration took for stopped is stopped for it.
+        (vec![(apply("work"), 2), (safe("rest"), 0)], vec![on("stop A", lie)]),
+        // A safe configuration has nothing to take back of what was taken away under it.
+        (vec![(apply("again"), 2), (safe("slow"), 0)], vec![on("create C", late)]),
+        // Mending that broke off goes on to where it should be.
+        (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", panic)]),
+        // What was undone of a safe frame, and another safe configuration has done again, is still to be undone.
+        (vec![(safe("brake"), 4), (Act::UndoSafe(place(&SAFE, "brake")), 2), (safe("quiet"), 0)], vec![]),
+    ];
+    for (acts, faults) in found {
+        leads_out(&acts, &faults).unwrap_or_else(|failed| panic!("{acts:?} {faults:?}: {failed}"));
+    }
 }
