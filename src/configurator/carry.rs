@@ -35,9 +35,9 @@ impl Engine {
 
     fn go_on(&mut self, running: &mut Running) -> bool {
         let mut did = self.land(running);
-        let platform = self.platform.clone();
+        let platform = self.given.platform.clone();
         let execution = |step: &Step| platform.execution(step);
-        let mut now = self.clock.now();
+        let mut now = self.given.clock.now();
         let mut inline = 0;
         loop {
             if !running.is_safe() && self.urgent() {
@@ -70,7 +70,7 @@ impl Engine {
                 }
                 Poll::Read(components) => {
                     did = true;
-                    let deadline = self.clock.now() + self.limits.step_timeout;
+                    let deadline = self.given.clock.now() + self.given.limits.step_timeout;
                     let ticket = self.pool.start(Call::ObserveSome(components), deadline);
                     running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
                 }
@@ -82,7 +82,7 @@ impl Engine {
                     did = true;
                     let first = &running.machine.step(steps[0]).step;
                     if steps.len() == 1 && platform.execution(first) == Execution::Immediate {
-                        let tools = (&*self.platform, &self.clock, self.progress.as_ref());
+                        let tools = (&*self.given.platform, &self.given.clock, self.given.progress.as_ref());
                         let hands = Hands::new(tools, &running.serves, running.enters_quarantine);
                         let outcome = hands.execute(running.machine.doing(steps[0], now), &mut now);
                         running.machine.ended(steps[0], outcome, &mut self.world.system);
@@ -93,7 +93,7 @@ impl Engine {
                         }
                     } else {
                         self.launch(running, steps);
-                        now = self.clock.now();
+                        now = self.given.clock.now();
                     }
                 }
             }
@@ -117,7 +117,7 @@ impl Engine {
             let gives_way = !running.is_safe();
             let counts = self.counts.clone();
             let goes_on = || !(gives_way && counts.safe.load(Ordering::Acquire) > 0);
-            let tools = (&*self.platform, &self.clock, self.progress.as_ref());
+            let tools = (&*self.given.platform, &self.given.clock, self.given.progress.as_ref());
             let hands = Hands::new(tools, &running.serves, running.enters_quarantine);
             let execute = |doing: Doing<'_>, at: &mut Time| hands.execute(doing, at);
             let did = running.machine.immediate_ones(GLANCE, &mut self.world.system, now, execution, goes_on, execute);
@@ -138,7 +138,7 @@ impl Engine {
 
     /// Hands steps to a worker: one of any kind, or several brief ones. Their preconditions hold.
     fn launch(&mut self, running: &mut Running, steps: SmallVec<[u32; 1]>) {
-        let started = self.clock.now();
+        let started = self.given.clock.now();
         let stop = Arc::<AtomicBool>::default();
         let step = |i: &u32| &running.machine.step(*i).step;
         steps.iter().for_each(|i| self.tell_started(step(i)));
@@ -159,24 +159,24 @@ impl Engine {
 
     /// A call is given up: it is told so, and is waited for no longer than a step may take.
     fn cancel(&mut self, running: &mut Running, step: u32) {
-        let until = self.clock.now() + self.limits.step_timeout;
+        let until = self.given.clock.now() + self.given.limits.step_timeout;
         if let Some(flight) = running.flights.iter_mut().find(|flight| flight.steps.contains(&step)) {
             flight.deadline = flight.deadline.min(until);
             flight.stop.store(true, Ordering::Release);
-            self.platform.cancel(&running.machine.step(step).step);
+            self.given.platform.cancel(&running.machine.step(step).step);
         }
     }
 
     /// Takes in the calls that are back, and those given up. True: there were some.
     fn land(&mut self, running: &mut Running) -> bool {
         let mut did = self.land_truths(running);
-        let now = self.clock.now();
+        let now = self.given.clock.now();
         if let Some((ticket, until)) = running.read {
-            let seen: Option<Option<Snapshot>> = match self.take_reply(ticket) {
+            let seen: Option<Option<Snapshot>> = match self.pool.take(ticket) {
                 Some(Reply::Observed(Ok(seen))) => Some(Some(seen)),
                 Some(_) => Some(None),
                 None if now >= until => {
-                    self.give_up(ticket);
+                    self.pool.give_up(ticket);
                     Some(None)
                 }
                 None => None,
@@ -193,12 +193,12 @@ impl Engine {
         while at < running.flights.len() {
             let flight = &running.flights[at];
             let several = flight.steps.len();
-            let ended: SmallVec<[Ended; 1]> = match self.take_reply(flight.ticket) {
+            let ended: SmallVec<[Ended; 1]> = match self.pool.take(flight.ticket) {
                 Some(Reply::Executed(outcome)) => smallvec![Ended { outcome, took: None }],
                 Some(Reply::Several(ended)) => SmallVec::from_vec(ended),
                 Some(_) => smallvec![unknown(Cause::Lost("the answer was to another question".to_owned())); several],
                 None if now >= flight.deadline + limits::PLATFORM_GRACE => {
-                    self.give_up(flight.ticket);
+                    self.pool.give_up(flight.ticket);
                     smallvec![unknown(Cause::Timeout); several]
                 }
                 None => {
@@ -276,13 +276,13 @@ impl Engine {
     }
 
     fn tell_started(&self, step: &Step) {
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Started(StepName::of(step)));
         }
     }
 
     fn tell(&self, running: &Running, number: u32, end: StepEnd, took: Option<std::time::Duration>) {
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Ended {
                 request: running.serves(number),
                 step: StepName::of(&running.machine.step(number).step),

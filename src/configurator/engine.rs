@@ -2,17 +2,18 @@
 //! itself.
 
 use super::conditions::{Conditions, Standings};
+use super::confirmations::Confirmations;
 use super::control::{Busy, Command, View};
-use super::inbox::{Counts, Mail, Reply, Ticket};
-use super::looks::{Observing, SuspectLook};
+use super::inbox::{Counts, Mail};
+use super::looks::Observing;
 use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::{Purpose, Running};
+use super::safe::Safety;
+use super::suspects::Suspects;
 use super::switches::Fast;
-use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, DeploymentLimits, EventName, RequestId, Snapshot, Verdict,
-};
+use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
@@ -25,14 +26,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// A frame that waits for its confirmation.
-pub(super) struct Confirming {
-    pub request: Request,
-    pub frame: FrameId,
-    pub event: EventName,
-    pub until: Time,
-}
-
 /// What is applied when everything is taken down by force, in order: what is safe, and what brings the system to rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Force {
@@ -40,41 +33,30 @@ pub(super) struct Force {
     pub rest: Vec<ConfigId>,
 }
 
-/// What a configurator is made of.
-pub(super) struct Parts {
+/// What a configurator is told once and for all.
+pub(super) struct Given {
     pub clock: Clock,
     pub platform: Arc<dyn Platform>,
     pub limits: DeploymentLimits,
     pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
-    pub force: Force,
-    pub operator: FxHashSet<ConfigId>,
-    pub context: Context,
-    pub coordinators: BTreeSet<Requester>,
-    pub pool: Pool,
-    pub inbox: Receiver<Mail>,
-    pub counts: Arc<Counts>,
-    pub answers: AnswerSink,
-    pub progress: Option<ProgressSink>,
-    pub conditions: Option<Arc<dyn Conditions>>,
-}
-
-pub(super) struct Engine {
-    pub clock: Clock,
-    pub platform: Arc<dyn Platform>,
-    pub limits: DeploymentLimits,
-    pub configurations: Arc<FxHashMap<ConfigId, Configuration>>,
+    pub claims: Claims,
     pub force: Force,
     /// What an operator may apply, beside what is safe.
     pub operator: FxHashSet<ConfigId>,
     pub context: Context,
-    pub claims: Claims,
+    pub coordinators: BTreeSet<Requester>,
+    pub answers: AnswerSink,
+    pub progress: Option<ProgressSink>,
+    /// Who evaluates conditions.
+    pub conditions: Option<Arc<dyn Conditions>>,
+}
+
+pub(super) struct Engine {
+    pub given: Given,
     pub pool: Pool,
     pub inbox: Receiver<Mail>,
     pub counts: Arc<Counts>,
-    answers: AnswerSink,
-    pub progress: Option<ProgressSink>,
-    /// Who evaluates conditions, and the configurations that stand for something.
-    pub conditions: Option<Arc<dyn Conditions>>,
+    /// The configurations that stand for something.
     pub standings: Standings,
     /// The slow look at what nothing is under way with.
     pub observing: Observing,
@@ -87,29 +69,18 @@ pub(super) struct Engine {
     pub numbers: u64,
     /// Steps that have ended.
     pub steps: u64,
-    /// Requests for safe configurations that have come and were not begun.
-    pub safe: VecDeque<Request>,
-    /// What safe configurations under way could not plan, and what those that have ended touched.
-    pub troubles: Vec<(RequestId, Vec<Reason>)>,
-    pub touched: crate::transaction::Touched,
+    pub safety: Safety,
     /// Commands that wait.
     pub commands: VecDeque<Command>,
-    replies: Vec<(Ticket, Reply)>,
-    given_up: FxHashSet<Ticket>,
-    /// Components that were reported faulted and not looked at since, and looks that are under way.
-    pub suspects: Vec<ComponentName>,
-    pub looks: Vec<SuspectLook>,
+    pub suspects: Suspects,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
     /// What partial frames are left of.
     pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
-    pub confirming: Vec<Confirming>,
-    /// Confirming events that came while something was under way.
-    pub heard: Vec<(EventName, Time)>,
-    /// Coordinators, and those that are down.
-    coordinators: BTreeSet<Requester>,
+    pub confirmations: Confirmations,
+    /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
     /// Requests that have begun and were not answered.
     pub current: SmallVec<[(Request, Time); 4]>,
@@ -122,23 +93,12 @@ pub(super) struct Engine {
 }
 
 impl Engine {
-    pub fn new(parts: Parts, world: World) -> Self {
-        let claims = Claims::new(parts.configurations.values());
+    pub fn new(given: Given, pool: Pool, inbox: Receiver<Mail>, counts: Arc<Counts>, world: World) -> Self {
         Self {
-            clock: parts.clock,
-            platform: parts.platform,
-            limits: parts.limits,
-            configurations: parts.configurations,
-            force: parts.force,
-            operator: parts.operator,
-            context: parts.context,
-            claims,
-            pool: parts.pool,
-            inbox: parts.inbox,
-            counts: parts.counts,
-            answers: parts.answers,
-            progress: parts.progress,
-            conditions: parts.conditions,
+            given,
+            pool,
+            inbox,
+            counts,
             standings: Standings::default(),
             observing: Observing::default(),
             world,
@@ -146,20 +106,13 @@ impl Engine {
             running: Vec::new(),
             numbers: 0,
             steps: 0,
-            safe: VecDeque::new(),
-            troubles: Vec::new(),
-            touched: crate::transaction::Touched::default(),
+            safety: Safety::default(),
             commands: VecDeque::new(),
-            replies: Vec::new(),
-            given_up: FxHashSet::default(),
-            suspects: Vec::new(),
-            looks: Vec::new(),
+            suspects: Suspects::default(),
             returned: false,
             partials: Vec::new(),
             switches: FxHashMap::default(),
-            confirming: Vec::new(),
-            heard: Vec::new(),
-            coordinators: parts.coordinators,
+            confirmations: Confirmations::default(),
             down: BTreeSet::new(),
             current: SmallVec::new(),
             revision: 0,
@@ -192,7 +145,7 @@ impl Engine {
             }
             let mut did = self.serve_safe();
             if !self.running.iter().any(Running::is_safe) {
-                while let Some(number) = self.desk.turn(&self.claims).map(|turn| turn.number) {
+                while let Some(number) = self.desk.turn(&self.given.claims).map(|turn| turn.number) {
                     did = true;
                     self.begin(number);
                     if self.urgent() {
@@ -218,8 +171,8 @@ impl Engine {
             if self.observe_slowly() {
                 continue;
             }
-            let confirm = self.confirming.iter().map(|waiting| waiting.until).min().unwrap_or(Time::NEVER);
-            let looks = self.looks.iter().map(|look| look.until).min().unwrap_or(Time::NEVER);
+            let confirm = self.confirmations.until();
+            let looks = self.suspects.until().unwrap_or(Time::NEVER);
             let (observed, idle) = self.observing.until();
             let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
             match self.inbox.recv_or_idle(until, idle) {
@@ -254,8 +207,7 @@ impl Engine {
         }
         // Nearly never, and to look costs less than to take.
         if self.counts.reports_lost.load(Ordering::Acquire) && self.counts.reports_lost.swap(false, Ordering::AcqRel) {
-            self.suspects.clear();
-            self.suspects.extend(self.world.system.graph().node_weights().map(|node| node.name));
+            self.suspects.report_all(&self.world.system);
             self.returned = true;
         }
     }
@@ -264,14 +216,7 @@ impl Engine {
         match mail {
             Mail::Request(request) => self.arrive(Batch::one(request)),
             Mail::Batch(batch) => self.arrive(*batch),
-            Mail::Reply(ticket, reply) => {
-                if self.given_up.remove(&ticket) {
-                    self.pool.came_back();
-                } else {
-                    self.pool.ended();
-                    self.replies.push((ticket, reply));
-                }
-            }
+            Mail::Reply(ticket, reply) => self.pool.came(ticket, reply),
             Mail::Platform(event) => {
                 self.counts.report_taken();
                 self.reported(event);
@@ -280,10 +225,7 @@ impl Engine {
             Mail::Truths => self.counts.truths.store(false, Ordering::Release),
             Mail::Event(event) => {
                 self.counts.report_taken();
-                self.confirming.retain(|waiting| waiting.event != event);
-                if !self.current.is_empty() && self.heard.len() < crate::limits::HEARD {
-                    self.heard.push((event, self.clock.now()));
-                }
+                self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());
             }
             Mail::Command(command) => {
                 self.counts.command_taken();
@@ -296,7 +238,7 @@ impl Engine {
                     Command::Down(requester) => {
                         let ask = Ask::Undo;
                         let request = Request { why: Why::Down, ..Request::new(RequestId(0), ask, requester) };
-                        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.claims);
+                        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
                     }
                     other => self.commands.push_back(other),
                 }
@@ -306,9 +248,9 @@ impl Engine {
 
     /// A batch comes: what it overtakes, gives up or cancels is answered, the rest waits its turn.
     pub fn arrive(&mut self, batch: Batch) {
-        let configurations = self.configurations.clone();
+        let configurations = self.given.configurations.clone();
         let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
-        let arrival = self.desk.arrive(batch, safe, &self.claims);
+        let arrival = self.desk.arrive(batch, safe, &self.given.claims);
         for (request, verdict, reason) in arrival.told {
             self.owe(request);
             if verdict == Verdict::UndoFailed {
@@ -323,8 +265,8 @@ impl Engine {
                 Purpose::Safe(safe) => Some(&safe.0),
                 _ => None,
             });
-            self.world.note_gone(&safe, self.safe.iter().chain(applied), self.desk.requests_mut());
-            self.safe.push_back(safe);
+            self.world.note_gone(&safe, self.safety.waiting.iter().chain(applied), self.desk.requests_mut());
+            self.safety.waiting.push_back(safe);
         }
         for (number, request) in arrival.given_up {
             self.owe(request);
@@ -334,13 +276,13 @@ impl Engine {
     }
 
     fn reported(&mut self, event: PlatformEvent) {
-        if let Some(conditions) = &self.conditions {
+        if let Some(conditions) = &self.given.conditions {
             conditions.nudge();
         }
         match event {
-            PlatformEvent::Faulted { component, .. } => self.suspects.push(component),
+            PlatformEvent::Faulted { component, .. } => self.suspects.report(component),
             PlatformEvent::Returned { component, .. } => {
-                self.suspects.push(component);
+                self.suspects.report(component);
                 self.returned = true;
                 self.note_quarantine();
             }
@@ -354,21 +296,8 @@ impl Engine {
         self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(Command::is_urgent)
     }
 
-    pub fn take_reply(&mut self, ticket: Ticket) -> Option<Reply> {
-        let at = self.replies.iter().position(|(t, _)| *t == ticket)?;
-        Some(self.replies.swap_remove(at).1)
-    }
-
-    /// The call is waited for no more; when it comes back its worker is free again.
-    pub fn give_up(&mut self, ticket: Ticket) {
-        if self.take_reply(ticket).is_none() {
-            self.given_up.insert(ticket);
-            self.pool.given_up();
-        }
-    }
-
     pub fn note_quarantine(&mut self) {
-        let mut now = self.platform.quarantined();
+        let mut now = self.given.platform.quarantined();
         now.sort_unstable();
         if now != self.world.quarantined {
             self.world.quarantined = now;
@@ -389,17 +318,18 @@ impl Engine {
 
     /// Whether all coordinators are down.
     pub fn all_down(&self) -> bool {
-        self.coordinators.iter().all(|coordinator| self.down.contains(coordinator))
+        self.given.coordinators.iter().all(|coordinator| self.down.contains(coordinator))
     }
 
     /// A request makes room in the queue and is owed an answer.
     pub fn owe(&mut self, request: Request) {
-        self.owe_since(request, self.clock.now());
+        self.owe_since(request, self.given.clock.now());
     }
 
     pub fn owe_since(&mut self, request: Request, begun: Time) {
         if request.why == Why::Asked {
-            let safe = matches!(request.ask, Ask::Apply(id) if self.configurations.get(&id).is_some_and(|c| c.safe));
+            let safe =
+                matches!(request.ask, Ask::Apply(id) if self.given.configurations.get(&id).is_some_and(|c| c.safe));
             let count = if safe { &self.counts.safe } else { &self.counts.requests };
             count.fetch_sub(1, Ordering::AcqRel);
             self.down.remove(&request.requester);
@@ -416,7 +346,7 @@ impl Engine {
         // No longer owed, whatever the listeners do with it.
         let (_, begun) = self.current.remove(at);
         if self.current.is_empty() {
-            self.heard.clear();
+            self.confirmations.nothing_under_way();
         }
         self.tell_answer(request, verdict, reason.map(Arc::new), begun);
     }
@@ -428,14 +358,14 @@ impl Engine {
 
     /// Tells an answer, or a notice in the form of one.
     pub fn tell_answer(&mut self, request: Request, verdict: Verdict, reason: Option<Arc<Reason>>, begun: Time) {
-        let at = self.clock.now();
+        let at = self.given.clock.now();
         let took = at.since(begun);
         let answer = Answer { request, verdict, at, took, reason };
         self.changed();
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Answered(answer.clone()));
         }
-        (self.answers)(answer);
+        (self.given.answers)(answer);
     }
 
     pub fn view(&mut self, system: bool) -> Arc<View> {
@@ -479,10 +409,10 @@ impl Engine {
     /// Everything that still waits is answered.
     fn bid_farewell(&mut self) {
         self.glance();
-        let safe = std::mem::take(&mut self.safe);
+        let safe = std::mem::take(&mut self.safety.waiting);
         let waiting = self.desk.cancel_waiting(|_| true);
         for request in safe.into_iter().chain(waiting).filter(|request| request.why == Why::Asked) {
-            let now = self.clock.now();
+            let now = self.given.clock.now();
             self.tell_answer(request, request.ask.failed(), Some(Arc::new(Reason::Ended)), now);
         }
     }

@@ -21,13 +21,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 impl Engine {
     /// Keeps what was planned for a fixed configuration.
     pub(super) fn prepare(&mut self, planned: &Planned) {
-        let configuration = planned.parts.first().and_then(|part| self.configurations.get(&part.pushes?));
+        let configuration = planned.parts.first().and_then(|part| self.given.configurations.get(&part.pushes?));
         let Some(configuration) = configuration else { return };
         let kept = self.switches.entry(configuration.id).or_default();
         // It was planned for another reason (a batch, the bound of the stack).
         if !kept.iter().any(|fast| fast.switch.fits(&self.world.system, false))
             && let Some(switch) = Switch::new(&self.world.system, configuration, planned)
-            && let Some(platform) = self.platform.prepare(&switch.universe())
+            && let Some(platform) = self.given.platform.prepare(&switch.universe())
         {
             if kept.len() >= limits::PREPARED {
                 kept.remove(0);
@@ -72,9 +72,9 @@ impl Engine {
             Ask::UndoOf(id) => (id, true),
             _ => return Fared::Not,
         };
-        let allowed = self.configurations.get(&id).is_some_and(|c| may_apply(&request, c, &self.operator));
+        let allowed = self.given.configurations.get(&id).is_some_and(|c| may_apply(&request, c, &self.given.operator));
         let known = number.and(self.current.last());
-        let begun = known.map_or_else(|| self.clock.now(), |(_, begun)| *begun);
+        let begun = known.map_or_else(|| self.given.clock.now(), |(_, begun)| *begun);
         let World { system, stack, .. } = &self.world;
         let own = || {
             let top = stack.top();
@@ -109,7 +109,7 @@ impl Engine {
             self.applied(id, None);
         }
         if self.watches_any()
-            && let Some(conditions) = &self.conditions
+            && let Some(conditions) = &self.given.conditions
         {
             conditions.nudge();
         }
@@ -123,8 +123,8 @@ impl Engine {
 
     /// A request that came alone is under way on the empty desk.
     fn takes_place(&mut self, request: Request) -> Option<u32> {
-        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.claims);
-        self.desk.turn(&self.claims).map(|turn| turn.number)
+        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
+        self.desk.turn(&self.given.claims).map(|turn| turn.number)
     }
 
     /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a
@@ -137,11 +137,11 @@ impl Engine {
         undoing: bool,
         at: &mut Time,
     ) -> Result<(), (u32, Outcome)> {
-        let deadline = *at + self.limits.step_timeout;
+        let deadline = *at + self.given.limits.step_timeout;
         let mut sent = 0u32;
         while let Some(Resolved { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
             let name = StepName::of(step);
-            if let Some(progress) = &self.progress {
+            if let Some(progress) = &self.given.progress {
                 progress(&Progress::Started(name));
             }
             // What is written was planned for this very component; only what an undo writes is not known to be allowed.
@@ -158,10 +158,10 @@ impl Engine {
             };
             // Who stops may have to wait, for its update to end.
             let took = fast.platform.waited().then(|| {
-                let begun = std::mem::replace(at, self.clock.now());
+                let begun = std::mem::replace(at, self.given.clock.now());
                 at.since(begun)
             });
-            if let Some(progress) = &self.progress {
+            if let Some(progress) = &self.given.progress {
                 let end = StepEnd::from(&outcome);
                 progress(&Progress::Ended { request: request.id, step: name, end, took, undoing });
             }
@@ -186,7 +186,7 @@ impl Engine {
         } else {
             part.edits.push = part.frame.clone();
             part.pushes = Some(switch.frame().configuration);
-            let configuration = self.configurations.get(&switch.frame().configuration);
+            let configuration = self.given.configurations.get(&switch.frame().configuration);
             part.on_failure = configuration.map(|c| c.on_failure).unwrap_or_default();
         }
         let spec = self.spec(&planned, false);

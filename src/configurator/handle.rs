@@ -2,7 +2,7 @@
 
 use super::conditions::Conditions;
 use super::control::{Command, Drift, Recovery, TakenDown, View};
-use super::engine::{Engine, Force, Parts};
+use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
 use super::progress::{AnswerSink, ProgressSink};
@@ -11,6 +11,7 @@ use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
+use crate::stack::claims::Claims;
 use crate::stack::{Requester, World};
 use crate::system::System;
 use crate::time::{Clock, Join, Receiver, Time};
@@ -63,24 +64,34 @@ impl Configurator {
         let force = Force { safe: safe_in_order, rest: setup.rest };
         let safe = configurations.values().filter(|c| c.safe).map(|c| c.id).collect();
         let awaited = configurations.values().filter_map(|c| c.confirm.map(|confirm| confirm.event)).collect();
-        let parts = Parts {
+        let pool = Pool::new(
+            setup.clock.clone(),
+            setup.platform.clone(),
+            post.clone(),
+            setup.workers.min(limits::WORKERS_MOST),
+        );
+        let given = Given {
             clock: setup.clock.clone(),
-            platform: setup.platform.clone(),
+            platform: setup.platform,
             limits: setup.limits,
+            claims: Claims::new(configurations.values()),
             configurations: Arc::new(configurations),
             force,
             operator: setup.operator.into_iter().collect(),
             context: Context { activities: setup.activities, avoid: BTreeSet::new() },
             coordinators: setup.coordinators,
-            pool: Pool::new(setup.clock.clone(), setup.platform, post.clone(), setup.workers.min(limits::WORKERS_MOST)),
-            inbox,
-            counts: post.counts.clone(),
             answers: setup.answers.clone(),
             progress: setup.progress,
             conditions: setup.conditions,
         };
         let stack = crate::stack::Stack::new(setup.limits.stack);
-        let engine = Engine::new(parts, World::new(System::new(Arc::new(setup.catalogue)), stack));
+        let engine = Engine::new(
+            given,
+            pool,
+            inbox,
+            post.counts.clone(),
+            World::new(System::new(Arc::new(setup.catalogue)), stack),
+        );
         let thread = setup.clock.spawn("configurator", move || engine.live());
         let inner =
             Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };

@@ -1,18 +1,9 @@
-//! Looks at components that are under way, and where the slow one stands (`suspects`, `observing`).
+//! Where the slow look at what nothing is under way with stands (`observing`).
 
 use super::inbox::Ticket;
 use crate::limits;
 use crate::model::ComponentName;
 use crate::time::Time;
-
-/// A look at a component that was reported faulted.
-pub(super) struct SuspectLook {
-    pub ticket: Ticket,
-    pub component: ComponentName,
-    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
-    pub generation: Option<u64>,
-    pub until: Time,
-}
 
 /// A look at some components, as the slow one takes it.
 pub(super) struct Look {

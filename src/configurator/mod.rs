@@ -18,6 +18,7 @@
 
 mod carry;
 pub mod conditions;
+mod confirmations;
 pub mod control;
 mod engine;
 mod fast;

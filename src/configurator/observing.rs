@@ -19,16 +19,16 @@ use std::sync::Arc;
 impl Engine {
     /// Looks on, when it is time. True: something differs.
     pub(super) fn observe_slowly(&mut self) -> bool {
-        let now = self.clock.now();
+        let now = self.given.clock.now();
         if let Some(look) = self.observing.out.take() {
-            match self.take_reply(look.ticket) {
+            match self.pool.take(look.ticket) {
                 Some(Reply::Observed(Ok(seen))) => {
                     if self.compare(&look, seen) {
                         return true;
                     }
                 }
                 Some(_) => {}
-                None if now >= look.until => self.give_up(look.ticket),
+                None if now >= look.until => self.pool.give_up(look.ticket),
                 None => {
                     self.observing.out = Some(look);
                     return false;
@@ -56,11 +56,11 @@ impl Engine {
 
     /// Looks at the next components of a round.
     fn look_on(&mut self) {
-        let now = self.clock.now();
+        let now = self.given.clock.now();
         if self.observing.rest.is_empty() {
             // Also what should not be there: of what some configuration destroys, that it is gone.
             let there = self.world.system.graph().node_weights().map(|node| node.name);
-            let mut rest: Vec<ComponentName> = there.chain(self.claims.components()).collect();
+            let mut rest: Vec<ComponentName> = there.chain(self.given.claims.components()).collect();
             rest.sort_unstable();
             rest.dedup();
             self.observing.rest = rest;
@@ -78,7 +78,7 @@ impl Engine {
         if components.is_empty() {
             return self.observing.later(now);
         }
-        let deadline = now + self.limits.step_timeout;
+        let deadline = now + self.given.limits.step_timeout;
         let names = components.iter().map(|(name, _)| *name).collect();
         let ticket = self.pool.start(Call::ObserveSome(names), deadline);
         self.observing.out = Some(Look { ticket, components, until: deadline + limits::PLATFORM_GRACE });
@@ -88,11 +88,7 @@ impl Engine {
     fn not_to_be_judged(&self) -> FxHashSet<ComponentName> {
         let running = self.running.iter().flat_map(|running| running.machine.components());
         let broken = self.world.broken.iter().flat_map(|broken| broken.components.iter().copied());
-        running
-            .chain(broken)
-            .chain(self.world.quarantined.iter().copied())
-            .chain(self.suspects.iter().copied())
-            .collect()
+        running.chain(broken).chain(self.world.quarantined.iter().copied()).chain(self.suspects.reported()).collect()
     }
 
     /// Compares what was seen with the model. True: it differs.
@@ -107,7 +103,7 @@ impl Engine {
         for (name, one) in &seen.components {
             let node = self.world.system.component(*name);
             if one.state == RunState::Faulted && node.is_some_and(|node| node.state != RunState::Faulted) {
-                self.suspects.push(*name);
+                self.suspects.report(*name);
                 busy.insert(*name);
             }
         }
@@ -174,7 +170,7 @@ impl Engine {
             seen: None,
         });
         self.changed();
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Differs(residual));
         }
         for frame in losers {

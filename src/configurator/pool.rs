@@ -10,6 +10,7 @@ use crate::limits;
 use crate::model::{ComponentName, Step};
 use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
 use crate::time::{Clock, Receiver, Sender, Time};
+use rustc_hash::FxHashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -42,6 +43,10 @@ pub(super) struct Pool {
     busy: usize,
     bound: usize,
     next: u64,
+    /// What came of calls that somebody waits for.
+    replies: Vec<(Ticket, Reply)>,
+    /// Calls that nobody waits for any more.
+    given_up: FxHashSet<Ticket>,
 }
 
 /// Calls `platform` and survives its panic: whether the step happened is then unknown.
@@ -80,7 +85,18 @@ fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
 impl Pool {
     pub fn new(clock: Clock, platform: Arc<dyn Platform>, post: Post, bound: usize) -> Self {
         let jobs = clock.channel(bound.max(1) + limits::WORKERS_GIVEN_UP);
-        Self { clock, platform, post, jobs, workers: 0, busy: 0, bound: bound.max(1), next: 0 }
+        Self {
+            clock,
+            platform,
+            post,
+            jobs,
+            workers: 0,
+            busy: 0,
+            bound: bound.max(1),
+            next: 0,
+            replies: Vec::new(),
+            given_up: FxHashSet::default(),
+        }
     }
 
     /// Whether a worker is free (or can be had), with so many left over.
@@ -103,20 +119,29 @@ impl Pool {
         ticket
     }
 
-    /// The call is back.
-    pub fn ended(&mut self) {
-        self.busy = self.busy.saturating_sub(1);
+    /// A worker is back with what came of its call.
+    pub fn came(&mut self, ticket: Ticket, reply: Reply) {
+        if self.given_up.remove(&ticket) {
+            self.workers += 1;
+        } else {
+            self.busy = self.busy.saturating_sub(1);
+            self.replies.push((ticket, reply));
+        }
     }
 
-    /// The call is not back long after its deadline: its worker is given up.
-    pub fn given_up(&mut self) {
-        self.busy = self.busy.saturating_sub(1);
-        self.workers = self.workers.saturating_sub(1);
+    /// What came of a call, once.
+    pub fn take(&mut self, ticket: Ticket) -> Option<Reply> {
+        let at = self.replies.iter().position(|(of, _)| *of == ticket)?;
+        Some(self.replies.swap_remove(at).1)
     }
 
-    /// A call that was given up is back after all, and its worker with it.
-    pub fn came_back(&mut self) {
-        self.workers += 1;
+    /// The call is waited for no more: it is not back long after its deadline. When it comes back its worker is free again.
+    pub fn give_up(&mut self, ticket: Ticket) {
+        if self.take(ticket).is_none() {
+            self.given_up.insert(ticket);
+            self.busy = self.busy.saturating_sub(1);
+            self.workers = self.workers.saturating_sub(1);
+        }
     }
 
     fn hire(&mut self) {

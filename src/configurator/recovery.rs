@@ -25,15 +25,15 @@ impl Engine {
 
     /// Asks the platform something on a worker, while everything else goes on. None: no answer.
     pub(super) fn ask(&mut self, call: Call) -> Option<Reply> {
-        let deadline = self.clock.now() + self.limits.step_timeout;
+        let deadline = self.given.clock.now() + self.given.limits.step_timeout;
         let ticket = self.pool.start(call, deadline);
         let until = deadline + limits::PLATFORM_GRACE;
         loop {
-            if let Some(reply) = self.take_reply(ticket) {
+            if let Some(reply) = self.pool.take(ticket) {
                 return Some(reply);
             }
-            if self.clock.now() >= until {
-                self.give_up(ticket);
+            if self.given.clock.now() >= until {
+                self.pool.give_up(ticket);
                 return None;
             }
             self.serve_safe();
@@ -101,9 +101,9 @@ impl Engine {
                 Some(seen) if self.adopt(&seen).is_ok() => {
                     self.world.stack.discard();
                     self.world.broken.clear();
-                    self.confirming.clear();
+                    self.confirmations.clear();
                     self.changed();
-                    if let Some(progress) = &self.progress {
+                    if let Some(progress) = &self.given.progress {
                         progress(&Progress::Recovered);
                     }
                     Ok(())
@@ -131,11 +131,12 @@ impl Engine {
             };
             some = true;
             self.pass_floor(&frame);
-            let planned = transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.context)
-                .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
+            let planned =
+                transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.given.context)
+                    .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
             self.take_back(&frame, planned)?;
         }
-        if some && let Some(progress) = &self.progress {
+        if some && let Some(progress) = &self.given.progress {
             progress(&Progress::Recovered);
         }
         Ok(())
@@ -157,7 +158,7 @@ impl Engine {
     /// Takes the partial frame of something broken back in one net with what mends that. False: each goes by itself.
     fn take_back_straight(&mut self, at: usize, frame: &Frame) -> Result<bool, Arc<Residual>> {
         self.pass_floor(frame);
-        let Some(planned) = self.world.straight(at, frame.id, &self.context) else { return Ok(false) };
+        let Some(planned) = self.world.straight(at, frame.id, &self.given.context) else { return Ok(false) };
         let residual = self.world.broken[at].residual.clone();
         self.take_back(frame, planned)?;
         self.forget_broken(&residual);
@@ -195,7 +196,7 @@ impl Engine {
 
     /// After a panic: what is owed is answered *broken*, and the picture is read back from the platform.
     pub(super) fn start_anew(&mut self, text: &str) {
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Survived(text.to_owned()));
         }
         let reason = Reason::Panic(text.to_owned());

@@ -204,7 +204,7 @@ impl Engine {
         let mut at = 0;
         while at < self.world.broken.len() {
             if self.world.broken[at].mendable && self.repair(at, By::Nobody).is_ok() {
-                if let Some(progress) = &self.progress {
+                if let Some(progress) = &self.given.progress {
                     progress(&Progress::Recovered);
                 }
             } else {

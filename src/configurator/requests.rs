@@ -1,7 +1,8 @@
 //! Batches that begin and end: what the stack decides is carried out, booked and answered.
 
+use super::confirmations::Confirming;
 use super::control::FrameView;
-use super::engine::{Confirming, Engine};
+use super::engine::Engine;
 use super::fast::Fared;
 use super::progress::Progress;
 use super::request::{Reason, Request};
@@ -60,15 +61,15 @@ impl Engine {
                 self.cancel_behind(number, place, requests[place]);
                 continue;
             }
-            let configurations = self.configurations.clone();
+            let configurations = self.given.configurations.clone();
             let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
             let held = self.held_frames();
             let places = self.places_taken();
             let rules = Rules {
                 configurations: &configurations,
-                operator: &self.operator,
-                context: &self.context,
-                at: self.clock.now(),
+                operator: &self.given.operator,
+                context: &self.given.context,
+                at: self.given.clock.now(),
                 busy,
                 held: &held,
                 places: &places,
@@ -98,7 +99,7 @@ impl Engine {
             if group.down {
                 self.down.insert(requests[0].requester);
                 if self.all_down() && self.world.settle_down() {
-                    self.confirming.clear();
+                    self.confirmations.clear();
                     self.changed();
                 }
                 self.forget(requests[0]);
@@ -122,7 +123,7 @@ impl Engine {
             };
             let serves: SmallVec<[RequestId; 2]> = group.places.iter().map(|place| requests[*place].id).collect();
             for place in &group.places {
-                if let Some(progress) = &self.progress {
+                if let Some(progress) = &self.given.progress {
                     progress(&Progress::Begun { request: requests[*place], steps: planned.steps.len() });
                 }
             }
@@ -139,11 +140,11 @@ impl Engine {
     /// How a plan is carried out: the time that its configurations give themselves, which then is also how long one step of
     /// theirs, or of their undoing, may take.
     pub(super) fn spec(&self, planned: &Planned, asked_back: bool) -> Spec {
-        let of = |id: &ConfigId| self.configurations.get(id).and_then(|c| c.timeout);
+        let of = |id: &ConfigId| self.given.configurations.get(id).and_then(|c| c.timeout);
         let timeout = planned.parts.iter().filter_map(|part| part.pushes.as_ref().and_then(of)).max();
         let popped = planned.popped.iter().filter_map(|frame| of(&frame.configuration)).max();
-        let patience = self.limits.step_timeout.max(timeout.unwrap_or_default()).max(popped.unwrap_or_default());
-        let until = timeout.map_or(Time::NEVER, |limit| self.clock.now() + limit);
+        let patience = self.given.limits.step_timeout.max(timeout.unwrap_or_default()).max(popped.unwrap_or_default());
+        let until = timeout.map_or(Time::NEVER, |limit| self.given.clock.now() + limit);
         Spec { until, timeout: timeout.unwrap_or_default(), patience, best_effort: false, asked_back }
     }
 
@@ -151,7 +152,7 @@ impl Engine {
     pub(super) fn ended(&mut self, running: Running) {
         let Running { number: own, mut machine, purpose, asked, stood, since, .. } = running;
         self.forget_conditions(asked.iter().map(|asked| asked.number));
-        if let Some(conditions) = &self.conditions {
+        if let Some(conditions) = &self.given.conditions {
             conditions.nudge();
         }
         match purpose {
@@ -233,13 +234,16 @@ impl Engine {
         match (request.why, verdict) {
             (_, None) | (Why::Down, _) => self.forget(request),
             (Why::Unconfirmed(_), Some(verdict)) => {
-                let begun =
-                    self.current.iter().find(|(r, _)| *r == request).map_or(self.clock.now(), |(_, begun)| *begun);
+                let begun = self
+                    .current
+                    .iter()
+                    .find(|(r, _)| *r == request)
+                    .map_or(self.given.clock.now(), |(_, begun)| *begun);
                 self.forget(request);
                 // It carries the number of the request that had pushed the frame.
                 let (told, verdict) = request.as_told(verdict);
                 let confirm = match told.ask {
-                    Ask::Apply(id) => self.configurations.get(&id).and_then(|c| c.confirm),
+                    Ask::Apply(id) => self.given.configurations.get(&id).and_then(|c| c.confirm),
                     _ => None,
                 };
                 let late = confirm.filter(|_| verdict == Verdict::Reverted);
@@ -285,7 +289,7 @@ impl Engine {
     /// Frames that those under way pop or hand over to, and those that wait for their confirmation.
     pub(super) fn held_frames(&self) -> Vec<FrameId> {
         let under_way = self.running.iter().flat_map(|running| crate::stack::held(running.machine.planned()));
-        under_way.chain(self.confirming.iter().map(|waiting| waiting.frame)).collect()
+        under_way.chain(self.confirmations.frames()).collect()
     }
 
     /// Who asked for the pushes under way: each has its place on the stack since it began.
@@ -364,29 +368,23 @@ impl Engine {
     /// A frame waits for its confirmation, unless that has come already.
     pub(super) fn await_confirmation(&mut self, request: Request, frame: FrameId) {
         let Ask::Apply(id) = request.ask else { return };
-        let Some(confirm) = self.configurations.get(&id).and_then(|c| c.confirm) else { return };
+        let Some(confirm) = self.given.configurations.get(&id).and_then(|c| c.confirm) else { return };
         let begun = self.current.iter().find(|(r, _)| r.id == request.id).map_or(Time::default(), |(_, begun)| *begun);
-        if !self.heard.iter().any(|(event, at)| *event == confirm.event && *at >= begun) {
-            let until = self.clock.now() + confirm.within;
-            self.confirming.push(Confirming { request, frame, event: confirm.event, until });
-        }
+        self.confirmations.wait_for(confirm, request, frame, begun, self.given.clock.now());
     }
 
     pub(super) fn forget_confirmations(&mut self) {
-        // A frame that is gone needs no confirmation any more.
-        let stack = &self.world.stack;
-        self.confirming.retain(|waiting| stack.frame(waiting.frame).is_some());
+        self.confirmations.keep_those_of(&self.world.stack);
     }
 
     /// Frames whose confirmation did not come in time are to be taken back. True: there were some.
     pub(super) fn revert_unconfirmed(&mut self) -> bool {
-        let now = self.clock.now();
+        let now = self.given.clock.now();
         let mut some = false;
-        while let Some(at) = self.confirming.iter().position(|waiting| waiting.until <= now) {
-            let Confirming { request, frame, .. } = self.confirming.remove(at);
+        while let Some(Confirming { request, frame, .. }) = self.confirmations.take_late(now) {
             let Ask::Apply(id) = request.ask else { continue };
             let revert = Request { ask: Ask::UndoOf(id), scope: None, why: Why::Unconfirmed(frame), ..request };
-            let _ = self.desk.arrive(Batch::one(revert), |_| false, &self.claims);
+            let _ = self.desk.arrive(Batch::one(revert), |_| false, &self.given.claims);
             some = true;
         }
         some

@@ -6,32 +6,52 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
+use crate::model::{Ask, ComponentName, ConfigId, RequestId, Step, Target, Verdict};
 use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Safe configurations that were asked for, and what those under way and over leave for others to heed.
+#[derive(Default)]
+pub(super) struct Safety {
+    /// Requests that have come and were not begun.
+    pub waiting: VecDeque<Request>,
+    /// What those under way could not plan.
+    troubles: Vec<(RequestId, Vec<Reason>)>,
+    /// What those that have ended touched, and what was interrupted was not told yet.
+    touched: Touched,
+}
+
+impl Safety {
+    /// What one that is over could not plan.
+    fn troubles_of(&mut self, request: RequestId) -> Vec<Reason> {
+        let at = self.troubles.iter().position(|(id, _)| *id == request);
+        at.map(|at| self.troubles.remove(at).1).unwrap_or_default()
+    }
+}
 
 impl Engine {
     /// Begins the safe configurations that were asked for. True: there were some.
     pub(super) fn serve_safe(&mut self) -> bool {
-        if self.safe.is_empty() && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) == 0 {
+        if self.safety.waiting.is_empty() && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) == 0 {
             return false;
         }
         self.glance();
         let mut some = false;
-        while let Some(request) = self.safe.pop_front() {
+        while let Some(request) = self.safety.waiting.pop_front() {
             self.owe(request);
             self.begin_safe(request);
             some = true;
         }
         if !some && self.counts.safe.load(std::sync::atomic::Ordering::Acquire) > 0 {
             // It was announced and is on its way.
-            self.pump(self.clock.now() + Duration::from_millis(1));
+            self.pump(self.given.clock.now() + Duration::from_millis(1));
         }
         some
     }
@@ -39,14 +59,14 @@ impl Engine {
     /// A safe configuration begins: what is under way is interrupted, and told so.
     fn begin_safe(&mut self, request: Request) {
         let Ask::Apply(id) = request.ask else { return };
-        let configurations = self.configurations.clone();
+        let configurations = self.given.configurations.clone();
         let Some(configuration) = configurations.get(&id) else { return };
         let before = self.interrupt(id);
-        let at = self.clock.now();
+        let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let (earlier, comes_after) = self.earlier_safe(&request);
         let plan = |system: &System, stack: &Stack, earlier: &[Step]| {
-            effort(&with(system, earlier), stack, configuration, &request, at, &self.context)
+            effort(&with(system, earlier), stack, configuration, &request, at, &self.given.context)
         };
         let Effort { mut planned, frame, troubles } = plan(&self.world.system, &self.world.stack, &earlier);
         let mut yields = false;
@@ -69,11 +89,11 @@ impl Engine {
             }
         }
         touched.planned_at(self.world.system.revision());
-        self.troubles.push((request.id, troubles));
+        self.safety.troubles.push((request.id, troubles));
         let spec = Spec {
             until: Time::NEVER,
             timeout: Duration::ZERO,
-            patience: self.limits.step_timeout,
+            patience: self.given.limits.step_timeout,
             best_effort: true,
             asked_back: false,
         };
@@ -89,11 +109,11 @@ impl Engine {
 
     /// The steps that safe configurations under way have still to do about what this one is about, and their numbers.
     fn earlier_safe(&self, request: &Request) -> (Vec<Step>, SmallVec<[u64; 1]>) {
-        let about = self.claims.of([request]);
+        let about = self.given.claims.of([request]);
         let (mut steps, mut numbers) = (Vec::new(), SmallVec::new());
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             let Purpose::Safe(safe) = &other.purpose else { continue };
-            if self.claims.of([&safe.0]).meets(&about) {
+            if self.given.claims.of([&safe.0]).meets(&about) {
                 steps.extend(other.machine.open_steps().cloned());
                 numbers.push(other.number);
             }
@@ -122,7 +142,7 @@ impl Engine {
             }
         }
         // Safe configurations that came before, and are not over or not told to what was interrupted yet.
-        let mut touched = self.touched.clone();
+        let mut touched = self.safety.touched.clone();
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             if let Purpose::Safe(safe) = &other.purpose {
                 touched.join(safe.2.clone());
@@ -149,8 +169,7 @@ impl Engine {
         let missed: Vec<Step> = machine.missed().cloned().collect();
         let edits = machine.planned().parts[0].edits.clone();
         let end = machine.end();
-        let troubles = self.troubles.iter().position(|(id, _)| *id == request.id);
-        let mut troubles = troubles.map(|at| self.troubles.remove(at).1).unwrap_or_default();
+        let mut troubles = self.safety.troubles_of(request.id);
         let mut broken = None;
         if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
             broken = Some(part);
@@ -164,7 +183,7 @@ impl Engine {
             // Those that came later took what this one was to do for done.
             let later = self.running.iter().filter(|other| other.after.contains(&number));
             let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
-            for (_, troubles) in self.troubles.iter_mut().filter(|(id, _)| served.contains(id)) {
+            for (_, troubles) in self.safety.troubles.iter_mut().filter(|(id, _)| served.contains(id)) {
                 troubles.push(Reason::Broken(part.residual.clone()));
             }
         }
@@ -204,11 +223,11 @@ impl Engine {
 
     /// What was interrupted goes back, once no safe configuration is being applied any more.
     fn release(&mut self, touched: Touched) {
-        self.touched.join(touched);
+        self.safety.touched.join(touched);
         if self.running.iter().any(|running| running.is_safe() && !running.over) {
             return;
         }
-        let touched = std::mem::take(&mut self.touched);
+        let touched = std::mem::take(&mut self.safety.touched);
         for running in self.running.iter_mut().filter(|running| !running.is_safe() && !running.over) {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
         }

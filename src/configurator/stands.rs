@@ -14,13 +14,13 @@ use std::sync::Arc;
 impl Engine {
     /// A transaction asks what only the values of components can tell.
     pub(super) fn ask_condition(&mut self, running: &mut Running, question: Question) {
-        let now = self.clock.now();
+        let now = self.given.clock.now();
         let (condition, until) = match question {
             Question::Stands { part } => {
                 let id = running.machine.planned().parts[part].pushes;
                 let limit = running.machine.spec().until;
-                let until = if limit == Time::NEVER { now + self.limits.step_timeout } else { limit };
-                (id.and_then(|id| self.configurations.get(&id)?.holds.clone()), until)
+                let until = if limit == Time::NEVER { now + self.given.limits.step_timeout } else { limit };
+                (id.and_then(|id| self.given.configurations.get(&id)?.holds.clone()), until)
             }
             Question::WasDone { step } => {
                 let step = &running.machine.step(step).step;
@@ -33,10 +33,10 @@ impl Engine {
                         .and_then(|operation| operation.settled_by_for(step.component())),
                     _ => None,
                 };
-                (condition, now + self.limits.step_timeout)
+                (condition, now + self.given.limits.step_timeout)
             }
         };
-        match (condition, self.conditions.clone()) {
+        match (condition, self.given.conditions.clone()) {
             (Some(condition), Some(conditions)) => {
                 let number = self.number();
                 conditions.begin(number, &condition);
@@ -52,8 +52,10 @@ impl Engine {
 
     /// Takes in answers to what was asked. True: there were some.
     pub(super) fn land_truths(&mut self, running: &mut Running) -> bool {
-        let Some(conditions) = self.conditions.clone().filter(|_| !running.asked.is_empty()) else { return false };
-        let now = self.clock.now();
+        let Some(conditions) = self.given.conditions.clone().filter(|_| !running.asked.is_empty()) else {
+            return false;
+        };
+        let now = self.given.clock.now();
         let mut did = false;
         let mut at = 0;
         while at < running.asked.len() {
@@ -82,7 +84,7 @@ impl Engine {
 
     /// These conditions are of interest no more.
     pub(super) fn forget_conditions(&self, numbers: impl IntoIterator<Item = u64>) {
-        let Some(conditions) = &self.conditions else { return };
+        let Some(conditions) = &self.given.conditions else { return };
         numbers.into_iter().for_each(|number| conditions.end(number));
     }
 
@@ -91,7 +93,7 @@ impl Engine {
         self.forget_standing(id);
         let Some(number) = number else { return };
         let mut runs: Vec<ComponentName> = Vec::new();
-        if let Some(condition) = self.configurations.get(&id).and_then(|c| c.holds.as_ref()) {
+        if let Some(condition) = self.given.configurations.get(&id).and_then(|c| c.holds.as_ref()) {
             condition.for_each_component(&mut |name, _| runs.push(name));
         }
         runs.sort_unstable();
@@ -106,7 +108,7 @@ impl Engine {
             return;
         }
         if let (Some(Standing { watch: Watch::On(number, _), .. }), Some(conditions)) =
-            (self.standings.of.remove(&id), &self.conditions)
+            (self.standings.of.remove(&id), &self.given.conditions)
         {
             conditions.end(number);
         }
@@ -130,7 +132,7 @@ impl Engine {
 
     /// Whether what a configuration in force stands for cannot be seen on this platform.
     pub(super) fn is_unseen(&self, id: ConfigId) -> bool {
-        match (self.standings.of.get(&id).map(|standing| &standing.watch), &self.conditions) {
+        match (self.standings.of.get(&id).map(|standing| &standing.watch), &self.given.conditions) {
             (Some(Watch::On(number, _)), Some(conditions)) => conditions.truth(*number).unseen,
             _ => false,
         }
@@ -167,12 +169,12 @@ impl Engine {
                 Watch::On(..) if worked_on => Watch::Paused,
                 Watch::On(..) | Watch::Paused if !worked_on && standing.runs.iter().any(stopped) => Watch::Over,
                 Watch::Paused if !worked_on => {
-                    let holds = self.configurations.get(&id).and_then(|c| c.holds.clone());
-                    match (holds, self.conditions.clone()) {
+                    let holds = self.given.configurations.get(&id).and_then(|c| c.holds.clone());
+                    match (holds, self.given.conditions.clone()) {
                         (Some(holds), Some(conditions)) => {
                             let number = self.number();
                             conditions.begin(number, &holds);
-                            Watch::On(number, Some(self.clock.now() + self.limits.step_timeout))
+                            Watch::On(number, Some(self.given.clock.now() + self.given.limits.step_timeout))
                         }
                         _ => Watch::Over,
                     }
@@ -181,7 +183,7 @@ impl Engine {
             };
             let standing = self.standings.of.get_mut(&id).expect("looked at just now");
             if let (Watch::On(number, _), Some(conditions)) =
-                (std::mem::replace(&mut standing.watch, next), &self.conditions)
+                (std::mem::replace(&mut standing.watch, next), &self.given.conditions)
             {
                 conditions.end(number);
             }
@@ -191,8 +193,8 @@ impl Engine {
 
     /// Tells of what is no longer so.
     pub(super) fn tell_fallen(&mut self) {
-        let Some(conditions) = self.conditions.clone().filter(|_| !self.standings.of.is_empty()) else { return };
-        let now = self.clock.now();
+        let Some(conditions) = self.given.conditions.clone().filter(|_| !self.standings.of.is_empty()) else { return };
+        let now = self.given.clock.now();
         let mut fallen: Vec<ConfigId> = Vec::new();
         for (id, standing) in &mut self.standings.of {
             let Watch::On(number, until) = &mut standing.watch else { continue };
@@ -216,7 +218,7 @@ impl Engine {
         self.forget_standing(id);
         self.standings.of.insert(id, Standing { watch: Watch::Over, runs: Vec::new(), lost: true });
         self.changed();
-        if let Some(progress) = &self.progress {
+        if let Some(progress) = &self.given.progress {
             progress(&Progress::Lost { configuration: id, reason: Arc::new(reason) });
         }
     }

@@ -1,25 +1,77 @@
 //! Components that were reported faulted: looked at, since the report may be older than what was done since.
 
 use super::engine::Engine;
-use super::inbox::Reply;
-use super::looks::SuspectLook;
-use super::pool::Call;
+use super::inbox::{Reply, Ticket};
+use super::pool::{Call, Pool};
 use crate::limits;
 use crate::model::{ComponentName, RunState};
-use crate::system::View as _;
+use crate::system::{System, View as _};
+use crate::time::Time;
 use rustc_hash::FxHashSet;
+use std::time::Duration;
 
-impl Engine {
-    /// Looks at components that were reported faulted (the report may be older than what was done since).
-    pub(super) fn look_at_suspects(&mut self) {
+/// A look at a component that was reported faulted.
+struct SuspectLook {
+    ticket: Ticket,
+    component: ComponentName,
+    /// When the model had touched it last: what is done to it meanwhile makes the look stale.
+    generation: Option<u64>,
+    until: Time,
+}
+
+/// Components that were reported faulted and not looked at since, and looks that are under way.
+#[derive(Default)]
+pub(super) struct Suspects {
+    reported: Vec<ComponentName>,
+    looks: Vec<SuspectLook>,
+}
+
+impl Suspects {
+    /// A component is said to be faulted, or to have come back.
+    pub fn report(&mut self, component: ComponentName) {
+        self.reported.push(component);
+    }
+
+    /// Reports were lost: anything may be faulted.
+    pub fn report_all(&mut self, system: &System) {
+        self.reported.clear();
+        self.reported.extend(system.graph().node_weights().map(|node| node.name));
+    }
+
+    /// Components that were not looked at yet.
+    pub fn reported(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        self.reported.iter().copied()
+    }
+
+    /// Whether nobody is to be looked at.
+    pub fn is_empty(&self) -> bool {
+        self.reported.is_empty()
+    }
+
+    /// When something must be looked at again, if nothing comes; none: no look is under way.
+    pub fn until(&self) -> Option<Time> {
+        self.looks.iter().map(|look| look.until).min()
+    }
+
+    /// Takes in what was seen, and begins to look at who is not `busy`: what is being worked on is looked at by whoever works
+    /// on it, or afterwards. Answers whether the model has changed.
+    pub fn look(
+        &mut self,
+        system: &mut System,
+        pool: &mut Pool,
+        busy: impl FnOnce() -> FxHashSet<ComponentName>,
+        now: Time,
+        timeout: Duration,
+    ) -> bool {
+        let mut changed = false;
         let mut at = 0;
         while at < self.looks.len() {
             let SuspectLook { ticket, component, generation, until } = self.looks[at];
-            let seen = match self.take_reply(ticket) {
+            let seen = match pool.take(ticket) {
                 Some(Reply::ObservedComponent(Ok(seen))) => seen,
                 Some(_) => None,
-                None if self.clock.now() >= until => {
-                    self.give_up(ticket);
+                None if now >= until => {
+                    pool.give_up(ticket);
                     None
                 }
                 None => {
@@ -29,45 +81,60 @@ impl Engine {
             };
             self.looks.remove(at);
             let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
-            let stale = self.generation(component) != generation;
-            if faulted && stale {
-                self.suspects.push(component);
-            } else if faulted && self.world.system.set_state(component, RunState::Faulted) {
-                self.changed();
+            if faulted && generation_of(system, component) != generation {
+                self.reported.push(component);
+            } else if faulted {
+                changed |= system.set_state(component, RunState::Faulted);
             }
         }
-        if self.suspects.is_empty() {
-            return;
+        if self.reported.is_empty() {
+            return changed;
         }
-        // What is being worked on is looked at by whoever works on it, or afterwards.
-        let busy: FxHashSet<ComponentName> = self.running.iter().flat_map(|r| r.machine.components()).collect();
+        let busy = busy();
         let mut later = Vec::new();
-        while let Some(component) = self.suspects.pop() {
+        while let Some(component) = self.reported.pop() {
             if self.looks.iter().any(|look| look.component == component) {
                 continue;
             }
-            if busy.contains(&component) || !self.pool.has_room_beside(1) {
+            if busy.contains(&component) || !pool.has_room_beside(1) {
                 later.push(component);
                 continue;
             }
-            let deadline = self.clock.now() + self.limits.step_timeout;
-            let ticket = self.pool.start(Call::ObserveComponent(component), deadline);
+            let deadline = now + timeout;
+            let ticket = pool.start(Call::ObserveComponent(component), deadline);
             let until = deadline + limits::PLATFORM_GRACE;
-            self.looks.push(SuspectLook { ticket, component, generation: self.generation(component), until });
+            self.looks.push(SuspectLook { ticket, component, generation: generation_of(system, component), until });
         }
-        self.suspects = later;
+        self.reported = later;
+        changed
+    }
+}
+
+/// When the model has touched a component last.
+fn generation_of(system: &System, component: ComponentName) -> Option<u64> {
+    system.component(component).map(|node| node.generation)
+}
+
+impl Engine {
+    /// Looks at components that were reported faulted.
+    pub(super) fn look_at_suspects(&mut self) {
+        let Self { suspects, world, pool, running, given, .. } = self;
+        let busy = || running.iter().flat_map(|running| running.machine.components()).collect();
+        if suspects.look(&mut world.system, pool, busy, given.clock.now(), given.limits.step_timeout) {
+            self.changed();
+        }
     }
 
     /// When the model has touched a component last.
     pub(super) fn generation(&self, component: ComponentName) -> Option<u64> {
-        self.world.system.component(component).map(|node| node.generation)
+        generation_of(&self.world.system, component)
     }
 
     /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
     pub(super) fn settle_suspects(&mut self) {
         loop {
             self.look_at_suspects();
-            let Some(until) = self.looks.iter().map(|look| look.until).min() else { return };
+            let Some(until) = self.suspects.until() else { return };
             self.pump(until);
             if self.stopping {
                 return;

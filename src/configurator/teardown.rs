@@ -36,7 +36,7 @@ impl Engine {
             Command::Down(_) => {}
             Command::DiscardStack => {
                 self.world.stack.discard();
-                self.confirming.clear();
+                self.confirmations.clear();
                 self.changed();
             }
             Command::Stop => self.stopping = true,
@@ -47,12 +47,12 @@ impl Engine {
         let mut down = TakenDown::default();
         self.taking_down = true;
         self.glance();
-        self.confirming.clear();
+        self.confirmations.clear();
         self.forget_standings();
         if forced {
             // Not after what is out has come in: now.
             self.break_off();
-            let Force { safe, rest } = self.force.clone();
+            let Force { safe, rest } = self.given.force.clone();
             // What a safe configuration holds still is not moved any more.
             let held = self.world.stack.frames().iter().any(|frame| frame.safe);
             self.apply_all(&safe, true, &mut down);
@@ -90,7 +90,7 @@ impl Engine {
                 seen: None,
             });
         }
-        down.in_time = self.clock.now() <= deadline;
+        down.in_time = self.given.clock.now() <= deadline;
         self.taking_down = false;
         self.changed();
         down
@@ -99,7 +99,7 @@ impl Engine {
     /// Everything that still waits is answered: nothing of it will be done.
     fn refuse_waiting(&mut self) {
         self.glance();
-        let safe: Vec<Request> = self.safe.drain(..).collect();
+        let safe: Vec<Request> = self.safety.waiting.drain(..).collect();
         let waiting = self.desk.cancel_waiting(|_| true);
         for request in waiting.into_iter().chain(safe) {
             if request.why == Why::Asked {
@@ -164,13 +164,13 @@ impl Engine {
 
     /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out.
     fn apply_all(&mut self, ids: &[ConfigId], safe: bool, down: &mut TakenDown) {
-        let configurations = self.configurations.clone();
+        let configurations = self.given.configurations.clone();
         for id in ids {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
-            let at = self.clock.now();
+            let at = self.given.clock.now();
             let Effort { planned, troubles, .. } =
-                effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.context);
+                effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
             let machine = Transaction::new(planned, self.effort(Time::NEVER));
             let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
             let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
@@ -209,7 +209,13 @@ impl Engine {
 
     /// A best effort.
     pub(super) fn effort(&self, until: Time) -> Spec {
-        Spec { until, timeout: Duration::ZERO, patience: self.limits.step_timeout, best_effort: true, asked_back: true }
+        Spec {
+            until,
+            timeout: Duration::ZERO,
+            patience: self.given.limits.step_timeout,
+            best_effort: true,
+            asked_back: true,
+        }
     }
 
     /// Removes what is there by the difference to nothing, again where something is left: a step that failed once need not
@@ -262,12 +268,13 @@ impl Engine {
 
     /// Pops frame after frame, newest first, as long as that goes.
     fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
-        while self.clock.now() < deadline {
+        while self.given.clock.now() < deadline {
             let Some(top) = self.world.stack.top().cloned() else { return };
-            let planned = match transaction(&self.world.system, &self.world.stack, &[Op::Undo(top.id)], &self.context) {
-                Ok(planned) => planned,
-                Err(refusal) => return down.troubles.push(Reason::Refused(refusal.findings)),
-            };
+            let planned =
+                match transaction(&self.world.system, &self.world.stack, &[Op::Undo(top.id)], &self.given.context) {
+                    Ok(planned) => planned,
+                    Err(refusal) => return down.troubles.push(Reason::Refused(refusal.findings)),
+                };
             let edits = planned.parts[0].edits.clone();
             let spec = Spec { asked_back: true, ..self.spec(&planned, true) };
             let end = self.carry_out(Transaction::new(planned, spec)).end();
