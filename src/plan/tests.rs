@@ -222,6 +222,27 @@ fn default_stays_in_the_file_of_its_configuration() {
     assert!(moved("lef/go").is_empty());
 }
 
+/// Where a name is destroyed and made again, *pre* is about the component that is there before.
+#[test]
+fn pre_is_about_the_component_that_goes() {
+    let mut system = base();
+    let name = system.graph().node_weights().find(|node| node.state == RunState::Running).map(|node| node.name);
+    let name = name.expect("one runs").to_string();
+    let links = system.snapshot().connections;
+    let own = |member: &MemberRef| member.component.to_string() == name;
+    let off = links.keys().filter(|(from, to)| own(from) || own(to));
+    let off: Vec<ChangeKind> = off.map(|(from, to)| disconnect(&from.to_string(), &to.to_string())).collect();
+    let ty = system.snapshot().components[&ComponentName::new(&name).unwrap()].ty.to_string();
+    let changes = off.into_iter().chain([destroy(&name), create(&name, &ty, &[])]).collect();
+    let swap = conf("swap", &[&format!("{name}:stopped")], changes, &[&format!("{name}:running")]);
+    let done = steps(&apply(&mut system, &swap));
+    let place =
+        |step: String| done.iter().position(|one| one.starts_with(&step)).unwrap_or_else(|| panic!("{step}: {done:?}"));
+    assert!(place(format!("stop {name}")) < place(format!("destroy {name}")), "{done:?}");
+    assert!(place(format!("create {name}")) < place(format!("start {name}")), "{done:?}");
+    assert_eq!(done.iter().filter(|step| **step == format!("stop {name}")).count(), 1, "{done:?}");
+}
+
 #[test]
 fn demands_that_are_true_need_no_step_and_acts_are_refused() {
     let plan = attempt(&base(), &conf("c", &["A:running"], vec![set("A.v", Value::floats(&[0.0; 3]))], &[])).unwrap();

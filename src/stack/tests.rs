@@ -446,3 +446,16 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     assert_eq!((gone.undone[..].to_vec(), gone.over), (vec![(undo(2), Verdict::UndoBroken)], false));
     assert!(desk.answered(number, 0, Some(Verdict::Ok)).over && desk.is_empty());
 }
+
+/// Whoever remembers a frame must never find another one under its number.
+#[test]
+fn numbers_of_frames_are_never_used_again() {
+    let mut bench = Bench::new(8);
+    let conf = conf("two", None, &[], vec![set("A.gain", 2.0)], &[]);
+    let first = bench.ok(&[push(&conf)]).1[0];
+    bench.stack.discard();
+    let second = bench.ok(&[push(&conf)]).1[0];
+    bench.ok(&[Op::Undo(second)]);
+    let third = bench.ok(&[push(&conf)]).1[0];
+    assert!(first < second && second < third && bench.stack.next() > third, "{first:?} {second:?} {third:?}");
+}

@@ -2,6 +2,7 @@
 
 mod agree;
 mod background;
+mod booked;
 mod breakages;
 mod commands;
 mod declared;
