@@ -31,6 +31,8 @@ impl Run for Args {
         let name = client.name().to_owned();
         let limit = Duration::from_secs_f64(self.within) + ASK;
         let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure)?;
+        // So that the same name can be deployed at once.
+        client.wait_until_free();
         if self.json {
             out.json(&answer);
         } else {

@@ -47,6 +47,8 @@ pub const REFUSED: i64 = 1;
 pub const TIMED_OUT: i64 = 2;
 /// The deployment is going down.
 pub const GOING_DOWN: i64 = 3;
+/// All places are taken.
+pub const TOO_MANY: i64 = 4;
 
 impl RpcError {
     /// An error without data.

@@ -1,14 +1,17 @@
 //! The command line as people and programs meet it: what is printed, in which shape, with which exit status.
 
 mod agree;
+mod answered;
 mod background;
 mod breakages;
 mod commands;
+mod crowded;
 mod declared;
 mod demo;
 mod explored;
 mod faults;
 mod force;
+mod foreground;
 mod hot_swap;
 mod listed;
 mod lost;
@@ -17,6 +20,8 @@ mod motion;
 mod recovery;
 mod several;
 mod simulated;
+mod stalled;
+mod vanished;
 mod together;
 mod unasked;
 mod unheard;
