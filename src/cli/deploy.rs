@@ -10,6 +10,7 @@ use super::signals::Watch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
+use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session};
@@ -132,6 +133,16 @@ fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
             CLI_NAME_TAKEN,
             format!("a deployment named `{name}` is already running"),
             format!("`davit shutdown {name}` takes it down; or give this one another `name`"),
+        ),
+        SocketError::Io { path, .. } if path.as_os_str().len() > place::LONGEST => Failure::usage(
+            CLI_SYSTEM,
+            format!(
+                "the path of the control socket has {} bytes, and may have {}: {}",
+                path.as_os_str().len(),
+                place::LONGEST,
+                path.display()
+            ),
+            "give the deployment a shorter `name`, or set XDG_RUNTIME_DIR to a directory with a shorter path",
         ),
         SocketError::Io { path, source } => Failure::usage(
             CLI_SYSTEM,

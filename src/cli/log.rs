@@ -30,6 +30,13 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
         if self.follow {
             return self.follow(context);
         }
@@ -43,9 +50,12 @@ impl Run for Args {
         }
         Ok(Exit::Done)
     }
-}
 
-impl Args {
+    /// Whether it prints one object a line.
+    pub fn streams(&self) -> bool {
+        self.follow
+    }
+
     fn follow(&self, context: &Context) -> Answer {
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();

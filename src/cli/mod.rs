@@ -205,7 +205,11 @@ pub fn main(libraries: Libraries) -> ExitCode {
         return tell(context.out, deploy::short(error), false).into();
     }
     // Their help promises one object a line.
-    let streams = matches!(cli.command, Command::Sim(_) | Command::Monitor(_));
+    let streams = match &cli.command {
+        Command::Sim(_) | Command::Monitor(_) => true,
+        Command::Log(log) => log.streams(),
+        _ => false,
+    };
     let ran = catch_unwind(AssertUnwindSafe(|| cli.command.run(&context)));
     let exit = match ran {
         Ok(Ok(exit)) => exit,

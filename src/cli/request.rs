@@ -40,7 +40,8 @@ impl Run for EventArgs {
         let params = json!({
             "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
         });
-        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))?;
+        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))
+            .map_err(|failure| failure.as_json(self.json))?;
         let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
         let good = heard == self.wait_for.as_deref();
         if self.json {
@@ -145,7 +146,6 @@ impl Run for CommitArgs {
         let wait = Wait { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
         request(context, "commit", params, &Which { name: self.name }, &wait, self.json)
-            .map_err(|failure| failure.as_json(self.json))
     }
 }
 
@@ -166,7 +166,8 @@ fn request(
     params["wait"] = json!(waits);
     params["within_s"] = json!(wait.within);
     let out = &context.out;
-    let answer = ask(which.name.as_deref(), method, &params, limit(wait.within))?;
+    let asked = ask(which.name.as_deref(), method, &params, limit(wait.within));
+    let answer = asked.map_err(|failure| failure.as_json(json))?;
     let verdict = text(&answer["answer"]);
     if json {
         out.json(&answer);

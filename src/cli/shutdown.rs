@@ -26,6 +26,13 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
         let out = &context.out;
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();

@@ -6,6 +6,9 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
+/// Bytes that the path of a socket may have, as the operating system has it.
+pub const LONGEST: usize = 107;
+
 /// The directory of the control sockets: `$XDG_RUNTIME_DIR/davit`, else `davit-UID` in the system's directory for
 /// temporary files.
 pub fn directory() -> PathBuf {

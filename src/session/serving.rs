@@ -133,14 +133,14 @@ pub(super) fn serve(connection: &Arc<Connection>, shared: &Shared, kept: bool) -
             Said::TooLong => {
                 return refuse(&Json::Null, RpcError::new(rpc::INVALID_REQUEST, "the line is too long"));
             }
-            Said::NotText => Err(RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8")),
+            Said::NotText => Err((Json::Null, RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))),
             Said::Line(line) if line.trim().is_empty() => continue,
             Said::Line(line) => rpc::parse(&line),
         };
         let call = match call {
             Ok(call) => call,
-            Err(error) => {
-                refuse(&Json::Null, error)?;
+            Err((id, error)) => {
+                refuse(&id, error)?;
                 continue;
             }
         };

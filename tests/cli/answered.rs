@@ -52,6 +52,34 @@ fn requests_end_with_their_answer() {
 }
 
 #[test]
+fn what_is_refused_is_json_too_where_it_is_asked_for() {
+    let demo = Demo::new();
+    for args in [
+        &["status"][..],
+        &["stack"],
+        &["log"],
+        &["log", "--follow"],
+        &["event", "e_fast"],
+        &["apply", "rename"],
+        &["undo"],
+        &["shutdown"],
+    ] {
+        let ran = demo.run(&[args, &["--json"]].concat());
+        assert_eq!((ran.code, ran.err.as_str()), (1, ""), "{args:?}");
+        assert_eq!(ran.json()["findings"][0]["code"], "cli::not_running", "{args:?}");
+    }
+}
+
+#[test]
+fn a_socket_with_too_long_a_path_says_so() {
+    let demo = Demo::new();
+    demo.replace("deployment.yaml", "name: demo", &format!("name: {}", "long".repeat(30)));
+    let ran = demo.run(&["deploy", "deployment.yaml"]);
+    assert_eq!(ran.code, 2, "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("107") && ran.err.contains("shorter"), "{}", ran.err);
+}
+
+#[test]
 fn the_log_is_followed_to_the_end() {
     let (demo, deployed) = deployed();
     let mut command = demo.command(&["log", "--follow", "--json"]);

@@ -1,9 +1,10 @@
 //! Nobody reads what a deployment prints: a terminal that was stopped (Ctrl-S), a pipe that is full. It goes on all the same.
 
 use crate::demo::Demo;
-use crate::foreground::{Foreground, full_pipe, read_until, terminal, until};
+use crate::foreground::{Foreground, LIMIT, full_pipe, read_until, terminal, until};
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
 use std::process::Stdio;
 
 /// It comes up, answers, and goes down in order.
@@ -153,36 +154,53 @@ fn a_terminal_that_is_closed_is_no_full_disk() {
 
 #[test]
 fn when_descriptors_run_out_nothing_spins_and_the_next_one_is_told() {
+    // Two limits, so that one of them is reached whether a connection takes one descriptor or two.
+    for limit in [40, 41] {
+        runs_out(limit);
+    }
+}
+
+fn runs_out(limit: u32) {
     let demo = Demo::new();
     let program = env!("CARGO_BIN_EXE_davit");
     let mut command = std::process::Command::new("sh");
-    command.args(["-c", &format!("ulimit -n 40; exec '{program}' deploy deployment.yaml")]);
-    command.current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path("")).stdout(Stdio::null()).stderr(Stdio::null());
+    command.args(["-c", &format!("ulimit -n {limit}; exec '{program}' deploy deployment.yaml")]);
+    command.current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path(""));
+    command.stdout(Stdio::null()).stderr(Stdio::null());
     let deployed = Foreground::start(&mut command);
     demo.until_phase("up");
-    let socket = demo.path("davit/demo.sock");
-    let mut idle = Vec::new();
+    let connect = || UnixStream::connect(demo.path("davit/demo.sock")).unwrap();
     // More than there are descriptors or places: each is let in, or told so.
-    for _ in 0..45 {
-        idle.push(std::os::unix::net::UnixStream::connect(&socket).unwrap());
-    }
-    let waits = || {
-        let tasks = std::fs::read_dir(format!("/proc/{}/task", deployed.id())).unwrap();
-        let of = |task: std::fs::DirEntry| {
-            let status = std::fs::read_to_string(task.path().join("status")).ok()?;
-            let field = |name: &str| status.lines().find_map(|l| Some(l.strip_prefix(name)?.trim().to_owned()));
-            (field("Name:")? == "davit-socket").then(|| field("voluntary_ctxt_switches:")?.parse::<u64>().ok())?
-        };
-        tasks.filter_map(Result::ok).find_map(of).expect("the thread that accepts")
-    };
+    let mut crowd: Vec<UnixStream> = (0..45).map(|_| connect()).collect();
     // A thread that spins never waits.
+    let waits = || waits_of(deployed.id(), "davit-socket");
     let before = waits();
-    let mut more = Vec::new();
     until("the thread that accepts waits", || {
-        more.push(std::os::unix::net::UnixStream::connect(&socket).ok()?);
+        // No more than the system keeps for who does not accept.
+        if crowd.len() < 100 {
+            crowd.push(connect());
+        }
         (waits() >= before + 3).then_some(())
     });
-    drop((idle, more));
-    until("places are free again", || (demo.command(&["shutdown"]).output().unwrap().status.code() == Some(0)).then_some(()));
+    let mut last = connect();
+    last.set_read_timeout(Some(LIMIT)).unwrap();
+    let mut told = String::new();
+    BufReader::new(&mut last).read_line(&mut told).unwrap();
+    assert!(told.contains("too many connections"), "{told}");
+    drop(crowd);
+    until("places are free again", || {
+        (demo.command(&["shutdown"]).output().unwrap().status.code() == Some(0)).then_some(())
+    });
     assert_eq!(deployed.end().code(), Some(0));
+}
+
+/// How often a thread has waited for something.
+fn waits_of(process: i32, thread: &str) -> u64 {
+    let of = |task: std::fs::DirEntry| {
+        let status = std::fs::read_to_string(task.path().join("status")).ok()?;
+        let field = |name: &str| status.lines().find_map(|l| Some(l.strip_prefix(name)?.trim().to_owned()));
+        (field("Name:")? == thread).then(|| field("voluntary_ctxt_switches:")?.parse().ok())?
+    };
+    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).unwrap();
+    tasks.filter_map(Result::ok).find_map(of).expect("a thread of that name")
 }
