@@ -185,7 +185,11 @@ fn watch(
 
 /// The system has no thread left.
 pub(super) fn short(error: std::io::Error) -> Failure {
-    Failure::usage(CLI_SYSTEM, format!("no thread can be started: {error}"), "try again; the system is short of threads")
+    Failure::usage(
+        CLI_SYSTEM,
+        format!("no thread can be started: {error}"),
+        "try again; the system is short of threads",
+    )
 }
 
 fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {

@@ -7,6 +7,7 @@ use super::output;
 use crate::limits;
 use crate::session::tap::{News, Tap};
 use crate::time::Clock;
+use crate::time::clock::panic_text;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::panic::PanicHookInfo;
 use std::sync::OnceLock;
@@ -37,7 +38,7 @@ pub fn prepare() -> std::io::Result<()> {
 fn told(info: &PanicHookInfo<'_>) -> String {
     let thread = std::thread::current();
     let place = info.location().map(ToString::to_string).unwrap_or_default();
-    let why = info.payload_as_str().unwrap_or("a panic without a text");
+    let why = panic_text(info.payload());
     let mut text = format!("thread '{}' panicked at {place}:\n{why}\n", thread.name().unwrap_or("unnamed"));
     let trace = Backtrace::capture();
     if trace.status() == BacktraceStatus::Captured {

@@ -145,7 +145,9 @@ impl Screen {
             }
             News::Missed(entries) => {
                 let word = self.out.paint(Style::Care, "missed");
-                self.line(format!("             {word}  {entries} lines are not shown: they came faster than they were read"));
+                self.line(format!(
+                    "             {word}  {entries} lines are not shown: they came faster than they were read"
+                ));
             }
         }
     }

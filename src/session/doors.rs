@@ -99,7 +99,9 @@ impl Doors {
     fn pause(&self, shared: &Shared) {
         let inside = lock(&self.inside);
         let still = |inside: &mut Inside| !inside.closed;
-        drop(self.closed.wait_timeout_while(inside, shared.bounds.pause, still).unwrap_or_else(PoisonError::into_inner));
+        drop(
+            self.closed.wait_timeout_while(inside, shared.bounds.pause, still).unwrap_or_else(PoisonError::into_inner),
+        );
     }
 
     fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>) {

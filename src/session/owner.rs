@@ -63,7 +63,11 @@ fn prefix() -> String {
 
 fn address(name: &str) -> io::Result<SocketAddr> {
     let prefix = prefix();
-    let own = if prefix.len() + name.len() > LONGEST { format!("#{:016x}", number(name.as_bytes())) } else { name.to_owned() };
+    let own = if prefix.len() + name.len() > LONGEST {
+        format!("#{:016x}", number(name.as_bytes()))
+    } else {
+        name.to_owned()
+    };
     SocketAddr::from_abstract_name(prefix + &own)
 }
 

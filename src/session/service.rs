@@ -139,7 +139,8 @@ impl Service for SessionService {
                     return Ok(json!({ "phase": "shutting_down" }));
                 }
                 let late = || "it is not down yet".to_owned();
-                wait(&session, Duration::from_secs(1_000_000), gone, late, |_| session.ended()).map(|ended| view(&ended))
+                wait(&session, Duration::from_secs(1_000_000), gone, late, |_| session.ended())
+                    .map(|ended| view(&ended))
             }
             _ => Err(RpcError::new(METHOD_NOT_FOUND, format!("`{method}` is the socket's own"))),
         }

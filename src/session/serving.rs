@@ -22,13 +22,7 @@ pub trait Service: Send + Sync + 'static {
     ///
     /// # Errors
     /// The error answer to send.
-    fn call_while(
-        &self,
-        line: u32,
-        method: &str,
-        params: &Json,
-        gone: &dyn Fn() -> bool,
-    ) -> Result<Json, RpcError> {
+    fn call_while(&self, line: u32, method: &str, params: &Json, gone: &dyn Fn() -> bool) -> Result<Json, RpcError> {
         let _ = gone;
         self.call(line, method, params)
     }
@@ -92,7 +86,11 @@ impl Calls {
     /// Waits until all are answered, at most as long as writing to a client may take.
     pub fn finish(&self) {
         let open = lock(&self.open);
-        drop(self.ended.wait_timeout_while(open, limits::SOCKET_WRITE, |open| *open > 0).unwrap_or_else(PoisonError::into_inner));
+        drop(
+            self.ended
+                .wait_timeout_while(open, limits::SOCKET_WRITE, |open| *open > 0)
+                .unwrap_or_else(PoisonError::into_inner),
+        );
     }
 }
 

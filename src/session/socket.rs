@@ -99,7 +99,16 @@ impl ControlSocket {
                 .spawn(move || doors.open(&listener, &shared))
                 .map_err(io)?
         };
-        Ok(Self { path, file, listening, doors, shared, observer: Mutex::default(), accepting: Some(accepting), _owner: owner })
+        Ok(Self {
+            path,
+            file,
+            listening,
+            doors,
+            shared,
+            observer: Mutex::default(),
+            accepting: Some(accepting),
+            _owner: owner,
+        })
     }
 
     /// Where it listens.

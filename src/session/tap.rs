@@ -91,7 +91,12 @@ impl<T: Send + 'static> Tap<T> {
     ///
     /// # Errors
     /// When the operating system has no thread left.
-    pub fn new(name: &str, bound: usize, clock: &Clock, observer: impl FnMut(News<T>) + Send + 'static) -> io::Result<Self> {
+    pub fn new(
+        name: &str,
+        bound: usize,
+        clock: &Clock,
+        observer: impl FnMut(News<T>) + Send + 'static,
+    ) -> io::Result<Self> {
         let state = State {
             queue: VecDeque::new(),
             missing: 0,
@@ -238,7 +243,11 @@ impl<T> Shared<T> {
     }
 
     /// Waits until the observer has done one more, or ends, at most for `patience`.
-    fn wait_for_progress<'a>(&'a self, state: MutexGuard<'a, State<T>>, patience: Duration) -> MutexGuard<'a, State<T>> {
+    fn wait_for_progress<'a>(
+        &'a self,
+        state: MutexGuard<'a, State<T>>,
+        patience: Duration,
+    ) -> MutexGuard<'a, State<T>> {
         let done = state.done;
         let still = |state: &mut State<T>| state.done == done && !state.gone;
         self.taken.wait_timeout_while(state, patience, still).unwrap_or_else(PoisonError::into_inner).0

@@ -30,7 +30,12 @@ fn requests_end_with_their_answer() {
     assert_eq!((failed.code, failed.out.as_str()), (1, "fast.failed after e_fast\n"), "{}", failed.err);
     // It is in the slow state again, where nobody hears this one.
     let unheard = run(&["event", "e_slow", "--within", "80"]);
-    assert_eq!((unheard.code, unheard.out.as_str()), (1, "e_slow raised, and no transition heard it\n"), "{}", unheard.err);
+    assert_eq!(
+        (unheard.code, unheard.out.as_str()),
+        (1, "e_slow raised, and no transition heard it\n"),
+        "{}",
+        unheard.err
+    );
     let heard = run(&["event", "e_fast", "--within", "80"]);
     assert_eq!((heard.code, heard.out.as_str()), (0, "e_fast heard\n"), "{}", heard.err);
     assert_eq!(run(&["event", "e_slow", "--no-wait"]).out, "e_slow raised\n");

@@ -34,6 +34,24 @@ fn a_full_pipe_stops_nothing() {
 }
 
 #[test]
+fn a_second_signal_is_heard_too() {
+    let demo = Demo::new();
+    // Something hangs on the way down, and nobody would wait for less than a minute.
+    let faults = "faults:\n  - { step: \"stop source\", how: hang, times: 9 }\n";
+    demo.write("deployment.yaml", &format!("{}{faults}", demo.read("deployment.yaml")));
+    demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 600");
+    let (_nobody, pipe) = full_pipe();
+    let mut command = demo.command(&["deploy", "deployment.yaml"]);
+    command.stdout(Stdio::from(pipe)).stderr(Stdio::null());
+    let deployed = Foreground::start(&mut command);
+    demo.until_phase("up");
+    deployed.signal(libc::SIGINT);
+    demo.until_phase("shutting_down");
+    deployed.signal(libc::SIGINT);
+    assert!(deployed.end().code().is_some_and(|code| code != 0), "it says that it did not end in order");
+}
+
+#[test]
 fn a_stopped_terminal_stops_nothing_and_shows_the_rest_when_it_goes_on() {
     let demo = Demo::new();
     let (mut person, program) = terminal();
@@ -61,11 +79,9 @@ fn a_stopped_terminal_does_not_keep_a_script_or_a_failed_bring_up_from_its_end()
     let demo = Demo::new();
     demo.write("script.lua", "deploy('deployment.yaml') wait_state('operational', 20) for i = 1, 300 do say('x') end");
     demo.write("failing.lua", "deploy('deployment.yaml') error('no luck')");
-    for (args, code) in [
-        (&["run", "script.lua"][..], 0),
-        (&["run", "failing.lua"], 1),
-        (&["deploy", "missing.yaml"], 2),
-    ] {
+    for (args, code) in
+        [(&["run", "script.lua"][..], 0), (&["run", "failing.lua"], 1), (&["deploy", "missing.yaml"], 2)]
+    {
         let (mut person, program) = terminal();
         person.write_all(b"\x13").unwrap();
         let mut command = demo.command(args);

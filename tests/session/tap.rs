@@ -214,3 +214,28 @@ fn a_wait_runs_out_also_while_much_happens() {
     };
     assert_eq!(found, None);
 }
+
+#[test]
+fn in_simulated_time_whoever_notes_something_waits_for_a_slow_observer() {
+    let clock = Clock::simulated();
+    let _me = clock.enter();
+    let hub = Hub::new(&clock, [], []);
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let hears = heard.clone();
+    let tap = Tap::new("slow", 16, &clock, move |news: News<Deaf>| {
+        std::thread::yield_now();
+        hears.lock().unwrap().push(match news {
+            News::One(Deaf(entry)) => serde_json::to_value(&entry.what).unwrap()["event"].clone(),
+            News::Missed(missing) => panic!("{missing} are missing"),
+        });
+    });
+    let tap = tap.unwrap();
+    hub.attach(Arc::new(tap.clone()));
+    for number in 0..5_000 {
+        hub.note(Happening::Emitted { event: format!("e_{number}") });
+    }
+    assert_eq!(tap.finish(LIMIT), 0);
+    let heard = heard.lock().unwrap();
+    assert_eq!(heard.len(), 5_000);
+    assert!(heard.iter().enumerate().all(|(number, event)| *event == format!("e_{number}")));
+}
