@@ -17,6 +17,31 @@ pub const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Connections a control socket serves at once: a coordinator, a few terminals and displays; each costs a thread.
 pub const SOCKET_CONNECTIONS: usize = 32;
 
+/// Connections beside them, for what must get through when all others are taken (`shutdown`, `status`, safety events): two
+/// people who ask at the same time, and two that are still being told that they are too many.
+pub const SOCKET_KEPT: usize = 4;
+
+/// How long a connection on one of these may take to say what it wants: a program that connects knows it.
+pub const SOCKET_SAY: Duration = Duration::from_secs(2);
+
+/// How long a connection that has not subscribed may take from one line to the end of the next before its place is given
+/// away: longer than any program is silent that still wants something; one that was only left open does not last.
+pub const SOCKET_IDLE: Duration = Duration::from_secs(60);
+
+/// How long a client waits for the socket of a deployment whose process lives: between taking its name and listening, and
+/// between its last answer and its end, it has none.
+pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
+
+/// How often it looks.
+pub const SOCKET_STEP: Duration = Duration::from_millis(10);
+
+/// How often whoever waits for an answer looks whether the client is still there.
+pub const SOCKET_LOOK: Duration = Duration::from_millis(100);
+
+/// How long nothing is accepted after the system had no descriptor left for it: some will be closed by then, and trying
+/// at once would only keep a processor busy.
+pub const SOCKET_PAUSE: Duration = Duration::from_millis(100);
+
 /// Bytes of one line on the control socket: far more than any request, little enough to buffer for every connection.
 pub const SOCKET_LINE: usize = 1 << 20;
 
@@ -25,6 +50,21 @@ pub const SOCKET_QUEUE: usize = 1024;
 
 /// How long a client may take to accept what is written to it.
 pub const SOCKET_WRITE: Duration = Duration::from_secs(5);
+
+/// Things that may wait for a slow observer (a terminal, the subscribers) before they are dropped: the log's own length.
+/// They are shared with the log, so that they take little more memory than it.
+pub const TAP: usize = LOG_ENTRIES;
+
+/// Lines beside them that a command says of itself (up, down, what is left): they have room when the queue is full.
+pub const TAP_OWN: usize = 256;
+
+/// How long simulated time stands still for an observer that takes nothing: somebody pages through the output. Then it
+/// goes on without it.
+pub const TAP_PATIENCE: Duration = Duration::from_secs(30);
+
+/// How long the end of a command waits for an observer that takes nothing of what is left: a terminal that was stopped
+/// (Ctrl-S) does not keep the process alive.
+pub const TAP_END: Duration = Duration::from_secs(3);
 
 /// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
 pub const LOG_ENTRIES: usize = 4096;

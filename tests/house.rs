@@ -360,6 +360,25 @@ fn time_is_read_in_one_room() {
     );
 }
 
+/// Files that may write to a stream: all else of the program hands its words to one of them.
+const WRITERS: &[&str] = &["src/cli/output.rs", "src/cli/detach.rs", "src/cli/progress.rs"];
+
+#[test]
+fn nothing_is_written_and_nothing_observes_in_a_thread_that_acts() {
+    let mut wrong = Vec::new();
+    for (file, text) in sources("src") {
+        for (i, line) in code_lines(&text).iter().enumerate() {
+            let streams = ["println!", "print!", "io::stdout()", "io::stderr()"];
+            let writes = !WRITERS.contains(&file.as_str()) && streams.iter().any(|word| line.contains(word));
+            // `attach` hangs an observer on a tap; `observe` is for tests and measurements.
+            if writes || line.contains("hub().observe(") || line.contains("hub.observe(") {
+                wrong.push(format!("{file}:{}: `{}`", i + 1, line.trim()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "whoever acts waits for a reader here, see `session/tap.rs`:\n{}", wrong.join("\n"));
+}
+
 #[test]
 fn every_code_is_used_and_explained() {
     let text = std::fs::read_to_string(root().join("src/model/codes.rs")).expect("codes.rs is there");

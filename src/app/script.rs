@@ -16,7 +16,8 @@ use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, EventName, Ident};
 use crate::runtime::Libraries;
-use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Observer, Session, recovery};
+use crate::session::tap::Hears;
+use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Session, recovery};
 use crate::time::{Clock, Time};
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
@@ -36,7 +37,7 @@ pub struct Options {
     /// The platform they run on, one of [`PLATFORMS`](super::PLATFORMS), instead of the one they name.
     pub platform: Option<Ident>,
     /// Hears everything that happens.
-    pub observer: Option<Observer>,
+    pub observer: Option<Arc<dyn Hears>>,
     /// Where `say` goes.
     pub say: Box<dyn Fn(&str)>,
 }
@@ -307,7 +308,7 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
     host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {
-        session.hub().observe(observer.clone());
+        session.hub().attach(observer.clone());
     }
     // A replay raises the events itself.
     match if replay { Ok(()) } else { session.bring_up() } {

@@ -3,17 +3,18 @@
 use super::detach;
 use super::exit::Exit;
 use super::input::Input;
+use super::last_words;
 use super::output::{Output, Style};
 use super::progress::Progress;
 use super::signals::Watch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
+use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session};
 use crate::time::Clock;
-use serde_json::json;
 use std::sync::Arc;
 
 /// Bring a deployment up and stay in the foreground; Ctrl-C shuts it down in order.
@@ -70,10 +71,11 @@ impl Run for Args {
             return detach::run(context);
         }
         let checked = self.input.check(context)?;
-        let progress = Progress::new(context.out, self.json);
         let clock = self.clock.make(self.pace);
+        let progress = Progress::new(context.out, self.json, &clock).map_err(short)?;
         let exit = foreground(context, &checked, &clock, &progress, self.in_background)?;
         clock.shutdown();
+        last_words::unread(progress.end());
         Ok(exit)
     }
 }
@@ -99,14 +101,8 @@ fn foreground(
     })?;
     let socket = open(&session)?;
     let watch = watch(&session, &socket, progress, in_background)?;
-    session.hub().observe(progress.observer());
-    {
-        let notify = socket.notifier();
-        session.hub().observe(Arc::new(move |at, what| {
-            let entry = crate::session::log::Entry { at: at.as_secs_f64(), what: what.clone() };
-            notify("log", &json!(entry));
-        }));
-    }
+    session.hub().attach(progress.observer());
+    session.hub().attach(socket.observer(clock).map_err(short)?);
     let exit = match session.bring_up() {
         Err(not_up) => {
             progress.finish();
@@ -115,8 +111,7 @@ fn foreground(
         Ok(()) => {
             tell_up(&context.out, progress, &session, in_background);
             if in_background {
-                detach::tell_up();
-                progress.silence();
+                progress.up_in_background();
             }
             let Command::Shutdown { force } = session.serve();
             let ended = session.take_down(force);
@@ -139,6 +134,16 @@ fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
             format!("a deployment named `{name}` is already running"),
             format!("`davit shutdown {name}` takes it down; or give this one another `name`"),
         ),
+        SocketError::Io { path, .. } if path.as_os_str().len() > place::LONGEST => Failure::usage(
+            CLI_SYSTEM,
+            format!(
+                "the path of the control socket has {} bytes, and may have {}: {}",
+                path.as_os_str().len(),
+                place::LONGEST,
+                path.display()
+            ),
+            "give the deployment a shorter `name`, or set XDG_RUNTIME_DIR to a directory with a shorter path",
+        ),
         SocketError::Io { path, source } => Failure::usage(
             CLI_SYSTEM,
             format!("cannot listen on {}: {source}", path.display()),
@@ -156,17 +161,17 @@ fn watch(
     let first = {
         let (session, progress) = (Arc::downgrade(session), progress.clone());
         move || {
-            progress.line("taking it down; Ctrl-C again ends at once and asks the components nothing more");
             if let Some(session) = session.upgrade() {
                 session.command(Command::Shutdown { force: false });
             }
+            progress.line("taking it down; Ctrl-C again ends at once and asks the components nothing more");
         }
     };
     let second = {
-        let (path, progress) = (socket.path().to_owned(), progress.clone());
+        let (leave, progress) = (socket.leave(), progress.clone());
         move || {
+            leave();
             progress.finish();
-            let _ = std::fs::remove_file(path);
         }
     };
     Watch::start(in_background, first, second).map_err(|error| {
@@ -176,6 +181,15 @@ fn watch(
             "try again; the system is short of threads",
         )
     })
+}
+
+/// The system has no thread left.
+pub(super) fn short(error: std::io::Error) -> Failure {
+    Failure::usage(
+        CLI_SYSTEM,
+        format!("no thread can be started: {error}"),
+        "try again; the system is short of threads",
+    )
 }
 
 fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {

@@ -2,9 +2,11 @@
 
 use super::exit::Exit;
 use super::output::{Output, Style};
-use super::remote::{ASK, ask};
+use super::remote::{ASK, ask, connect, failure};
 use super::status::text;
-use super::{Answer, Context, Run};
+use super::{Answer, Context, Failure, Run, output};
+use crate::model::codes::CLI_NO_ANSWER;
+use crate::session::owner;
 use serde_json::{Value as Json, json};
 
 /// Show what happened: requests and their answers, events, states, faults, and how long each step took.
@@ -18,13 +20,26 @@ pub struct Args {
     /// Show the steps of every answer.
     #[arg(long)]
     steps: bool,
-    /// Print JSON.
+    /// Go on with what happens from now on, until the deployment ends.
+    #[arg(long, short)]
+    follow: bool,
+    /// Print JSON; with `--follow` one object a line.
     #[arg(long)]
     json: bool,
 }
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
+        if self.follow {
+            return self.follow(context);
+        }
         let log = ask(self.name.as_deref(), "log", &json!({ "last": self.last }), ASK)?;
         if self.json {
             context.out.json(&log);
@@ -34,6 +49,63 @@ impl Run for Args {
             context.out.text(line(&context.out, entry, self.steps));
         }
         Ok(Exit::Done)
+    }
+
+    /// Whether it prints one object a line.
+    pub fn streams(&self) -> bool {
+        self.follow
+    }
+
+    fn follow(&self, context: &Context) -> Answer {
+        let mut client = connect(self.name.as_deref())?;
+        let name = client.name().to_owned();
+        client.subscribe(ASK).map_err(failure)?;
+        // Asked for behind the subscription: what happens in between is in both.
+        let log = ask(Some(&name), "log", &json!({ "last": self.last }), ASK)?;
+        let mut told = log.as_array().cloned().unwrap_or_default();
+        let print = |entry: &Json| match self.json {
+            true => context.out.json_line(entry),
+            false => context.out.text(line(&context.out, entry, self.steps)),
+        };
+        told.iter().for_each(&print);
+        let mut phases = Phases::default();
+        while let Some(entry) = client.next_entry() {
+            phases.see(&entry);
+            match told.iter().position(|old| *old == entry) {
+                Some(place) => drop(told.drain(..=place)),
+                None => {
+                    told.clear();
+                    print(&entry);
+                }
+            }
+            if output::reader_is_gone() {
+                return Ok(Exit::Done);
+            }
+        }
+        if !phases.over && owner::is_owned(&name) {
+            return Err(Failure::no(
+                CLI_NO_ANSWER,
+                format!("the deployment `{name}` ended the connection"),
+                "more happened than could be printed, or it is going down: `davit log` shows what it remembers",
+            ));
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// How far a story is.
+#[derive(Default)]
+struct Phases {
+    ending: bool,
+    over: bool,
+}
+
+impl Phases {
+    fn see(&mut self, entry: &Json) {
+        if entry["what"] == "phase" {
+            self.over = self.ending && entry["phase"] != "shutting_down";
+            self.ending |= entry["phase"] == "shutting_down";
+        }
     }
 }
 
@@ -73,6 +145,11 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))
         }
         "returned" => format!("returned   {}", text(&entry["component"])),
+        "missed" => format!(
+            "{}     {} entries are not shown: they came faster than they were read",
+            out.paint(Style::Care, "missed"),
+            entry["entries"]
+        ),
         "dropped" => format!(
             "{}    {} events: the coordinator does not keep up",
             out.paint(Style::Care, "dropped"),

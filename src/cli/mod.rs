@@ -15,6 +15,7 @@ pub mod exit;
 mod explain;
 mod graph;
 pub mod input;
+mod last_words;
 mod log;
 mod monitor;
 pub mod output;
@@ -42,6 +43,7 @@ use crate::runtime::Libraries;
 use clap::Parser;
 use exit::Exit;
 use output::{Color, Output};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -188,27 +190,65 @@ pub fn main(libraries: Libraries) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Also help and version, which are no errors. A stream that is gone takes nothing; the code still answers.
-            let _ = error.print();
-            return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
+            // Also help and version, which are no errors.
+            if let Err(unwritten) = error.print() {
+                output::failed(&unwritten);
+            }
+            return written(Output::new(Color::Auto), if error.use_stderr() { Exit::Usage } else { Exit::Done }).into();
         }
     };
     let context = Context { out: Output::new(cli.color), libraries };
-    // Their help promises one object a line.
-    let streams = matches!(cli.command, Command::Sim(_) | Command::Monitor(_));
-    match cli.command.run(&context) {
-        Ok(exit) => exit.into(),
-        Err(failure) => {
-            if failure.json {
-                let findings = to_json(&failure.findings, &failure.sources);
-                let answer = serde_json::json!({ "ok": false, "findings": findings });
-                if streams { context.out.json_line(&answer) } else { context.out.json(&answer) }
-            } else {
-                context.out.findings(&failure.findings, &failure.sources);
-            }
-            failure.exit.into()
-        }
+    // They keep a robot up: nothing that cannot be written may hold them.
+    if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
+        && let Err(error) = last_words::prepare()
+    {
+        return tell(context.out, deploy::short(error), false).into();
     }
+    // Their help promises one object a line.
+    let streams = match &cli.command {
+        Command::Sim(_) | Command::Monitor(_) => true,
+        Command::Log(log) => log.streams(),
+        _ => false,
+    };
+    let ran = catch_unwind(AssertUnwindSafe(|| cli.command.run(&context)));
+    let exit = match ran {
+        Ok(Ok(exit)) => exit,
+        Ok(Err(failure)) => tell(context.out, failure, streams),
+        Err(panic) => {
+            last_words::end();
+            resume_unwind(panic);
+        }
+    };
+    last_words::end();
+    let exit = written(context.out, exit);
+    last_words::end();
+    exit.into()
+}
+
+/// Prints why a command did not do its work; answers how it ended.
+fn tell(out: Output, failure: Failure, streams: bool) -> Exit {
+    let Failure { exit, findings, sources, json } = failure;
+    last_words::say(move || {
+        if json {
+            let answer = serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
+            if streams { out.json_line(&answer) } else { out.json(&answer) }
+        } else {
+            out.findings(&findings, &sources);
+        }
+    });
+    exit
+}
+
+/// How a command ended that has written what it had to say: no good end if it could not.
+fn written(out: Output, exit: Exit) -> Exit {
+    let Some(why) = output::unwritten() else { return exit };
+    let failure = Failure::usage(
+        CLI_UNWRITABLE,
+        format!("the output could not be written: {why}"),
+        "make room where the output goes, or send it elsewhere",
+    );
+    let unwritten = tell(out, failure, false);
+    if exit == Exit::Done { unwritten } else { exit }
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
 //! Where a command's words go: text or JSON on stdout, findings on stderr, colours only where a terminal shows them.
 //!
 //! A reader that goes away (`davit plan … | head`) is no error of ours: what is left is thrown away and the command's
-//! answer stands.
+//! answer stands. Anything else that keeps words from being written (a full disk) is remembered, and the command's end
+//! says so.
 
 use crate::diagnostics::{SourceMap, render};
 use crate::model::Finding;
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// When to use colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
@@ -58,7 +61,9 @@ pub enum Style {
 impl Output {
     /// Streams with colours as asked.
     pub fn new(color: Color) -> Self {
-        Self { stdout_color: color.on(io::stdout().is_terminal()), stderr_color: color.on(io::stderr().is_terminal()) }
+        let (out, err) = (io::stdout().is_terminal(), io::stderr().is_terminal());
+        ON_TERMINAL.store(out || err, Ordering::Relaxed);
+        Self { stdout_color: color.on(out), stderr_color: color.on(err) }
     }
 
     /// Whether findings may be coloured.
@@ -113,16 +118,47 @@ impl Output {
 
     /// Text to stderr as it is.
     pub fn error(&self, text: impl AsRef<str>) {
-        put(&mut io::stderr().lock(), text.as_ref());
+        error(text.as_ref());
     }
 }
 
+/// Text to stderr as it is.
+pub fn error(text: &str) {
+    put(&mut io::stderr().lock(), text);
+}
+
+/// Why something could not be written, the first time that happened. A reader that went away is no such reason.
+static UNWRITTEN: OnceLock<String> = OnceLock::new();
+
+/// Why something that was to be written was not, if there was anything (a disk is full, a stream is closed).
+pub fn unwritten() -> Option<&'static str> {
+    UNWRITTEN.get().map(String::as_str)
+}
+
+/// Remembers why a stream took nothing.
+pub fn failed(error: &io::Error) {
+    // A terminal that was closed refuses everything.
+    let closed = error.raw_os_error() == Some(libc::EIO) && ON_TERMINAL.load(Ordering::Relaxed);
+    if error.kind() == ErrorKind::BrokenPipe || closed {
+        READER_GONE.store(true, Ordering::Relaxed);
+    } else {
+        let _ = UNWRITTEN.set(error.to_string());
+    }
+}
+
+/// Whether one of the streams went to a terminal when the command began.
+static ON_TERMINAL: AtomicBool = AtomicBool::new(false);
+
+static READER_GONE: AtomicBool = AtomicBool::new(false);
+
+/// Whether nobody reads any more: a command that goes on printing has nothing left to do.
+pub fn reader_is_gone() -> bool {
+    READER_GONE.load(Ordering::Relaxed)
+}
+
 fn put(stream: &mut impl Write, text: &str) {
-    match stream.write_all(text.as_bytes()).and_then(|()| stream.flush()) {
-        Ok(()) => {}
-        Err(e) if e.kind() == ErrorKind::BrokenPipe => {}
-        // Nothing can be said on a stream that takes nothing; the exit code still answers.
-        Err(_) => {}
+    if let Err(error) = stream.write_all(text.as_bytes()).and_then(|()| stream.flush()) {
+        failed(&error);
     }
 }
 

@@ -1,72 +1,165 @@
 //! Live progress of a deployment: a line for every answer, and on a terminal a line below that tells what is under way.
+//!
+//! All of it is written in a thread of its own behind a [tap](crate::session::tap): a terminal that was stopped (Ctrl-S), or a
+//! pipe that nobody reads, keeps nobody waiting who acts.
 
+use super::detach;
 use super::log::{count, duration};
 use super::output::{Output, Style};
-use crate::session::{Happening, Observer, Phase};
-use crate::time::Time;
+use crate::limits;
+use crate::session::log::Entry;
+use crate::session::tap::{Hears, News, Tap};
+use crate::session::{Happening, Phase};
+use crate::time::Clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How a deployment's story is told.
+/// How a deployment's story is told. Clones tell the same one.
 #[derive(Clone)]
 pub struct Progress {
-    out: Output,
-    bar: ProgressBar,
-    quiet: Arc<AtomicBool>,
+    tap: Tap<Told>,
     json: bool,
+    simulated: bool,
+}
+
+/// What is told.
+enum Told {
+    /// Something happened.
+    Entry(Arc<Entry>),
+    /// A line of the command's own.
+    Line(String),
+    /// The same for programs.
+    Json(String),
+    /// No line below any more that tells what is under way.
+    Finish,
+    /// It is up, and whoever listened to the process in the background goes.
+    UpInBackground,
+}
+
+impl From<Arc<Entry>> for Told {
+    fn from(entry: Arc<Entry>) -> Self {
+        Self::Entry(entry)
+    }
 }
 
 impl Progress {
-    /// Tells it on stdout: as one JSON object a line if `json`, else as text.
-    pub fn new(out: Output, json: bool) -> Self {
+    /// Tells it on stdout: as one JSON object a line if `json`, else as text. Of a deployment on `clock`.
+    ///
+    /// # Errors
+    /// When the operating system has no thread left.
+    pub fn new(out: Output, json: bool, clock: &Clock) -> std::io::Result<Self> {
+        let mut screen = Screen::new(out, json);
+        let tap = Tap::new("davit-output", limits::TAP, clock, move |news| screen.show(news))?;
+        Ok(Self { tap, json, simulated: clock.is_simulated() })
+    }
+
+    /// What to give to the session.
+    pub fn observer(&self) -> Arc<dyn Hears> {
+        Arc::new(self.tap.clone())
+    }
+
+    /// A line of the command's own, for people. Never waits.
+    pub fn line(&self, line: impl std::fmt::Display) {
+        if !self.json {
+            self.tap.put_own(Told::Line(line.to_string()));
+        }
+    }
+
+    /// A line of a script. In simulated time the script waits for the reader.
+    pub fn say(&self, line: impl std::fmt::Display) {
+        if !self.json {
+            self.tap.put(Told::Line(line.to_string()));
+            self.tap.keep_pace();
+        }
+    }
+
+    /// The same for programs.
+    pub fn say_json(&self, object: &serde_json::Value) {
+        self.tap.put(Told::Json(object.to_string()));
+        self.tap.keep_pace();
+    }
+
+    /// From now on nothing is told but by [`Progress::line`] and what happens.
+    pub fn finish(&self) {
+        self.tap.put_own(Told::Finish);
+    }
+
+    /// It is up, and from now on nothing is told at all.
+    pub fn up_in_background(&self) {
+        self.tap.put_own(Told::UpInBackground);
+    }
+
+    /// The end: waits until all is written, as long as somebody reads. Answers how many lines were not.
+    pub fn end(&self) -> u64 {
+        self.tap.finish(if self.simulated { limits::TAP_PATIENCE } else { limits::TAP_END })
+    }
+}
+
+/// The end of the tap that writes.
+struct Screen {
+    out: Output,
+    bar: ProgressBar,
+    quiet: bool,
+    json: bool,
+    /// When what was told last happened.
+    at: f64,
+}
+
+impl Screen {
+    fn new(out: Output, json: bool) -> Self {
         let bar = if std::io::stdout().is_terminal() && !json {
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout())
         } else {
             ProgressBar::hidden()
         };
         bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
-        Self { out, bar, quiet: Arc::new(AtomicBool::new(false)), json }
+        Self { out, bar, quiet: false, json, at: 0.0 }
     }
 
-    /// What to give to the session.
-    pub fn observer(&self) -> Observer {
-        let this = self.clone();
-        Arc::new(move |at, what| this.tell(at, what))
-    }
-
-    /// A line of the story.
-    pub fn line(&self, line: impl std::fmt::Display) {
-        if self.quiet.load(Ordering::Relaxed) || self.json {
-            return;
-        }
+    fn line(&self, line: impl std::fmt::Display) {
         let out = self.out;
         self.bar.suspend(|| out.line(line));
     }
 
-    /// From now on nothing is told but by [`Progress::line`].
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
-
-    /// From now on nothing is told at all (whoever listened is gone).
-    pub fn silence(&self) {
-        self.finish();
-        self.quiet.store(true, Ordering::Relaxed);
-    }
-
-    fn tell(&self, at: Time, what: &Happening) {
-        if self.quiet.load(Ordering::Relaxed) {
+    fn show(&mut self, news: News<Told>) {
+        if self.quiet {
             return;
         }
+        match news {
+            News::One(Told::Entry(entry)) => {
+                self.at = entry.at;
+                self.tell(&entry);
+            }
+            News::One(Told::Line(line)) => self.line(line),
+            News::One(Told::Json(line)) => self.out.line(line),
+            News::One(Told::Finish) => self.bar.finish_and_clear(),
+            News::One(Told::UpInBackground) => {
+                self.bar.finish_and_clear();
+                self.quiet = true;
+                detach::tell_up();
+            }
+            News::Missed(entries) if self.json => {
+                self.out.json_line(&json!({ "at": self.at, "what": "missed", "entries": entries }));
+            }
+            News::Missed(entries) => {
+                let word = self.out.paint(Style::Care, "missed");
+                self.line(format!(
+                    "             {word}  {entries} lines are not shown: they came faster than they were read"
+                ));
+            }
+        }
+    }
+
+    fn tell(&self, entry: &Entry) {
         if self.json {
-            self.out.json_line(&crate::session::log::Entry { at: at.as_secs_f64(), what: what.clone() });
+            self.out.json_line(entry);
             return;
         }
         let out = &self.out;
-        let time = out.paint(Style::Dim, format!("{:>9.3} s", at.as_secs_f64()));
-        match what {
+        let time = out.paint(Style::Dim, format!("{:>9.3} s", entry.at));
+        match &entry.what {
             // A recovery is answered where it was asked: no answer ends its bar.
             Happening::Requested { request: None, ask, by } => self.line(format!("{time}  {ask} (asked by {by})")),
             Happening::Requested { ask, by, .. } => {

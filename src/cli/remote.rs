@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::exit::Exit;
-use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING};
+use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE};
 use crate::session::client::{Client, ClientError};
 use serde_json::Value as Json;
 use std::time::Duration;
@@ -21,8 +21,11 @@ pub struct Which {
 /// How long to wait for an answer.
 #[derive(Debug, clap::Args)]
 pub struct Wait {
-    /// Wait for the answer, and exit with 1 or 3 if it is not a good one.
+    /// Do not wait for the answer: exit with 0 once it is asked for.
     #[arg(long)]
+    pub no_wait: bool,
+    /// What is done anyway.
+    #[arg(long, hide = true, conflicts_with = "no_wait")]
     pub wait: bool,
     /// How long to wait at most, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
@@ -68,6 +71,12 @@ pub fn failure(error: ClientError) -> Failure {
         ClientError::Unknown { name, help } => {
             Failure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
         }
+        ClientError::SocketGone { name, path } => Failure::no(
+            CLI_SOCKET_GONE,
+            format!("the deployment `{name}` runs, but its socket {} is gone", path.display()),
+            "Ctrl-C in its terminal shuts it down in order, and so does SIGINT to its process: look for it with `pgrep -af \
+             davit`",
+        ),
         ClientError::Io { name, source } => Failure {
             exit: Exit::No,
             ..Failure::no(

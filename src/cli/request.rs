@@ -10,16 +10,23 @@ use crate::configurator::WAY_OUT;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
 
-/// Raise an event for the coordinator of a running deployment.
+/// Raise an event for the coordinators of a running deployment, and wait until they have taken it up.
+///
+/// Exit status: 0 a transition heard it; 1 none did, or it was not taken up in time. With `--wait EVENT`: 0 that was heard; 1 it
+/// was not, or what was heard instead is another answer to the same request (`X.failed` for `X.ok`); 3 that answer is
+/// `X.broken`.
 #[derive(Debug, clap::Args)]
 pub struct EventArgs {
     /// The event.
     event: String,
     #[command(flatten)]
     which: Which,
-    /// Wait until this event or answer is heard; exit with 1 if it is not.
+    /// Wait until this event or answer is heard, or another answer to the same request.
     #[arg(long = "wait", value_name = "EVENT")]
     wait_for: Option<String>,
+    /// Do not wait: exit with 0 once it is raised.
+    #[arg(long, conflicts_with = "wait_for")]
+    no_wait: bool,
     /// How long to wait at most, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::remote::seconds)]
     within: f64,
@@ -30,23 +37,38 @@ pub struct EventArgs {
 
 impl Run for EventArgs {
     fn run(self, context: &Context) -> Answer {
-        let params = json!({ "event": self.event, "wait_for": self.wait_for, "within_s": self.within });
-        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))?;
+        let params = json!({
+            "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
+        });
+        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))
+            .map_err(|failure| failure.as_json(self.json))?;
+        let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
+        let good = heard == self.wait_for.as_deref();
         if self.json {
             context.out.json(&answer);
-        } else if let Some(heard) = answer["heard"].as_str() {
-            context.out.line(format!("{} after {}", context.out.paint(Style::Good, heard), self.event));
+        } else if let Some(heard) = heard {
+            let style = if good { Style::Good } else { Style::Bad };
+            context.out.line(format!("{} after {}", context.out.paint(style, heard), self.event));
+        } else if let Some(taken) = taken {
+            let what = if taken { "heard" } else { "raised, and no transition heard it" };
+            context.out.line(format!("{} {what}", self.event));
         } else {
             context.out.line(format!("{} raised", self.event));
         }
         if let Some(note) = answer["note"].as_str().filter(|_| !self.json) {
             context.out.error(format!("note: {note}\n"));
         }
-        Ok(Exit::Done)
+        Ok(match heard {
+            Some(heard) if heard.ends_with(".broken") && !good => Exit::Broken,
+            _ if good && taken != Some(false) => Exit::Done,
+            _ => Exit::No,
+        })
     }
 }
 
-/// Apply a configuration on a running deployment.
+/// Apply a configuration on a running deployment, and wait for the answer.
+///
+/// Exit status: 0 applied; 1 refused, failed and taken back, or not answered in time; 3 broken.
 #[derive(Debug, clap::Args)]
 pub struct ApplyArgs {
     /// The configuration.
@@ -70,7 +92,9 @@ impl Run for ApplyArgs {
     }
 }
 
-/// Undo the newest configuration of a running deployment, or a named one, or down to N frames.
+/// Undo the newest configuration of a running deployment, or a named one, or down to N frames, and wait for the answer.
+///
+/// Exit status: 0 undone; 1 refused, nothing to undo, or not answered in time; 3 broken.
 #[derive(Debug, clap::Args)]
 pub struct UndoArgs {
     /// The configuration whose newest frame is undone; without one, the newest that was applied by hand. Of the very
@@ -119,10 +143,9 @@ pub struct CommitArgs {
 
 impl Run for CommitArgs {
     fn run(self, context: &Context) -> Answer {
-        let wait = Wait { wait: true, within: self.within };
+        let wait = Wait { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
         request(context, "commit", params, &Which { name: self.name }, &wait, self.json)
-            .map_err(|failure| failure.as_json(self.json))
     }
 }
 
@@ -139,14 +162,16 @@ fn request(
     wait: &Wait,
     json: bool,
 ) -> Result<Exit, Failure> {
-    params["wait"] = json!(wait.wait);
+    let waits = !wait.no_wait;
+    params["wait"] = json!(waits);
     params["within_s"] = json!(wait.within);
     let out = &context.out;
-    let answer = ask(which.name.as_deref(), method, &params, limit(wait.within))?;
+    let asked = ask(which.name.as_deref(), method, &params, limit(wait.within));
+    let answer = asked.map_err(|failure| failure.as_json(json))?;
     let verdict = text(&answer["answer"]);
     if json {
         out.json(&answer);
-    } else if wait.wait {
+    } else if waits {
         let ok = answer["ok"] == true;
         out.line(format!(
             "{} ({}, {})",
@@ -161,9 +186,9 @@ fn request(
             out.error(format!("note: it is broken; {WAY_OUT}\n"));
         }
     } else {
-        out.line(format!("request {} accepted; `davit log` shows its answer", answer["request"]));
+        out.line(format!("asked for as request {}; `davit log` shows how it is answered", answer["request"]));
     }
-    Ok(match (wait.wait, answer["ok"] == true, verdict.ends_with(".broken")) {
+    Ok(match (waits, answer["ok"] == true, verdict.ends_with(".broken")) {
         (false, ..) | (_, true, _) => Exit::Done,
         (_, _, true) => Exit::Broken,
         _ => Exit::No,

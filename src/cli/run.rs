@@ -3,6 +3,7 @@
 use super::deploy::ClockKind;
 use super::exit::Exit;
 use super::input::Parameters;
+use super::last_words;
 use super::output::Style;
 use super::progress::Progress;
 use super::{Answer, Context, Failure, Run};
@@ -40,14 +41,14 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let progress = Progress::new(context.out, self.json);
         let clock = self.clock.make(0.0);
+        let progress = Progress::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
         let say = {
             let progress = progress.clone();
             let (out, clock, json) = (context.out, clock.clone(), self.json);
             Box::new(move |text: &str| match json {
-                true => out.json_line(&json!({ "at": clock.now().as_secs_f64(), "what": "said", "text": text })),
-                false => progress.line(out.paint(Style::Bold, text)),
+                true => progress.say_json(&json!({ "at": clock.now().as_secs_f64(), "what": "said", "text": text })),
+                false => progress.say(out.paint(Style::Bold, text)),
             })
         };
         let end = script::run(
@@ -69,6 +70,7 @@ impl Run for Args {
                 progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
             }
         }
+        last_words::unread(progress.end());
         let Some(failure) = end.failure else {
             return Ok(if left { Exit::Broken } else { Exit::Done });
         };

@@ -26,11 +26,20 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
         let out = &context.out;
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
         let limit = Duration::from_secs_f64(self.within) + ASK;
         let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure)?;
+        // So that the same name can be deployed at once.
+        client.wait_until_free();
         if self.json {
             out.json(&answer);
         } else {

@@ -19,7 +19,8 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let status = ask(self.name.as_deref(), "status", &json!({}), ASK)?;
+        let status =
+            ask(self.name.as_deref(), "status", &json!({}), ASK).map_err(|failure| failure.as_json(self.json))?;
         if self.json {
             context.out.json(&status);
         } else {

@@ -35,6 +35,11 @@ pub trait Listener {
         let _ = (chart, active);
     }
 
+    /// The event with this ticket was taken up, and what became of it.
+    fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
+        let _ = (ticket, delivered);
+    }
+
     /// An event triggered nothing.
     fn unmatched(&mut self, event: EventName) {
         let _ = event;

@@ -32,22 +32,29 @@ pub struct Incoming {
     pub tag: Option<Tag>,
     /// By which lane it travels.
     pub lane: Lane,
+    /// Whose number is told with what became of it; 0: nobody wants to know.
+    pub ticket: u64,
 }
 
 impl Incoming {
     /// An answer for whoever asked.
     pub fn answer(event: EventName, tag: Tag) -> Self {
-        Self { event, tag: Some(tag), lane: Lane::Control }
+        Self { event, tag: Some(tag), lane: Lane::Control, ticket: 0 }
     }
 
     /// An operator's event, or an answer that is for nobody in particular.
     pub fn control(event: EventName) -> Self {
-        Self { event, tag: None, lane: Lane::Control }
+        Self { event, tag: None, lane: Lane::Control, ticket: 0 }
+    }
+
+    /// The same, of which somebody wants to know whether a transition heard it.
+    pub fn watched(event: EventName, ticket: u64) -> Self {
+        Self { ticket, ..Self::control(event) }
     }
 
     /// An event of a monitor or a component.
     pub fn report(event: EventName) -> Self {
-        Self { event, tag: None, lane: Lane::Report }
+        Self { event, tag: None, lane: Lane::Report, ticket: 0 }
     }
 }
 

@@ -269,8 +269,12 @@ impl Shared {
             // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
             let worked = self.react(now, || match self.next() {
                 Some(incoming) => {
-                    if core.deliver(incoming.event, incoming.tag, now, &mut listener) != Delivered::Stale {
+                    let delivered = core.deliver(incoming.event, incoming.tag, now, &mut listener);
+                    if delivered != Delivered::Stale {
                         self.delivered.fetch_add(1, Ordering::Relaxed);
+                    }
+                    if incoming.ticket != 0 {
+                        listener.taken_up(incoming.ticket, delivered);
                     }
                     true
                 }
@@ -384,6 +388,10 @@ impl<L: Listener> Listener for Told<'_, L> {
 
     fn unmatched(&mut self, event: EventName) {
         self.tell(|listener| listener.unmatched(event));
+    }
+
+    fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
+        self.tell(|listener| listener.taken_up(ticket, delivered));
     }
 
     fn grown(&mut self, chart: &Arc<Chart>) {

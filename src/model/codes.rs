@@ -634,7 +634,9 @@ codes! {
          override what the deployment says under `with:`. Without an equals sign there is nothing to give.";
     CLI_UNWRITABLE = "cli::unwritable", "the output cannot be written",
         "`-o FILE` names a file that cannot be created or written: the directory is missing, it is a directory itself, or \
-         permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal.";
+         permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal. Or what \
+         a command prints could not be written where its output goes, as to a full disk: part of it is missing. A \
+         deployment lives on all the same; its command says so when it ends. A reader that goes away (`| head`) is no error.";
     CLI_UNKNOWN_MONITOR = "cli::unknown_monitor", "there is no such monitor",
         "The file has monitors, but none of the name that was given. Correct the name, or leave the option out to run all \
          of them.";
@@ -683,6 +685,11 @@ codes! {
         "The control socket is there and something listens on it, but no answer came in time, or the connection was \
          closed. The deployment may just have ended: `davit status` tells. If it is stuck, `davit shutdown --force` \
          takes it down without its coordinator.";
+    CLI_SOCKET_GONE = "cli::socket_gone", "the socket of a running deployment is gone",
+        "A process owns the deployment's name, but the file of its control socket is not there any more: somebody removed it, \
+         or the directory was cleaned up (a logout does that to XDG_RUNTIME_DIR). It runs on, and no second deployment of \
+         that name can start. It can be reached by signals only: Ctrl-C in its terminal, or SIGINT to its process (`pgrep -af \
+         davit` shows the number), shuts it down in order.";
     CLI_REFUSED = "cli::refused", "the running deployment refused",
         "The running deployment understood the request and said no; the message is its own. An unknown event or \
          configuration is refused at once; a wait that ran out is told as such, and the request itself may still be \

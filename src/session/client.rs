@@ -1,11 +1,15 @@
 //! The other end of the control socket, as the command line uses it.
 
+use super::owner;
 use super::place;
 use super::rpc::RpcError;
+use crate::limits;
 use crate::model::finding::did_you_mean;
+use crate::time::Clock;
 use serde_json::{Value as Json, json};
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Why a running deployment could not be asked.
@@ -25,6 +29,14 @@ pub enum ClientError {
         /// What was likely meant.
         help: String,
     },
+    /// A process owns the name, but its socket is not there any more.
+    #[error("the deployment `{name}` runs, but its socket {} is gone", .path.display())]
+    SocketGone {
+        /// The name.
+        name: String,
+        /// Where the socket was.
+        path: PathBuf,
+    },
     /// The connection failed.
     #[error("the running deployment `{name}` does not answer")]
     Io {
@@ -36,6 +48,15 @@ pub enum ClientError {
     /// It answered with an error.
     #[error(transparent)]
     Refused(#[from] RpcError),
+}
+
+fn nanos(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn gone(name: String) -> ClientError {
+    let path = place::socket(&name);
+    ClientError::SocketGone { name, path }
 }
 
 /// A connection to a running deployment.
@@ -56,19 +77,36 @@ impl Client {
             None => {
                 let mut running = place::running();
                 match running.len() {
-                    0 => return Err(ClientError::None),
+                    0 => owner::owned().pop().ok_or(ClientError::None)?,
                     1 => running.remove(0),
                     _ => return Err(ClientError::Several(running)),
                 }
             }
         };
-        match UnixStream::connect(place::socket(&name)) {
-            Ok(stream) => Ok(Self { name, reader: BufReader::new(stream), next: 1 }),
-            Err(_) => {
+        let clock = Clock::real();
+        loop {
+            if let Ok(stream) = UnixStream::connect(place::socket(&name)) {
+                return Ok(Self { name, reader: BufReader::new(stream), next: 1 });
+            }
+            if !owner::is_owned(&name) {
                 let running = place::running();
                 let help = did_you_mean(&name, "running deployments", running.iter().map(String::as_str));
-                Err(ClientError::Unknown { name, help })
+                return Err(ClientError::Unknown { name, help });
             }
+            // It may be about to listen, or about to end.
+            if clock.now().0 >= nanos(limits::SOCKET_APPEARS) {
+                return Err(gone(name));
+            }
+            clock.sleep(limits::SOCKET_STEP);
+        }
+    }
+
+    /// Waits until the deployment's name is free: it is down, and its process is done with its clients. At most for as long
+    /// as that may take.
+    pub fn wait_until_free(&self) {
+        let clock = Clock::real();
+        while owner::is_owned(&self.name) && clock.now().0 < nanos(limits::SOCKET_WRITE + limits::TAP_END) {
+            clock.sleep(limits::SOCKET_STEP);
         }
     }
 
@@ -87,18 +125,46 @@ impl Client {
         let io = |source| ClientError::Io { name: self.name.clone(), source };
         self.reader.get_ref().set_read_timeout(Some(limit)).map_err(io)?;
         let line = json!({"jsonrpc": "2.0", "id": id, "method": method, "params": params}).to_string();
-        self.reader.get_mut().write_all(format!("{line}\n").as_bytes()).map_err(io)?;
+        // One that was refused a place may be closed by now; what it was told is still there to be read.
+        match self.reader.get_mut().write_all(format!("{line}\n").as_bytes()) {
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => return Err(io(e)),
+            _ => {}
+        }
         loop {
             let json = self.read().map_err(|source| ClientError::Io { name: self.name.clone(), source })?;
-            if json.get("id").and_then(Json::as_u64) != Some(id) {
+            let refused = json.get("error");
+            let own = json.get("id").and_then(Json::as_u64) == Some(id);
+            // An error without an `id` is about the connection.
+            if !own && !(refused.is_some() && json.get("id").is_none_or(Json::is_null)) {
                 continue;
             }
-            if let Some(error) = json.get("error") {
+            if let Some(error) = refused {
                 let error: RpcError =
                     serde_json::from_value(error.clone()).unwrap_or_else(|_| RpcError::new(0, error.to_string()));
                 return Err(error.into());
             }
             return Ok(json.get("result").cloned().unwrap_or(Json::Null));
+        }
+    }
+
+    /// From now on what happens is told: see [`Client::next_entry`].
+    ///
+    /// # Errors
+    /// When the deployment refuses.
+    pub fn subscribe(&mut self, limit: Duration) -> Result<(), ClientError> {
+        self.call("subscribe", &Json::Null, limit)?;
+        let io = |source| ClientError::Io { name: self.name.clone(), source };
+        self.reader.get_ref().set_read_timeout(None).map_err(io)
+    }
+
+    /// The next thing that happens, waiting for it as long as the deployment lives; none: it does not any more, or the
+    /// connection was cut off since too much waited to be read.
+    pub fn next_entry(&mut self) -> Option<Json> {
+        loop {
+            let mut json = self.read().ok()?;
+            if json.get("method").and_then(Json::as_str) == Some("log") {
+                return Some(json["params"].take());
+            }
         }
     }
 

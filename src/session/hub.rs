@@ -4,7 +4,8 @@
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
 use super::lanes::Lanes;
-use super::log::{Answered, Fault, Happening, Log, Phase};
+use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
+use super::tap::Hears;
 use crate::coordinator::Refused;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
@@ -15,12 +16,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Called with everything that happens, in order; must not block.
+/// Called with everything that happens, in the thread that acts: for tests and measurements, which keep no one waiting. What
+/// shows or passes on what happens hangs on a [tap](super::tap).
 pub type Observer = Arc<dyn Fn(Time, &Happening) + Send + Sync>;
 
 /// The common memory of one session.
 pub struct Hub {
     clock: Clock,
+    /// For those who wait outside.
+    real: Clock,
     state: Mutex<State>,
     /// Whether events were dropped that nobody was told of.
     untold: AtomicBool,
@@ -39,11 +43,15 @@ struct State {
     faults: Vec<Fault>,
     log: Log,
     observers: Vec<Observer>,
+    taps: Vec<Arc<dyn Hears>>,
     /// The newest answers and events, for those who wait for one.
     heard: Lanes<String>,
     /// Events that found an inbox full since that was last told, and when it was.
     dropped: u64,
     dropped_told: Option<Time>,
+    /// Events of which somebody wants to know whether a transition hears them: by how many coordinators each is still to be
+    /// taken up, and whether one heard it.
+    tickets: FxHashMap<u64, (usize, bool)>,
     /// The newest answers.
     answers: VecDeque<Answered>,
     /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
@@ -84,6 +92,7 @@ impl Hub {
     ) -> Self {
         Self {
             clock: clock.clone(),
+            real: Clock::real(),
             state: Mutex::new(State {
                 phase: Phase::Down,
                 next: 1,
@@ -91,9 +100,11 @@ impl Hub {
                 faults: Vec::new(),
                 log: Log::default(),
                 observers: Vec::new(),
+                taps: Vec::new(),
                 heard: Lanes::new(limits::HEARD, limits::HEARD),
                 dropped: 0,
                 dropped_told: None,
+                tickets: FxHashMap::default(),
                 answers: VecDeque::new(),
                 active: BTreeMap::new(),
                 epoch: 0,
@@ -155,7 +166,7 @@ impl Hub {
 
     fn record(&self, what: Happening, is_report: bool) {
         let now = self.clock.now();
-        let observers = {
+        let (entry, observers, taps) = {
             let mut state = self.lock();
             let heard = match &what {
                 Happening::Event { event, .. }
@@ -174,18 +185,57 @@ impl Hub {
                 state.heard.push(event, is_report);
             }
             state.epoch += 1;
-            state.log.push(now, what.clone(), is_report);
-            state.observers.clone()
+            let entry = Arc::new(Entry { at: now.as_secs_f64(), what });
+            state.log.push(entry.clone(), is_report);
+            // Under the lock, so that all hear it in one order.
+            state.taps.iter().for_each(|tap| tap.hear(&entry));
+            // Those who may have to be waited for.
+            let slow = if self.clock.is_simulated() { state.taps.clone() } else { Vec::new() };
+            (entry, state.observers.clone(), slow)
         };
         for observer in observers {
-            observer(now, &what);
+            observer(now, &entry.what);
         }
         self.wake();
+        taps.iter().for_each(|tap| tap.keep_pace());
+    }
+
+    /// A number for an event that so many coordinators are given, to be asked with [`Hub::was_heard`] what became of it.
+    pub fn ticket(&self, coordinators: usize) -> u64 {
+        let mut state = self.lock();
+        let ticket = state.next;
+        state.next += 1;
+        state.tickets.insert(ticket, (coordinators, false));
+        ticket
+    }
+
+    /// A coordinator took such an event up (or cannot), and a transition heard it, or none did.
+    pub fn taken_up(&self, ticket: u64, heard: bool) {
+        if let Some((left, any)) = self.lock().tickets.get_mut(&ticket) {
+            *left = left.saturating_sub(1);
+            *any |= heard;
+        }
+        self.outside.notify_all();
+    }
+
+    /// Whether a transition heard it, once all have taken it up.
+    pub fn was_heard(&self, ticket: u64) -> Option<bool> {
+        self.lock().tickets.get(&ticket).filter(|(left, _)| *left == 0).map(|(_, heard)| *heard)
+    }
+
+    /// Nobody wants to know any more.
+    pub fn forget(&self, ticket: u64) {
+        self.lock().tickets.remove(&ticket);
     }
 
     /// From now on everything that happens is told to `observer`.
     pub fn observe(&self, observer: Observer) {
         self.lock().observers.push(observer);
+    }
+
+    /// From now on everything that happens is handed to `tap`.
+    pub fn attach(&self, tap: Arc<dyn Hears>) {
+        self.lock().taps.push(tap);
     }
 
     /// A new request of `by`.
@@ -293,7 +343,7 @@ impl Hub {
     }
 
     /// The newest entries of the log, oldest first.
-    pub fn log(&self, last: usize) -> Vec<super::log::Entry> {
+    pub fn log(&self, last: usize) -> Vec<Arc<Entry>> {
         self.lock().log.last(last)
     }
 
@@ -325,6 +375,13 @@ impl Hub {
         self.heard_but(event, since, &[])
     }
 
+    /// Which of these was heard first after the `since`-th.
+    pub fn first_heard(&self, events: &[String], since: u64) -> Option<String> {
+        let state = self.lock();
+        let mut news = state.heard.iter().filter(|(number, text)| *number > since && events.contains(text));
+        news.next().map(|(_, event)| event.clone())
+    }
+
     /// The same, leaving out those of some numbers.
     pub fn heard_but(&self, event: &str, since: u64, but: &[u64]) -> Option<u64> {
         let state = self.lock();
@@ -339,23 +396,19 @@ impl Hub {
 
     /// Waits, outside the clock and in real time, until `look` finds something; for threads that are no participants.
     pub fn wait_outside<T>(&self, limit: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
-        // Real time, since whoever waits is a client in the real world; a condition variable keeps the deadline for us.
-        let mut left = limit;
-        let step = Duration::from_millis(100).min(limit);
+        // Real time, since whoever waits is a client in the real world.
+        let deadline = self.real.now() + limit;
         loop {
             if let Some(found) = look(self) {
                 return Some(found);
             }
+            let left = deadline.since(self.real.now());
             if left.is_zero() {
                 return None;
             }
-            let state = self.lock();
-            let (_state, result) =
-                self.outside.wait_timeout(state, step.min(left)).unwrap_or_else(PoisonError::into_inner);
-            // A wake-up in between is counted as no time at all: the limit is a bound from below, of idle time.
-            if result.timed_out() {
-                left = left.saturating_sub(step);
-            }
+            // Something may have happened since the look, and `look` may see what nobody tells (a client that is gone).
+            let step = left.min(limits::SOCKET_LOOK);
+            drop(self.outside.wait_timeout(self.lock(), step).unwrap_or_else(PoisonError::into_inner));
         }
     }
 }

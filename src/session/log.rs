@@ -6,10 +6,10 @@ use crate::configurator::{StepEnd, StepName};
 use crate::coordinator::Dropped;
 use crate::limits;
 use crate::model::Snapshot;
-use crate::time::Time;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// One thing that happened.
@@ -201,7 +201,7 @@ impl Phase {
 
 /// What happened, in memory.
 #[derive(Debug)]
-pub struct Log(Lanes<Entry>);
+pub struct Log(Lanes<Arc<Entry>>);
 
 impl Default for Log {
     fn default() -> Self {
@@ -211,12 +211,12 @@ impl Default for Log {
 
 impl Log {
     /// Adds an entry, dropping the oldest of its kind past the bound. `is_report`: a component raised an event.
-    pub fn push(&mut self, at: Time, what: Happening, is_report: bool) {
-        self.0.push(Entry { at: at.as_secs_f64(), what }, is_report);
+    pub fn push(&mut self, entry: Arc<Entry>, is_report: bool) {
+        self.0.push(entry, is_report);
     }
 
     /// The newest `last` entries, oldest first.
-    pub fn last(&self, last: usize) -> Vec<Entry> {
+    pub fn last(&self, last: usize) -> Vec<Arc<Entry>> {
         self.0.newest(last).cloned().collect()
     }
 

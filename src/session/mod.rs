@@ -5,20 +5,26 @@
 //! [`Session::take_down`] drives the deployment's life; everybody else only leaves requests and commands.
 
 pub mod client;
+mod connection;
+mod doors;
 pub mod hub;
 mod lanes;
 mod life;
 pub mod log;
 mod names;
+pub mod owner;
 mod parts;
 pub mod place;
 mod recovery;
 mod routes;
 pub mod rpc;
 pub mod service;
+pub mod serving;
 pub mod socket;
 mod stands;
 mod steps;
+mod subscribers;
+pub mod tap;
 mod wiring;
 
 pub use hub::{Hub, Observer};

@@ -4,6 +4,18 @@ use super::Session;
 use crate::model::finding::did_you_mean;
 use crate::model::{EventName, Verdict};
 
+/// What ends a wait for an answer beside that answer itself: the others that the same request may be answered with.
+pub(super) fn instead(event: &str) -> Vec<String> {
+    let Some((subject, ending)) = Verdict::split(event) else { return Vec::new() };
+    let bare = subject == "undo";
+    let others: &[Verdict] = match ending {
+        _ if ending == Verdict::Ok.ending(false) => &[Verdict::Failed, Verdict::Broken, Verdict::Cancelled],
+        _ if ending == Verdict::Undone.ending(bare) => &[Verdict::UndoFailed, Verdict::UndoBroken],
+        _ => &[],
+    };
+    others.iter().map(|verdict| format!("{subject}{}", verdict.ending(bare))).collect()
+}
+
 impl Session {
     /// Why an event will never be heard, if that is known: it is spelt like an answer, and nothing is answered so.
     pub fn never_heard(&self, event: &str) -> Option<String> {

@@ -6,6 +6,9 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
+/// Bytes that the path of a socket may have, as the operating system has it.
+pub const LONGEST: usize = 107;
+
 /// The directory of the control sockets: `$XDG_RUNTIME_DIR/davit`, else `davit-UID` in the system's directory for
 /// temporary files.
 pub fn directory() -> PathBuf {
@@ -44,8 +47,8 @@ pub fn prepare(directory: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The names of the deployments that answer on their sockets, in alphabetical order. A socket nobody listens on is left
-/// of a process that was killed; it is removed.
+/// The names of the deployments that answer on their sockets, in alphabetical order. A socket that nobody listens on is left
+/// of a process that was killed; it stays until that name is deployed again: only who owns a name removes its socket.
 pub fn running() -> Vec<String> {
     let Ok(entries) = fs::read_dir(directory()) else { return Vec::new() };
     let mut names: Vec<String> = entries
@@ -59,14 +62,31 @@ pub fn running() -> Vec<String> {
     names
 }
 
-/// Whether somebody listens on the socket; a dead one is removed.
+/// Whether somebody listens on the socket.
 pub fn is_alive(socket: &Path) -> bool {
-    match UnixStream::connect(socket) {
-        Ok(_) => true,
-        Err(e) if e.kind() == io::ErrorKind::ConnectionRefused => {
-            let _ = fs::remove_file(socket);
-            false
+    UnixStream::connect(socket).is_ok()
+}
+
+/// A file, known by what it is and not by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Known {
+    device: u64,
+    inode: u64,
+}
+
+impl Known {
+    /// The file of that name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn at(path: &Path) -> io::Result<Self> {
+        fs::symlink_metadata(path).map(|m| Self { device: m.dev(), inode: m.ino() })
+    }
+
+    /// Removes it, if it still has that name.
+    pub fn remove(self, path: &Path) {
+        if Self::at(path).is_ok_and(|there| there == self) {
+            let _ = fs::remove_file(path);
         }
-        Err(_) => false,
     }
 }

@@ -5,7 +5,7 @@ use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, Scope};
-use crate::coordinator::{Coordinator, Incoming, Listener, Tag, Trouble};
+use crate::coordinator::{Coordinator, Delivered, Incoming, Listener, Tag, Trouble};
 use crate::model::{Ask, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
@@ -93,6 +93,10 @@ impl Listener for ToConfigurator {
         self.hub.note(Happening::State {
             active: active.iter().map(|n| format!("{}{}", self.prefix, chart.fqn(*n))).collect(),
         });
+    }
+
+    fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
+        self.hub.taken_up(ticket, delivered == Delivered::Taken);
     }
 
     fn stale(&mut self, _: &Chart, event: EventName, _: Tag) {

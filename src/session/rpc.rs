@@ -10,8 +10,8 @@ pub struct Call {
     /// `"2.0"`.
     #[serde(default)]
     pub jsonrpc: String,
-    /// Echoed in the answer; none: no answer is wanted.
-    #[serde(default)]
+    /// Echoed in the answer; none: no answer is wanted. `null` is an `id` as well.
+    #[serde(default, deserialize_with = "given")]
     pub id: Option<Json>,
     /// What to do.
     pub method: String,
@@ -47,6 +47,8 @@ pub const REFUSED: i64 = 1;
 pub const TIMED_OUT: i64 = 2;
 /// The deployment is going down.
 pub const GOING_DOWN: i64 = 3;
+/// All places are taken.
+pub const TOO_MANY: i64 = 4;
 
 impl RpcError {
     /// An error without data.
@@ -55,20 +57,25 @@ impl RpcError {
     }
 }
 
+fn given<'de, D: serde::Deserializer<'de>>(id: D) -> Result<Option<Json>, D::Error> {
+    Json::deserialize(id).map(Some)
+}
+
 /// Reads one line as a call.
 ///
 /// # Errors
-/// The error answer to send.
-pub fn parse(line: &str) -> Result<Call, RpcError> {
+/// The error answer to send, and the `id` to send it to as far as the line has one.
+pub fn parse(line: &str) -> Result<Call, (Json, RpcError)> {
     let json: Json = serde_json::from_str(line)
-        .map_err(|e| RpcError::new(PARSE_ERROR, format!("the line is not one JSON object: {e}")))?;
+        .map_err(|e| (Json::Null, RpcError::new(PARSE_ERROR, format!("the line is not one JSON object: {e}"))))?;
+    let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or(Json::Null);
+    let refused = |message: String| (id.clone(), RpcError::new(INVALID_REQUEST, message));
     if json.is_array() {
-        return Err(RpcError::new(INVALID_REQUEST, "batches are not supported: send one object a line"));
+        return Err(refused("batches are not supported: send one object a line".to_owned()));
     }
-    let call: Call = serde_json::from_value(json)
-        .map_err(|e| RpcError::new(INVALID_REQUEST, format!("not a JSON-RPC request: {e}")))?;
+    let call: Call = serde_json::from_value(json).map_err(|e| refused(format!("not a JSON-RPC request: {e}")))?;
     if call.jsonrpc != "2.0" {
-        return Err(RpcError::new(INVALID_REQUEST, "`jsonrpc` must be \"2.0\""));
+        return Err(refused("`jsonrpc` must be \"2.0\"".to_owned()));
     }
     Ok(call)
 }

@@ -2,8 +2,9 @@
 
 use super::hub::Hub;
 use super::log::Answered;
+use super::names::instead;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
-use super::socket::Service;
+use super::serving::Service;
 use super::{Command, NO_FORWARD, Session, recovery};
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, EventName};
@@ -21,7 +22,7 @@ pub const METHODS: &[(&str, &[&str])] = &[
     ("status", &[]),
     ("stack", &[]),
     ("log", &["last"]),
-    ("event", &["event", "wait_for", "within_s"]),
+    ("event", &["event", "wait", "wait_for", "within_s"]),
     ("apply", &["configuration", "force", "wait", "within_s"]),
     ("undo", &["configuration", "to", "force", "wait", "within_s"]),
     ("drift", &["within_s"]),
@@ -67,18 +68,51 @@ fn view(value: &impl serde::Serialize) -> Json {
     serde_json::to_value(value).expect("views are plain data")
 }
 
+/// Whether nobody waits for the answer any more.
+type Gone<'a> = &'a dyn Fn() -> bool;
+
+/// Waits outside the clock for what `look` finds, as long as somebody wants to know.
+fn wait<T>(
+    session: &Session,
+    limit: Duration,
+    gone: Gone<'_>,
+    late: impl FnOnce() -> String,
+    look: impl Fn(&Hub) -> Option<T>,
+) -> Result<T, RpcError> {
+    let found = session.hub().wait_outside(limit, |hub| match look(hub) {
+        Some(found) => Some(Some(found)),
+        None => gone().then_some(None),
+    });
+    found.flatten().ok_or_else(|| RpcError::new(TIMED_OUT, late()))
+}
+
 impl Service for SessionService {
     fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError> {
+        self.call_while(line, method, params, &|| false)
+    }
+
+    fn must_get_through(&self, method: &str, params: &Json) -> bool {
+        match method {
+            "shutdown" | "status" => true,
+            "event" => self.session.upgrade().is_some_and(|session| {
+                let named = params.get("event").and_then(Json::as_str);
+                session.deployment().safety.iter().any(|(event, _)| Some(event.as_str()) == named)
+            }),
+            _ => false,
+        }
+    }
+
+    fn call_while(&self, line: u32, method: &str, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
         known(method, params)?;
         let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
         match method {
             "status" => Ok(view(&session.status())),
             "stack" => Ok(view(&session.status().stack)),
             "log" => Ok(view(&session.hub().log(optional(params, "last")?.unwrap_or(usize::MAX)))),
-            "event" => event(&session, params),
+            "event" => event(&session, params, gone),
             "apply" => {
                 let name: String = param(params, "configuration")?;
-                request(&session, line, Ask::Apply(configuration(&session, &name)?), params)
+                request(&session, line, Ask::Apply(configuration(&session, &name)?), params, gone)
             }
             "undo" => {
                 let ask = match (optional::<String>(params, "configuration")?, optional::<usize>(params, "to")?) {
@@ -89,26 +123,24 @@ impl Service for SessionService {
                     (None, Some(to)) => Ask::UndoTo(to),
                     (None, None) => Ask::Undo,
                 };
-                request(&session, line, ask, params)
+                request(&session, line, ask, params, gone)
             }
             "drift" => drift(&session, params),
             "recover" => recover(&session, params),
             "commit" => {
                 let force = forced(params)?;
-                request(&session, line, Ask::Commit { force }, params)
+                request(&session, line, Ask::Commit { force }, params, gone)
             }
             "shutdown" => {
                 let force = forced(params)?;
-                let wait = optional(params, "wait")?.unwrap_or(false);
+                let waits = optional(params, "wait")?.unwrap_or(false);
                 session.command(Command::Shutdown { force });
-                if !wait {
+                if !waits {
                     return Ok(json!({ "phase": "shutting_down" }));
                 }
-                session
-                    .hub()
-                    .wait_outside(Duration::from_secs(1_000_000), |_| session.ended())
+                let late = || "it is not down yet".to_owned();
+                wait(&session, Duration::from_secs(1_000_000), gone, late, |_| session.ended())
                     .map(|ended| view(&ended))
-                    .ok_or_else(|| RpcError::new(TIMED_OUT, "it is not down yet"))
             }
             _ => Err(RpcError::new(METHOD_NOT_FOUND, format!("`{method}` is the socket's own"))),
         }
@@ -125,9 +157,10 @@ fn configuration(session: &Session, name: &str) -> Result<ConfigId, RpcError> {
     })
 }
 
-fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
+fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
     let name: String = param(params, "event")?;
     let wait_for: Option<String> = optional(params, "wait_for")?;
+    let waits: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params)?;
     let known = session.events();
     let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
@@ -145,16 +178,24 @@ fn event(session: &Session, params: &Json) -> Result<Json, RpcError> {
         return Err(refused(why, "wait for an answer that may come, or for an event".to_owned()));
     }
     let since = session.hub().heard();
-    session.raise(event, "operator");
-    let Some(wait_for) = wait_for else { return Ok(answer) };
-    let heard = |hub: &Hub| hub.heard_since(&wait_for, since);
-    match session.hub().wait_outside(within, heard) {
-        Some(_) => {
-            answer["heard"] = json!(wait_for);
-            Ok(answer)
-        }
-        None => Err(RpcError::new(TIMED_OUT, format!("`{wait_for}` was not heard in time"))),
+    if let Some(wait_for) = wait_for {
+        session.raise(event, "operator");
+        let late = format!("`{wait_for}` was not heard in time");
+        let mut ends = instead(&wait_for);
+        ends.push(wait_for);
+        let heard = wait(session, within, gone, || late, |hub| hub.first_heard(&ends, since))?;
+        answer["heard"] = json!(heard);
+    } else if waits {
+        let ticket = session.raise_watched(event, "operator");
+        let late = || format!("`{name}` was not taken up in time; it may be yet");
+        let taken = wait(session, within, gone, late, |hub| hub.was_heard(ticket));
+        session.hub().forget(ticket);
+        // What confirms a configuration need not move a coordinator.
+        answer["taken"] = json!(taken? || session.confirms(event));
+    } else {
+        session.raise(event, "operator");
     }
+    Ok(answer)
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {
@@ -192,13 +233,14 @@ fn forced(params: &Json) -> Result<bool, RpcError> {
     Ok(optional(params, "force")?.unwrap_or(false))
 }
 
-fn request(session: &Session, line: u32, ask: Ask, params: &Json) -> Result<Json, RpcError> {
-    let wait: bool = optional(params, "wait")?.unwrap_or(false);
+fn request(session: &Session, line: u32, ask: Ask, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
+    let waits: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params)?;
     let request = session.request_on(line, ask, "operator", forced(params)?);
-    if !wait {
+    if !waits {
         return Ok(json!({ "request": request }));
     }
-    let answer: Option<Answered> = session.hub().wait_outside(within, |hub| hub.answer(request));
-    answer.map(|a| view(&a)).ok_or_else(|| RpcError::new(TIMED_OUT, format!("`{ask}` was not answered in time")))
+    let late = || format!("`{ask}` was not answered in time");
+    let answer: Answered = wait(session, within, gone, late, |hub| hub.answer(request))?;
+    Ok(view(&answer))
 }

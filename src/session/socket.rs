@@ -1,91 +1,44 @@
-//! The control socket: accepts connections, answers calls, forwards notifications to those who subscribed.
+//! The control socket: listens, answers calls, forwards notifications to those who subscribed.
 //!
 //! Its threads are outside the clock's scheduling: they only put requests into bounded queues and wait, with a limit in
-//! real time, for what comes back. A slow or hostile client can fill its own queue and nothing else.
+//! real time, for what comes back. A slow or hostile client can fill its own queue and nothing else. [`owner`](super::owner)
+//! says whose name it is, [`doors`](super::doors) who is let in, [`serving`](super::serving) what is done with what they say.
 
-use super::place;
-use super::rpc::{self, RpcError};
+use super::doors::Doors;
+use super::owner::Owner;
+use super::place::{self, Known};
+use super::rpc;
+use super::serving::{Calls, Shared};
+use super::subscribers::{Subscribers, ToSubscribers};
+use super::tap::Hears;
 use crate::limits;
+use crate::time::{Clock, lock};
 use serde_json::Value as Json;
 use std::fs;
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io;
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// What answers the calls.
-pub trait Service: Send + Sync + 'static {
-    /// Answers one call of the connection with this number (never 0 or 1); may wait for as long as it promises to.
-    ///
-    /// # Errors
-    /// The error answer to send.
-    fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError>;
-}
-
-/// Sends a notification (method, parameters) to all subscribers; never waits.
-pub type Notifier = Arc<dyn Fn(&str, &Json) + Send + Sync>;
-
-/// Lines on their way to the subscribers.
-#[derive(Default)]
-struct Subscribers {
-    list: Mutex<Vec<SyncSender<String>>>,
-}
-
-impl Subscribers {
-    fn add(&self) -> Receiver<String> {
-        let (sender, receiver) = sync_channel(limits::SOCKET_QUEUE);
-        self.list.lock().unwrap_or_else(PoisonError::into_inner).push(sender);
-        receiver
-    }
-
-    /// A subscriber whose queue is full is cut off: it would otherwise hear a story with holes and not know it.
-    fn send(&self, line: &str) {
-        let mut list = self.list.lock().unwrap_or_else(PoisonError::into_inner);
-        list.retain(|s| match s.try_send(line.to_owned()) {
-            Ok(()) => true,
-            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
-        });
-    }
-}
-
-/// Calls that are being answered.
-#[derive(Default)]
-struct Calls {
-    open: Mutex<usize>,
-    ended: Condvar,
-}
-
-impl Calls {
-    fn run<T>(&self, call: impl FnOnce() -> T) -> T {
-        *self.open.lock().unwrap_or_else(PoisonError::into_inner) += 1;
-        let result = call();
-        *self.open.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
-        self.ended.notify_all();
-        result
-    }
-
-    /// Waits until all are answered, at most as long as writing to a client may take.
-    fn finish(&self) {
-        let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-        let _ = self.ended.wait_timeout_while(open, limits::SOCKET_WRITE, |open| *open > 0);
-    }
-}
+pub use super::serving::{Bounds, Service};
 
 /// A listening control socket; dropping it lets the calls under way be answered, closes and removes it.
 pub struct ControlSocket {
     path: PathBuf,
+    /// The file it made.
+    file: Known,
     /// The listening socket, to end it.
     listening: UnixStream,
-    calls: Arc<Calls>,
-    stop: Arc<AtomicBool>,
-    subscribers: Arc<Subscribers>,
+    doors: Arc<Doors>,
+    shared: Arc<Shared>,
+    observer: Mutex<Option<ToSubscribers>>,
     accepting: Option<JoinHandle<()>>,
+    /// Held longest.
+    _owner: Owner,
 }
 
 /// Why a control socket could not be opened.
@@ -110,31 +63,52 @@ impl ControlSocket {
     /// # Errors
     /// When the name is taken by a running deployment, or the socket cannot be made.
     pub fn open(name: &str, service: Arc<dyn Service>) -> Result<Self, SocketError> {
+        Self::open_within(name, service, Bounds::default())
+    }
+
+    /// The same with other bounds.
+    ///
+    /// # Errors
+    /// When the name is taken by a running deployment, or the socket cannot be made.
+    pub fn open_within(name: &str, service: Arc<dyn Service>, bounds: Bounds) -> Result<Self, SocketError> {
         let path = place::socket(name);
         let io = |source| SocketError::Io { path: path.clone(), source };
+        let taken = || SocketError::Taken(name.to_owned());
         place::prepare(&place::directory()).map_err(io)?;
-        if path.exists() && place::is_alive(&path) {
-            return Err(SocketError::Taken(name.to_owned()));
+        let owner = Owner::of(name).map_err(io)?.ok_or_else(taken)?;
+        // Only who owns the name gets here: what lies there is left of a process that is gone, unless it answers (to who
+        // cannot see its lock: they share a directory and no network).
+        if place::is_alive(&path) {
+            return Err(taken());
         }
-        let listener = match UnixListener::bind(&path) {
-            Ok(listener) => listener,
-            // Between the look and the bind somebody else came up: the name is taken all the same.
-            Err(e) if e.kind() == io::ErrorKind::AddrInUse => return Err(SocketError::Taken(name.to_owned())),
-            Err(e) => return Err(io(e)),
-        };
+        match fs::remove_file(&path) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(io(e)),
+            _ => {}
+        }
+        let listener = UnixListener::bind(&path).map_err(io)?;
+        let file = Known::at(&path).map_err(io)?;
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
-        let stop = Arc::new(AtomicBool::new(false));
-        let subscribers = Arc::new(Subscribers::default());
-        let calls = Arc::new(Calls::default());
+        let subscribers = Arc::new(Subscribers::new(bounds.queue));
+        let shared = Arc::new(Shared { bounds, subscribers, calls: Calls::default(), service });
+        let doors = Arc::new(Doors::default());
         let accepting = {
-            let (stop, subscribers, calls) = (stop.clone(), subscribers.clone(), calls.clone());
+            let (doors, shared) = (doors.clone(), shared.clone());
             std::thread::Builder::new()
                 .name("davit-socket".to_owned())
-                .spawn(move || accept(&listener, &stop, &subscribers, &calls, &service))
+                .spawn(move || doors.open(&listener, &shared))
                 .map_err(io)?
         };
-        Ok(Self { path, listening, calls, stop, subscribers, accepting: Some(accepting) })
+        Ok(Self {
+            path,
+            file,
+            listening,
+            doors,
+            shared,
+            observer: Mutex::default(),
+            accepting: Some(accepting),
+            _owner: owner,
+        })
     }
 
     /// Where it listens.
@@ -144,129 +118,41 @@ impl ControlSocket {
 
     /// Sends a notification to all subscribers; never waits.
     pub fn notify(&self, method: &str, params: &Json) {
-        self.subscribers.send(&rpc::notification(method, params));
+        self.shared.subscribers.send(&rpc::notification(method, params));
     }
 
-    /// A function that sends notifications, for other threads.
-    pub fn notifier(&self) -> Notifier {
-        let subscribers = self.subscribers.clone();
-        Arc::new(move |method, params| subscribers.send(&rpc::notification(method, params)))
+    /// What to give to a session on `clock`, so that the subscribers hear all that happens.
+    ///
+    /// # Errors
+    /// When the operating system has no thread left.
+    pub fn observer(&self, clock: &Clock) -> io::Result<Arc<dyn Hears>> {
+        let observer = self.shared.subscribers.observer(clock)?;
+        *lock(&self.observer) = Some(observer.clone());
+        Ok(Arc::new(observer))
+    }
+
+    /// A function that takes the socket's file away, for a process that ends at once.
+    pub fn leave(&self) -> impl FnOnce() + Send + use<> {
+        let (path, file) = (self.path.clone(), self.file);
+        move || file.remove(&path)
     }
 }
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
+        self.doors.close();
         // Wakes the accepting thread, also when the file is gone (its directory was cleaned up, the user logged out): a
         // connection to ourselves would not find it then.
         let _ = self.listening.shutdown(Shutdown::Both);
-        let _ = fs::remove_file(&self.path);
+        self.file.remove(&self.path);
         if let Some(thread) = self.accepting.take() {
             let _ = thread.join();
         }
-        self.calls.finish();
+        self.shared.calls.finish();
+        if let Some(observer) = lock(&self.observer).take() {
+            observer.finish(limits::TAP_END);
+        }
+        self.shared.subscribers.finish(limits::TAP_END);
+        self.doors.cut();
     }
-}
-
-fn accept(
-    listener: &UnixListener,
-    stop: &Arc<AtomicBool>,
-    subscribers: &Arc<Subscribers>,
-    calls: &Arc<Calls>,
-    service: &Arc<dyn Service>,
-) {
-    let open = Arc::new(AtomicUsize::new(0));
-    // Scripts have the number 1.
-    for (number, stream) in (2..).zip(listener.incoming()) {
-        if stop.load(Ordering::Acquire) {
-            return;
-        }
-        let Ok(mut stream) = stream else { continue };
-        if open.fetch_add(1, Ordering::AcqRel) >= limits::SOCKET_CONNECTIONS {
-            open.fetch_sub(1, Ordering::AcqRel);
-            let error = RpcError::new(rpc::REFUSED, "too many connections; close one and try again");
-            let _ = writeln!(stream, "{}", rpc::answer(&Json::Null, Err(error)));
-            continue;
-        }
-        let (subscribers, service, counter) = (subscribers.clone(), service.clone(), open.clone());
-        let calls = calls.clone();
-        let serving = std::thread::Builder::new().name("davit-client".to_owned()).spawn(move || {
-            let _ = serve(number, stream, &subscribers, &calls, &*service);
-            counter.fetch_sub(1, Ordering::AcqRel);
-        });
-        if serving.is_err() {
-            open.fetch_sub(1, Ordering::AcqRel);
-        }
-    }
-}
-
-/// Answers the calls of one connection until it closes.
-fn serve(
-    number: u32,
-    stream: UnixStream,
-    subscribers: &Subscribers,
-    calls: &Calls,
-    service: &dyn Service,
-) -> io::Result<()> {
-    let writer = Arc::new(Mutex::new(stream.try_clone()?));
-    // A client that does not read must not hold a thread for ever.
-    stream.set_write_timeout(Some(limits::SOCKET_WRITE))?;
-    let mut reader = BufReader::new(stream);
-    let mut line = String::new();
-    loop {
-        line.clear();
-        let read = reader.by_ref().take(limits::SOCKET_LINE as u64 + 1).read_line(&mut line);
-        let result = match read {
-            Ok(0) => return Ok(()),
-            Ok(n) if n > limits::SOCKET_LINE => {
-                let error = RpcError::new(rpc::INVALID_REQUEST, "the line is too long");
-                send(&writer, &rpc::answer(&Json::Null, Err(error)))?;
-                return Ok(());
-            }
-            Ok(_) if line.trim().is_empty() => continue,
-            Ok(_) => rpc::parse(&line),
-            Err(e) if e.kind() == io::ErrorKind::InvalidData => {
-                Err(RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))
-            }
-            Err(e) => return Err(e),
-        };
-        match result {
-            Ok(call) if call.method == "subscribe" => {
-                if let Err(error) = rpc::only(&call.method, &call.params, &[]) {
-                    call.id.as_ref().map_or(Ok(()), |id| send(&writer, &rpc::answer(id, Err(error))))?;
-                    continue;
-                }
-                let lines = subscribers.add();
-                forward(lines, writer.clone())?;
-                if let Some(id) = &call.id {
-                    send(&writer, &rpc::answer(id, Ok(Json::Bool(true))))?;
-                }
-            }
-            Ok(call) => calls.run(|| {
-                let result = service.call(number, &call.method, &call.params);
-                call.id.as_ref().map_or(Ok(()), |id| send(&writer, &rpc::answer(id, result)))
-            })?,
-            Err(error) => send(&writer, &rpc::answer(&Json::Null, Err(error)))?,
-        }
-    }
-}
-
-fn forward(lines: Receiver<String>, writer: Arc<Mutex<UnixStream>>) -> io::Result<()> {
-    std::thread::Builder::new().name("davit-subscriber".to_owned()).spawn(move || {
-        while let Ok(line) = lines.recv() {
-            if send(&writer, &line).is_err() {
-                return;
-            }
-        }
-        // Cut off, or the deployment is gone: the reader sees the end of the stream instead of silence.
-        let stream = writer.lock().unwrap_or_else(PoisonError::into_inner);
-        let _ = stream.shutdown(Shutdown::Both);
-    })?;
-    Ok(())
-}
-
-fn send(writer: &Mutex<UnixStream>, line: &str) -> io::Result<()> {
-    let mut stream = writer.lock().unwrap_or_else(PoisonError::into_inner);
-    stream.write_all(line.as_bytes())?;
-    stream.write_all(b"\n")
 }

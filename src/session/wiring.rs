@@ -146,6 +146,11 @@ impl Session {
         events
     }
 
+    /// Whether a configuration waits for that event to be confirmed.
+    pub fn confirms(&self, event: EventName) -> bool {
+        self.deployment.configurations.iter().any(|c| c.confirm.is_some_and(|confirm| confirm.event == event))
+    }
+
     /// Whether a coordinator has functions, which see every event, also one that no transition lists.
     pub fn sees_all_events(&self) -> bool {
         self.parts.iter().any(|part| part.sees_all)
@@ -162,10 +167,23 @@ impl Session {
 
     /// Gives an event to all coordinators, in the name of `from`.
     pub fn raise(&self, event: EventName, from: &str) {
+        self.deliver(event, from, 0);
+    }
+
+    /// The same; [`Hub::was_heard`] says with the number that this answers what became of it, until it is
+    /// [forgotten](Hub::forget).
+    pub fn raise_watched(&self, event: EventName, from: &str) -> u64 {
+        let ticket = self.hub.ticket(self.parts.len());
+        self.deliver(event, from, ticket);
+        ticket
+    }
+
+    fn deliver(&self, event: EventName, from: &str, ticket: u64) {
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator.event(event);
         for part in &self.parts {
-            if part.coordinator.deliver(Incoming::control(event)).is_err() {
+            if part.coordinator.deliver(Incoming::watched(event, ticket)).is_err() {
+                self.hub.taken_up(ticket, false);
                 self.hub.note(Happening::Forced {
                     note: format!("`{event}` was not delivered: the coordinator is full or gone"),
                 });

@@ -100,7 +100,7 @@ shutdown: { event: e_stop, down: idle, within_s: 20 }
     assert!(event.err.contains("no transition lists `e_odd_one`"), "{}", event.err);
     assert_eq!(run(&["status", "--json"]).json()["coordinator"], serde_json::json!(["root", "root.seen"]));
     let known = run(&["event", "e_stop", "--json"]).json();
-    assert_eq!(known, serde_json::json!({ "accepted": true }));
+    assert_eq!(known, serde_json::json!({ "accepted": true, "taken": true }));
     assert_eq!(run(&["shutdown"]).code, 0);
 }
 

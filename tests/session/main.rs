@@ -2,9 +2,11 @@
 
 mod beside;
 mod bringup;
+mod doors;
 mod flood;
 mod hangs;
 mod life;
 mod settled;
 mod socket;
 mod stands;
+mod tap;

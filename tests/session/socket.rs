@@ -63,6 +63,17 @@ fn hostile_lines_are_answered_not_fatal() {
     assert_eq!(code(b"\xff\xfe"), Some(rpc::PARSE_ERROR));
     assert_eq!(code("[".repeat(100_000).as_bytes()), Some(rpc::PARSE_ERROR));
     assert_eq!(code(b"{\"jsonrpc\":\"2.0\",\"method\":\"echo\",\"id\":1}"), None);
+    // An error names the request that it answers; one whose `id` is null is answered too.
+    for (line, id) in [
+        (&br#"{"jsonrpc":"1.0","method":"echo","id":17}"#[..], json!(17)),
+        (br#"{"jsonrpc":"2.0","id":"x"}"#, json!("x")),
+        (br#"{"jsonrpc":"2.0","method":"echo","id":null}"#, Json::Null),
+    ] {
+        stream.write_all(line).unwrap();
+        stream.write_all(b"\n").unwrap();
+        let answer: Json = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
+        assert_eq!(answer["id"], id);
+    }
     // A notification gets no answer: the next answer is that of the next call.
     stream.write_all(b"{\"jsonrpc\":\"2.0\",\"method\":\"echo\"}\n").unwrap();
     stream.write_all(b"{\"jsonrpc\":\"2.0\",\"method\":\"echo\",\"id\":7}\n").unwrap();

@@ -1,0 +1,129 @@
+//! Who is let in at the control socket: places, those that are kept, and what is done when there is none.
+
+use super::connection::Connection;
+use super::rpc;
+use super::serving::{Shared, serve, too_many};
+use crate::time::lock;
+use serde_json::Value as Json;
+use std::fs::File;
+use std::io;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
+
+/// The connections there are, and whether there may be more.
+#[derive(Default)]
+pub(super) struct Doors {
+    inside: Mutex<Inside>,
+    closed: Condvar,
+}
+
+#[derive(Default)]
+struct Inside {
+    closed: bool,
+    places: usize,
+    kept: usize,
+    connections: Vec<Weak<Connection>>,
+}
+
+/// A place, until it is dropped.
+struct Place {
+    doors: Arc<Doors>,
+    kept: bool,
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut inside = lock(&self.doors.inside);
+        *(if self.kept { &mut inside.kept } else { &mut inside.places }) -= 1;
+    }
+}
+
+impl Doors {
+    /// Nobody else is let in.
+    pub fn close(&self) {
+        lock(&self.inside).closed = true;
+        self.closed.notify_all();
+    }
+
+    /// Ends all connections.
+    pub fn cut(&self) {
+        let connections = std::mem::take(&mut lock(&self.inside).connections);
+        connections.iter().filter_map(Weak::upgrade).for_each(|connection| connection.cut());
+    }
+
+    fn is_closed(&self) -> bool {
+        lock(&self.inside).closed
+    }
+
+    /// A place, an ordinary one if there is one left.
+    fn place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+        let mut inside = lock(&self.inside);
+        let kept = inside.places >= shared.bounds.connections;
+        if kept && inside.kept >= shared.bounds.kept {
+            return None;
+        }
+        *(if kept { &mut inside.kept } else { &mut inside.places }) += 1;
+        Some(Place { doors: self.clone(), kept })
+    }
+
+    fn enter(&self, connection: &Arc<Connection>) {
+        let mut inside = lock(&self.inside);
+        inside.connections.retain(|there| there.strong_count() > 0);
+        inside.connections.push(Arc::downgrade(connection));
+    }
+
+    /// Lets clients in until the doors are closed.
+    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<Shared>) {
+        // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
+        let mut spare = File::open("/dev/null").ok();
+        for (number, stream) in (2..).zip(listener.incoming()) {
+            if self.is_closed() {
+                return;
+            }
+            match stream {
+                Ok(stream) => self.admit(number, stream, shared),
+                Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
+                Err(_) => {
+                    drop(spare.take());
+                    if let Ok((stream, _)) = listener.accept() {
+                        refuse(number, stream, shared);
+                    }
+                    self.pause(shared);
+                    spare = File::open("/dev/null").ok();
+                }
+            }
+        }
+    }
+
+    /// Waits a little, or until the doors are closed.
+    fn pause(&self, shared: &Shared) {
+        let inside = lock(&self.inside);
+        let still = |inside: &mut Inside| !inside.closed;
+        drop(
+            self.closed.wait_timeout_while(inside, shared.bounds.pause, still).unwrap_or_else(PoisonError::into_inner),
+        );
+    }
+
+    fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>) {
+        let Some(place) = self.place(shared) else { return refuse(number, stream, shared) };
+        let Ok(connection) = Connection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
+        self.enter(&connection);
+        let (shared, own) = (shared.clone(), connection.clone());
+        let serving = std::thread::Builder::new().name("davit-client".to_owned()).spawn(move || {
+            let _ = serve(&own, &shared, place.kept);
+            shared.subscribers.remove(own.number);
+            own.cut();
+            drop(place);
+        });
+        if serving.is_err() {
+            let _ = connection.send(&rpc::answer(&Json::Null, Err(too_many())));
+        }
+    }
+}
+
+fn refuse(number: u32, stream: UnixStream, shared: &Shared) {
+    // A line of a new connection finds room: nobody waits here.
+    if let Ok(connection) = Connection::new(number, stream, shared.bounds.write) {
+        let _ = connection.send(&rpc::answer(&Json::Null, Err(too_many())));
+    }
+}

@@ -1,0 +1,174 @@
+//! What is done with the lines of a connection: who answers them, and within which bounds.
+
+use super::connection::{Connection, Lines, Said};
+use super::rpc::{self, RpcError};
+use super::subscribers::Subscribers;
+use crate::limits;
+use crate::time::lock;
+use serde_json::Value as Json;
+use std::io;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+/// What answers the calls.
+pub trait Service: Send + Sync + 'static {
+    /// Answers one call of the connection with this number (never 0 or 1); may wait for as long as it promises to.
+    ///
+    /// # Errors
+    /// The error answer to send.
+    fn call(&self, line: u32, method: &str, params: &Json) -> Result<Json, RpcError>;
+
+    /// The same, and may give up waiting when `gone` says that nobody waits for the answer any more.
+    ///
+    /// # Errors
+    /// The error answer to send.
+    fn call_while(&self, line: u32, method: &str, params: &Json, gone: &dyn Fn() -> bool) -> Result<Json, RpcError> {
+        let _ = gone;
+        self.call(line, method, params)
+    }
+
+    /// Whether such a call is answered when all places but the kept ones are taken.
+    fn must_get_through(&self, method: &str, params: &Json) -> bool {
+        let _ = (method, params);
+        false
+    }
+}
+
+/// Bounds of a control socket; see those of the same names in [`limits`].
+#[derive(Debug, Clone)]
+pub struct Bounds {
+    /// [`limits::SOCKET_CONNECTIONS`]
+    pub connections: usize,
+    /// [`limits::SOCKET_KEPT`]
+    pub kept: usize,
+    /// [`limits::SOCKET_SAY`]
+    pub say: Duration,
+    /// [`limits::SOCKET_IDLE`]
+    pub idle: Duration,
+    /// [`limits::SOCKET_WRITE`]
+    pub write: Duration,
+    /// [`limits::SOCKET_PAUSE`]
+    pub pause: Duration,
+    /// [`limits::SOCKET_QUEUE`]
+    pub queue: usize,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self {
+            connections: limits::SOCKET_CONNECTIONS,
+            kept: limits::SOCKET_KEPT,
+            say: limits::SOCKET_SAY,
+            idle: limits::SOCKET_IDLE,
+            write: limits::SOCKET_WRITE,
+            pause: limits::SOCKET_PAUSE,
+            queue: limits::SOCKET_QUEUE,
+        }
+    }
+}
+
+/// Calls that are being answered.
+#[derive(Default)]
+pub(super) struct Calls {
+    open: Mutex<usize>,
+    ended: Condvar,
+}
+
+impl Calls {
+    pub fn run<T>(&self, call: impl FnOnce() -> T) -> T {
+        *lock(&self.open) += 1;
+        let result = call();
+        *lock(&self.open) -= 1;
+        self.ended.notify_all();
+        result
+    }
+
+    /// Waits until all are answered, at most as long as writing to a client may take.
+    pub fn finish(&self) {
+        let open = lock(&self.open);
+        drop(
+            self.ended
+                .wait_timeout_while(open, limits::SOCKET_WRITE, |open| *open > 0)
+                .unwrap_or_else(PoisonError::into_inner),
+        );
+    }
+}
+
+/// What the connections of one socket share.
+pub(super) struct Shared {
+    pub bounds: Bounds,
+    pub subscribers: Arc<Subscribers>,
+    pub calls: Calls,
+    pub service: Arc<dyn Service>,
+}
+
+/// The answer to one that finds all places taken.
+pub(super) fn too_many() -> RpcError {
+    RpcError {
+        code: rpc::TOO_MANY,
+        message: "too many connections".to_owned(),
+        data: serde_json::json!({
+            "help": "close one and try again; `davit status`, `davit shutdown` and safety events are answered all the same"
+        }),
+    }
+}
+
+/// Answers the calls of one connection until it closes. `kept`: it has one of the places kept for what must get through.
+pub(super) fn serve(connection: &Arc<Connection>, shared: &Shared, kept: bool) -> io::Result<()> {
+    let mut lines = Lines::of(connection);
+    let mut subscribed = false;
+    let bounds = &shared.bounds;
+    let refuse = |id: &Json, error: RpcError| connection.send(&rpc::answer(id, Err(error)));
+    loop {
+        let limit = if kept { bounds.say } else { bounds.idle };
+        let call = match lines.next((!subscribed).then_some(limit))? {
+            Said::End => return Ok(()),
+            Said::Nothing if kept => return refuse(&Json::Null, too_many()),
+            Said::Nothing => {
+                let why = format!("closed: nothing was said for {} s", bounds.idle.as_secs_f64());
+                return refuse(&Json::Null, RpcError::new(rpc::REFUSED, why));
+            }
+            Said::TooLong => {
+                return refuse(&Json::Null, RpcError::new(rpc::INVALID_REQUEST, "the line is too long"));
+            }
+            Said::NotText => Err((Json::Null, RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))),
+            Said::Line(line) if line.trim().is_empty() => continue,
+            Said::Line(line) => rpc::parse(&line),
+        };
+        let call = match call {
+            Ok(call) => call,
+            Err((id, error)) => {
+                refuse(&id, error)?;
+                continue;
+            }
+        };
+        let answer = |result: Result<Json, RpcError>| match &call.id {
+            Some(id) => connection.send(&rpc::answer(id, result)),
+            None => Ok(()),
+        };
+        if kept && !shared.service.must_get_through(&call.method, &call.params) {
+            return answer(Err(too_many()));
+        }
+        if call.method == "subscribe" {
+            answer(match rpc::only(&call.method, &call.params, &[]) {
+                Err(error) => Err(error),
+                Ok(()) => match shared.subscribers.add(connection)? {
+                    true => {
+                        subscribed = true;
+                        Ok(Json::Bool(true))
+                    }
+                    false => Err(RpcError::new(rpc::REFUSED, "this connection has subscribed already")),
+                },
+            })?;
+            continue;
+        }
+        shared.calls.run(|| {
+            let gone = || connection.is_gone();
+            answer(shared.service.call_while(connection.number, &call.method, &call.params, &gone))
+        })?;
+        // Such a place is for one word: who asks again and again must not keep it.
+        if kept {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! `apply`, `undo` and `event` end with their answer, as their exit status says it; `log --follow` goes on.
+
+use crate::demo::Demo;
+use crate::foreground::Foreground;
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+/// Fails once and breaks once, where it is told to.
+const FAULTS: &str = "
+faults:
+  - { step: \"property_set source.k = 9.0\", how: fail, times: 1 }
+";
+
+fn deployed() -> (Demo, Foreground) {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", &format!("{}{FAULTS}", demo.read("deployment.yaml")));
+    let mut command = demo.command(&["deploy", "deployment.yaml"]);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let deployed = Foreground::start(&mut command);
+    demo.until_phase("up");
+    (demo, deployed)
+}
+
+#[test]
+fn requests_end_with_their_answer() {
+    let (demo, deployed) = deployed();
+    let run = |args: &[&str]| demo.run(args);
+    // It fails, and is heard though the other one was waited for.
+    let failed = run(&["event", "e_fast", "--wait", "fast.ok", "--within", "80"]);
+    assert_eq!((failed.code, failed.out.as_str()), (1, "fast.failed after e_fast\n"), "{}", failed.err);
+    // It is in the slow state again, where nobody hears this one.
+    let unheard = run(&["event", "e_slow", "--within", "80"]);
+    assert_eq!(
+        (unheard.code, unheard.out.as_str()),
+        (1, "e_slow raised, and no transition heard it\n"),
+        "{}",
+        unheard.err
+    );
+    let heard = run(&["event", "e_fast", "--within", "80"]);
+    assert_eq!((heard.code, heard.out.as_str()), (0, "e_fast heard\n"), "{}", heard.err);
+    assert_eq!(run(&["event", "e_slow", "--no-wait"]).out, "e_slow raised\n");
+    let refused = run(&["apply", "rename"]);
+    assert_eq!(refused.code, 1, "{}{}", refused.out, refused.err);
+    assert!(refused.out.starts_with("rename.failed") && !refused.out.contains("accepted"), "{}", refused.out);
+    let asked = run(&["apply", "rename", "--no-wait"]);
+    assert!(asked.code == 0 && !asked.out.contains("accepted"), "{}", asked.out);
+    assert!(asked.out.contains("`davit log` shows how it is answered"), "{}", asked.out);
+    let applied = run(&["apply", "rename", "--force", "--json"]);
+    assert_eq!((applied.code, applied.json()["answer"].clone()), (0, "rename.ok".into()));
+    assert_eq!(run(&["undo"]).code, 0);
+    let nothing = run(&["undo"]);
+    assert!(nothing.code == 1 && nothing.out.starts_with("undo.failed"), "{}{}", nothing.out, nothing.err);
+    // What was needed before still goes.
+    assert_eq!(run(&["apply", "rename", "--force", "--wait"]).code, 0);
+    assert_eq!(run(&["shutdown"]).code, 0);
+    assert_eq!(deployed.end().code(), Some(0));
+}
+
+#[test]
+fn what_is_refused_is_json_too_where_it_is_asked_for() {
+    let demo = Demo::new();
+    for args in [
+        &["status"][..],
+        &["stack"],
+        &["log"],
+        &["log", "--follow"],
+        &["event", "e_fast"],
+        &["apply", "rename"],
+        &["undo"],
+        &["shutdown"],
+    ] {
+        let ran = demo.run(&[args, &["--json"]].concat());
+        assert_eq!((ran.code, ran.err.as_str()), (1, ""), "{args:?}");
+        assert_eq!(ran.json()["findings"][0]["code"], "cli::not_running", "{args:?}");
+    }
+}
+
+#[test]
+fn a_socket_with_too_long_a_path_says_so() {
+    let demo = Demo::new();
+    demo.replace("deployment.yaml", "name: demo", &format!("name: {}", "long".repeat(30)));
+    let ran = demo.run(&["deploy", "deployment.yaml"]);
+    assert_eq!(ran.code, 2, "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("107") && ran.err.contains("shorter"), "{}", ran.err);
+}
+
+#[test]
+fn the_log_is_followed_to_the_end() {
+    let (demo, deployed) = deployed();
+    let mut command = demo.command(&["log", "--follow", "--json"]);
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut entries: Vec<serde_json::Value> = Vec::new();
+    let mut next = || serde_json::from_str(&lines.next()?.unwrap()).ok();
+    // What was before it, and what comes.
+    while !entries.iter().any(|e: &serde_json::Value| e["event"] == "e_ready") {
+        entries.push(next().expect("the log from the beginning"));
+    }
+    assert_eq!(demo.run(&["apply", "rename", "--force"]).code, 0);
+    assert_eq!(demo.run(&["undo"]).code, 0);
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    entries.extend(std::iter::from_fn(next));
+    let answers: Vec<&str> = entries.iter().filter_map(|e| e["answer"].as_str()).collect();
+    for answer in ["create_all.ok", "rename.ok", "create_all.undone"] {
+        assert_eq!(answers.iter().filter(|a| **a == answer).count(), 1, "{answer} once: {answers:?}");
+    }
+    assert_eq!(entries.last().unwrap()["phase"], "down");
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(deployed.end().code(), Some(0));
+}
