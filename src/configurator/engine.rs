@@ -10,7 +10,7 @@ use super::pool::Pool;
 use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::{Purpose, Running};
-use super::safe::Safety;
+use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
 use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};

@@ -12,8 +12,9 @@
 //!   answered. [`control`]: how things stand, taking down. [`progress`]: what is told on the way.
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform; `hands`: an immediate step. [`conditions`], `stands`: what only the values of components tell, and what is
-//!   watched while it is in force. `safe`: what goes first. `fast`, `switches`: plans that are carried out again.
-//!   `teardown`: to nothing. `recovery`: the way out of what is broken. `suspects`: who was reported faulted. `observing`, `looks`: the slow look at what nothing is under way with.
+//!   watched while it is in force. `safe`, `safety`: what goes first. `fast`, `switches`: plans that are carried out again.
+//!   `teardown`: to nothing. `recovery`: the way out of what is broken. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
+//!   wait to be confirmed. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
 mod carry;
@@ -31,10 +32,12 @@ mod pool;
 pub mod progress;
 mod recovery;
 mod repair;
+mod reported;
 pub mod request;
 mod requests;
 mod running;
 mod safe;
+mod safety;
 mod stands;
 mod suspects;
 mod switches;

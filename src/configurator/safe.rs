@@ -6,35 +6,15 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ComponentName, ConfigId, RequestId, Step, Target, Verdict};
+use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
 use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Safe configurations that were asked for, and what those under way and over leave for others to heed.
-#[derive(Default)]
-pub(super) struct Safety {
-    /// Requests that have come and were not begun.
-    pub waiting: VecDeque<Request>,
-    /// What those under way could not plan.
-    troubles: Vec<(RequestId, Vec<Reason>)>,
-    /// What those that have ended touched, and what was interrupted was not told yet.
-    touched: Touched,
-}
-
-impl Safety {
-    /// What one that is over could not plan.
-    fn troubles_of(&mut self, request: RequestId) -> Vec<Reason> {
-        let at = self.troubles.iter().position(|(id, _)| *id == request);
-        at.map(|at| self.troubles.remove(at).1).unwrap_or_default()
-    }
-}
 
 impl Engine {
     /// Begins the safe configurations that were asked for. True: there were some.

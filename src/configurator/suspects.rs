@@ -1,6 +1,5 @@
 //! Components that were reported faulted: looked at, since the report may be older than what was done since.
 
-use super::engine::Engine;
 use super::inbox::{Reply, Ticket};
 use super::pool::{Call, Pool};
 use crate::limits;
@@ -111,34 +110,6 @@ impl Suspects {
 }
 
 /// When the model has touched a component last.
-fn generation_of(system: &System, component: ComponentName) -> Option<u64> {
+pub(super) fn generation_of(system: &System, component: ComponentName) -> Option<u64> {
     system.component(component).map(|node| node.generation)
-}
-
-impl Engine {
-    /// Looks at components that were reported faulted.
-    pub(super) fn look_at_suspects(&mut self) {
-        let Self { suspects, world, pool, running, given, .. } = self;
-        let busy = || running.iter().flat_map(|running| running.machine.components()).collect();
-        if suspects.look(&mut world.system, pool, busy, given.clock.now(), given.limits.step_timeout) {
-            self.changed();
-        }
-    }
-
-    /// When the model has touched a component last.
-    pub(super) fn generation(&self, component: ComponentName) -> Option<u64> {
-        generation_of(&self.world.system, component)
-    }
-
-    /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it.
-    pub(super) fn settle_suspects(&mut self) {
-        loop {
-            self.look_at_suspects();
-            let Some(until) = self.suspects.until() else { return };
-            self.pump(until);
-            if self.stopping {
-                return;
-            }
-        }
-    }
 }
