@@ -175,3 +175,32 @@ fn what_operators_push_at_once_has_no_more_places_than_there_are() {
     rig.wait(100.0);
     assert_eq!(rig.events()[2..], ["two.ok", "waits.ok"]);
 }
+
+/// One request with more slow steps than there are workers leaves one to whoever else begins.
+#[test]
+fn no_request_takes_all_workers() {
+    let six = ["B", "C", "D", "E", "F", "G"];
+    let list = |verb: &str, after: &str, of: &[&str]| {
+        of.iter().map(|name| format!("{verb} {name}{after}")).collect::<Vec<_>>().join("; ")
+    };
+    let all: Vec<&str> = std::iter::once("A").chain(six).collect();
+    let rig = Rig::new(vec![
+        configuration("make", "", &list("create", "", &all), "_default:stopped"),
+        configuration("many", "", &list("call", ".open", &six), ""),
+        configuration("one", "", "call A.open", ""),
+    ]);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let of = vec![(StepPattern::new("operation_call"), Duration::from_secs(1))];
+    let limits = Delays { of, ..Delays::default() };
+    rig.platform.set_delays(limits);
+    let asked = rig.clock.now();
+    rig.submit("many");
+    rig.submit_as("one", coordinator("c2")).unwrap();
+    rig.wait(20.0);
+    let answers = rig.answers.lock().unwrap().clone();
+    let at = |word: &str| {
+        answers.iter().find(|answer| answer.event().to_string() == word).expect("it is answered").at.since(asked)
+    };
+    assert_eq!(at("one.ok"), Duration::from_secs(1), "it begins at once");
+    assert_eq!(at("many.ok"), Duration::from_secs(2), "the others go on in parallel");
+}
