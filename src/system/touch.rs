@@ -98,6 +98,18 @@ impl Touch {
 /// What a step touches; never more than two slots.
 pub type Touches = SmallVec<[Touch; 2]>;
 
+/// What a step is about, where each thing is one: what it writes, makes, takes away, links or calls.
+pub fn slot(step: &Step) -> Slot {
+    match step {
+        Step::State { component, .. } => Slot::State(*component),
+        Step::Create { component, .. } | Step::Destroy { component } => Slot::Component(*component),
+        Step::Connect { from, to, .. } | Step::Disconnect { from, to } => Slot::Link(*from, *to),
+        Step::PropertySet { property, .. } => Slot::Property(*property),
+        Step::PortWrite { port, .. } => Slot::Port(*port),
+        Step::Operation(call) => Slot::Operation(call.operation),
+    }
+}
+
 /// What `step` touches in the system `before` it, and what its inverse will need. `undo` is the call that a configuration
 /// names for an operation's call, as for [`inverse`](super::step::inverse).
 ///

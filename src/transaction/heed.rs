@@ -3,9 +3,9 @@
 
 use super::Transaction;
 use super::run::Run;
-use super::touched::{Touched, slot};
+use super::touched::Touched;
 use crate::model::{ComponentName, RunState, Step, Transition, Wanted};
-use crate::system::touch::{Slot, components};
+use crate::system::touch::{Slot, components, slot};
 use crate::system::{View, step};
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};

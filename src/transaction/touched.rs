@@ -1,7 +1,7 @@
 //! What safe configurations touched.
 
 use crate::model::{ComponentName, MemberRef, RunState, Step, Value, Wanted};
-use crate::system::touch::{Slot, components};
+use crate::system::touch::{Slot, components, slot};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// What safe configurations touched: the way back of what they interrupted leaves that alone.
@@ -15,18 +15,6 @@ pub struct Touched {
     pub(super) properties: FxHashMap<MemberRef, Value>,
     pub(super) ports: FxHashMap<MemberRef, Option<Value>>,
     pub(super) states: FxHashMap<ComponentName, RunState>,
-}
-
-/// What a step is about, where each thing is one: what it writes, makes, takes away, links or calls.
-pub(super) fn slot(step: &Step) -> Slot {
-    match step {
-        Step::State { component, .. } => Slot::State(*component),
-        Step::Create { component, .. } | Step::Destroy { component } => Slot::Component(*component),
-        Step::Connect { from, to, .. } | Step::Disconnect { from, to } => Slot::Link(*from, *to),
-        Step::PropertySet { property, .. } => Slot::Property(*property),
-        Step::PortWrite { port, .. } => Slot::Port(*port),
-        Step::Operation(call) => Slot::Operation(call.operation),
-    }
 }
 
 impl Touched {
