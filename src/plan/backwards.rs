@@ -27,7 +27,7 @@ impl Backwards {
 
     /// The wave of the undo of a step: the last one's come first.
     pub fn wave(&self, done: &PlannedStep) -> u32 {
-        self.last_wave - done.wave
+        self.last_wave.saturating_sub(done.wave)
     }
 
     /// How many waves the way back has at most.
