@@ -13,6 +13,7 @@ mod coordinator;
 mod declared;
 mod down;
 mod drive;
+mod endless;
 mod ends;
 mod explore;
 mod follow;
