@@ -20,6 +20,8 @@ pub enum Bound {
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
     Forks,
+    /// [`limits::CHECK_STOPPING`].
+    Stopping,
     /// A coordinator could not be entered.
     Entered,
 }
@@ -46,6 +48,7 @@ impl Bound {
                 limits::CHECK_HANDED,
                 limits::CHECK_FORKS
             ),
+            Self::Stopping => "whether one event that ends the deployment leads all coordinators down was not followed".to_owned(),
             Self::Entered => "a coordinator could not be entered".to_owned(),
         };
         let behind = match failed {

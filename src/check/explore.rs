@@ -135,7 +135,8 @@ impl Graph<'_, '_> {
         }
     }
 
-    fn cut(&mut self, bound: Bound, failed: Failed) {
+    /// Something was left out that comes where at worst this failed.
+    pub fn cut(&mut self, bound: Bound, failed: Failed) {
         let known = self.bounds.entry(bound).or_insert(failed);
         *known = failed.min(*known);
     }
