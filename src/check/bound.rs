@@ -20,6 +20,8 @@ pub enum Bound {
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
     Forks,
+    /// [`limits::CHECK_ROUNDS`].
+    Rounds,
     /// [`limits::CHECK_STOPPING`].
     Stopping,
     /// A coordinator could not be entered.
@@ -47,6 +49,11 @@ impl Bound {
                  followed to its end",
                 limits::CHECK_HANDED,
                 limits::CHECK_FORKS
+            ),
+            Self::Rounds => format!(
+                "more than {} worlds in which going round leaves frames of one configuration were not followed to where the \
+                 oldest are squashed",
+                limits::CHECK_ROUNDS
             ),
             Self::Stopping => "whether one event that ends the deployment leads all coordinators down was not followed".to_owned(),
             Self::Entered => "a coordinator could not be entered".to_owned(),

@@ -28,6 +28,7 @@ mod purity;
 mod reactions;
 pub mod replay;
 mod report;
+mod rounds;
 mod run;
 mod safety;
 mod shape;

@@ -48,3 +48,42 @@ fn a_circle_of_answers_is_found_whatever_its_length() {
         assert_eq!(said.0["verdict"], "warnings", "{times}: {found:#?}");
     }
 }
+
+/// A frame that nobody undoes is left on each round, and the next request fails each time: the oldest frames are squashed all
+/// the same, and what the coordinator wants to undo is among them.
+#[test]
+fn frames_pile_up_on_rounds_on_which_a_request_fails() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
+        one = Configuration { property_set(\"a.gain\", 2.0) }, two = Configuration { property_set(\"a.gain\", 3.0) },
+        all = Configuration { destroy(\"a\") },";
+    let states = "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
+        first = state { entry = \"one\" }, second = state { entry = \"two\" }, far = state {},
+        undoing = state { entry = \"keep.undo\" }, leaving = state { entry = \"all\" }, stuck = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"keeping\", events = { \"base.ok\" } },
+        trans { src = \"building\", tgt = \"stuck\", events = { \"base.failed\", \"base.broken\" } },
+        trans { src = \"keeping\", tgt = \"up\", events = { \"keep.ok\" } },
+        trans { src = \"up\", tgt = \"first\", events = { \"e_one\" } },
+        trans { src = \"first\", tgt = \"second\", events = { \"one.ok\" } },
+        trans { src = \"first\", tgt = \"up\", events = { \"one.failed\", \"one.broken\" } },
+        trans { src = \"second\", tgt = \"far\", events = { \"two.ok\" } },
+        trans { src = \"second\", tgt = \"up\", events = { \"two.failed\" } },
+        trans { src = \"second\", tgt = \"leaving\", events = { \"two.broken\" } },
+        trans { src = \"up\", tgt = \"undoing\", events = { \"e_undo\" } },
+        trans { src = \"undoing\", tgt = \"leaving\", events = { \"keep.undone\", \"keep.undo.broken\" } },
+        trans { src = \"undoing\", tgt = \"stuck\", events = { \"keep.undo.failed\" } },
+        trans { src = \"keeping\", tgt = \"leaving\", events = { \"keep.failed\", \"keep.broken\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },
+        trans { src = \"leaving\", tgt = \"stuck\", events = { \"all.failed\", \"all.broken\" } },"
+        .to_owned()
+        + &["building", "keeping", "up", "first", "second", "far", "stuck"]
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
+            .join(" ");
+    let said = Small::new(configurations, &states, "limits: { stack: 4 }\n").check();
+    let refused = said.refused("keep.undo");
+    let squashed = |(severity, message): &(&str, &str)| *severity == "warning" && message.contains("squashed");
+    assert!(refused.iter().any(squashed), "{:#}", said.0);
+    assert_eq!(said.0["verdict"], "warnings", "{:#}", said.0);
+}
