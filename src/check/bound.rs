@@ -16,6 +16,10 @@ pub enum Bound {
     Piled,
     /// [`limits::CHECK_FRAMES`].
     Frames,
+    /// [`limits::CHECK_LEFT`].
+    Left,
+    /// What fails where frames are squashed.
+    Squashed,
     /// [`limits::CHECK_INBOX`].
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
@@ -43,6 +47,10 @@ impl Bound {
             Self::Frames => {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)
             }
+            Self::Left => {
+                format!("more than {} frames of one configuration were not followed", limits::CHECK_LEFT)
+            }
+            Self::Squashed => "what fails where frames have been squashed was not followed".to_owned(),
             Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
             Self::Forks => format!(
                 "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \

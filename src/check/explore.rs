@@ -201,11 +201,13 @@ impl Graph<'_, '_> {
             // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
             if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
                 self.ends.insert(at);
+                self.cut(Bound::Squashed, so_far);
                 continue;
             }
             // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
             if next.deep.1.is_some() && so_far >= Failed::Undo {
                 self.ends.insert(at);
+                self.cut(Bound::Left, so_far);
                 continue;
             }
             for (request, verdict) in &next.answers {

@@ -79,3 +79,26 @@ fn each_finding_has_its_own_way() {
     }
     assert!(!ways.is_empty(), "{json:#}");
 }
+
+/// Each time round an undo fails and leaves a frame more: that is followed only so far, and told.
+#[test]
+fn frames_that_failed_undoings_leave_are_followed_only_so_far() {
+    let configurations = format!("{CONFIGURATIONS} one = Configuration {{ property_set(\"a.gain\", 2.0) }},");
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, on = state { config = \"one\" },
+        leaving = state { entry = \"base.undo\" }, stuck = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"building\", tgt = \"leaving\", events = { \"base.failed\", \"base.broken\", \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"on\", events = { \"e_on\" } },
+        trans { src = \"on\", tgt = \"up\", events = { \"e_off\", \"one.failed\", \"one.broken\" } },
+        trans { src = \"on\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+        trans { src = \"leaving\", tgt = \"stuck\", events = { \"base.undo.failed\", \"base.undo.broken\" } },
+        trans { src = \"stuck\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let small = Small::new(&configurations, states, "");
+    let (word, code, strict, text) = verdict(&small);
+    assert_eq!((word.as_str(), code, strict), ("followed", 0, 1), "{text}");
+    assert!(text.contains("more than 2 frames of one configuration were not followed, behind an undo"), "{text}");
+}
