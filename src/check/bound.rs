@@ -24,6 +24,8 @@ pub enum Bound {
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
     Forks,
+    /// A safe configuration of an operator: it is the operator's to deal with.
+    ByHand,
     /// [`limits::CHECK_ROUNDS`].
     Rounds,
     /// [`limits::CHECK_STOPPING`].
@@ -58,6 +60,7 @@ impl Bound {
                 limits::CHECK_HANDED,
                 limits::CHECK_FORKS
             ),
+            Self::ByHand => "what an operator's safe configuration leads to was not followed".to_owned(),
             Self::Rounds => format!(
                 "more than {} worlds in which going round leaves frames of one configuration were not followed to where the \
                  oldest are squashed",

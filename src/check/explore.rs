@@ -222,7 +222,7 @@ impl Graph<'_, '_> {
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let again = state.stopping && self.product.is_shutdown(next.by);
             let dropped = matches!(next.by, Move::Dropped(_));
-            let (mut next, class) = self.abstracted(next);
+            let (mut next, class) = self.abstracted(next, so_far);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
@@ -250,11 +250,12 @@ impl Graph<'_, '_> {
 
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
     /// that it is in force.
-    fn abstracted(&mut self, next: Next) -> (State, Failed) {
+    fn abstracted(&mut self, next: Next, so_far: Failed) -> (State, Failed) {
         let Next { mut state, failed, by_hand, .. } = next;
         if !by_hand || self.product.worlds.top(state.world).is_some() {
             return (state, failed);
         }
+        self.cut(Bound::ByHand, so_far);
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
         state.world = self.product.worlds.topped(top, std::iter::empty());
         state.unconfirmed.clear();
