@@ -352,6 +352,14 @@ pub const CHECK_WAITING_MOST: usize = 6;
 /// Transitions up to which following counts as easy: then it is done anew with more batches that wait, if there are any.
 pub const CHECK_EASY: usize = 10_000;
 
+/// Worlds in which `check` goes round a circle that leaves a frame of one configuration each time, until the oldest frames are
+/// squashed. In each of them all requests of the circle are planned as often as frames have room.
+pub const CHECK_ROUNDS: usize = 4;
+
+/// Transitions of several coordinators up to which they are followed anew with it in mind whether the event that ends the
+/// deployment has come: that makes up to twice as many of each state.
+pub const CHECK_STOPPING: usize = 20_000;
+
 /// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
 /// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
 pub const CHECK_LEAN: usize = 5_000;
@@ -368,7 +376,7 @@ pub const CHECK_FRAMES: usize = 3;
 /// coordinator. What one left frame under another leads to, further ones do too.
 pub const CHECK_LEFT: usize = 2;
 
-/// States of a circle of answers that `check` looks for, and of a way from a safety event to a safe configuration.
+/// States on a way from a safety event to a safe configuration.
 pub const CHECK_CIRCLE: usize = 128;
 
 /// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes

@@ -16,10 +16,20 @@ pub enum Bound {
     Piled,
     /// [`limits::CHECK_FRAMES`].
     Frames,
+    /// [`limits::CHECK_LEFT`].
+    Left,
+    /// What fails where frames are squashed.
+    Squashed,
     /// [`limits::CHECK_INBOX`].
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
     Forks,
+    /// A safe configuration of an operator: it is the operator's to deal with.
+    ByHand,
+    /// [`limits::CHECK_ROUNDS`].
+    Rounds,
+    /// [`limits::CHECK_STOPPING`].
+    Stopping,
     /// A coordinator could not be entered.
     Entered,
 }
@@ -39,6 +49,10 @@ impl Bound {
             Self::Frames => {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)
             }
+            Self::Left => {
+                format!("more than {} frames of one configuration were not followed", limits::CHECK_LEFT)
+            }
+            Self::Squashed => "what fails where frames have been squashed was not followed".to_owned(),
             Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
             Self::Forks => format!(
                 "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \
@@ -46,6 +60,13 @@ impl Bound {
                 limits::CHECK_HANDED,
                 limits::CHECK_FORKS
             ),
+            Self::ByHand => "what an operator's safe configuration leads to was not followed".to_owned(),
+            Self::Rounds => format!(
+                "more than {} worlds in which going round leaves frames of one configuration were not followed to where the \
+                 oldest are squashed",
+                limits::CHECK_ROUNDS
+            ),
+            Self::Stopping => "whether one event that ends the deployment leads all coordinators down was not followed".to_owned(),
             Self::Entered => "a coordinator could not be entered".to_owned(),
         };
         let behind = match failed {

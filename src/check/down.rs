@@ -6,7 +6,7 @@ use super::judge::Traced;
 use super::state::{Failed, State};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};
-use crate::statechart::NodeId;
+use crate::statechart::{EventId, NodeId};
 use crate::system::View;
 use rustc_hash::FxHashSet;
 
@@ -115,8 +115,15 @@ impl Graph<'_, '_> {
         let severity = if self.failed[at as usize] == Failed::Nothing { Severity::Warning } else { Severity::Info };
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
         let message = format!("from `{place}` only a second `{event}` leads down, and it is raised once");
+        // The one that is not down yet, and would be led on by the second one.
+        let late = |number: &usize| {
+            let member = &self.product.members[*number];
+            let down = member.down.is_some_and(|down| member.chart.is_inside(state.leaves[*number], down));
+            !down && member.chart.event(event) != EventId::OTHER
+        };
+        let late = (0..self.product.members.len()).find(late).unwrap_or(0);
         let finding = Finding::new(severity, COORD_NO_WAY_DOWN, message)
-            .at(self.product.members[0].chart.origin(state.leaves[0]))
+            .at(self.product.members[late].chart.origin(state.leaves[late]))
             .path("shutdown.event")
             .help(
                 "let an answer or a time lead on from there; else what is left is taken down without the coordinator",

@@ -4,7 +4,7 @@
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::bound::Bound;
-use super::outcome::EMPTY;
+use super::outcome::WorldId;
 use super::product::Product;
 use super::replay::Replay;
 use super::report::Explored;
@@ -60,17 +60,19 @@ pub struct Graph<'p, 'a> {
     /// What was cut off, and of what class it was.
     pub bounds: FxHashMap<Bound, Failed>,
     /// Edges that push a frame which nobody ever undoes: of which configuration, and by whom.
-    pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
+    pub(super) pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
+    /// In which worlds circles that push one were gone round.
+    pub(super) gone_round: FxHashMap<(ConfigId, Requester), FxHashSet<WorldId>>,
     /// Behind undoings that failed only one batch at a time is followed, and no races.
     lean: Option<bool>,
-    depth: Vec<u32>,
+    pub(super) depth: Vec<u32>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
     /// For each class the first edge to each state, on the shortest ways with nothing worse.
     ways: FxHashMap<Failed, Vec<u32>>,
 }
 
-const NOWHERE: u32 = u32::MAX;
+pub(super) const NOWHERE: u32 = u32::MAX;
 
 /// Follows everything, within the budget.
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
@@ -85,6 +87,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         ends: FxHashSet::default(),
         bounds: FxHashMap::default(),
         pushes: FxHashMap::default(),
+        gone_round: FxHashMap::default(),
         lean: None,
         depth: Vec::new(),
         index: FxHashMap::default(),
@@ -95,8 +98,9 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         Some(start) => {
             graph.reach(start, Failed::Nothing, 0);
             graph.run();
-            graph.go_round();
-            graph.run();
+            while graph.go_round() {
+                graph.run();
+            }
         }
         None => graph.cut(Bound::Entered, Failed::Nothing),
     }
@@ -135,13 +139,14 @@ impl Graph<'_, '_> {
         }
     }
 
-    fn cut(&mut self, bound: Bound, failed: Failed) {
+    /// Something was left out that comes where at worst this failed.
+    pub fn cut(&mut self, bound: Bound, failed: Failed) {
         let known = self.bounds.entry(bound).or_insert(failed);
         *known = failed.min(*known);
     }
 
     /// The number of a state that is reached with at worst this failing.
-    fn reach(&mut self, state: State, failed: Failed, depth: u32) -> u32 {
+    pub(super) fn reach(&mut self, state: State, failed: Failed, depth: u32) -> u32 {
         let mut hasher = FxHasher::default();
         state.hash(&mut hasher);
         let bucket = self.index.entry(hasher.finish()).or_default();
@@ -196,11 +201,13 @@ impl Graph<'_, '_> {
             // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
             if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
                 self.ends.insert(at);
+                self.cut(Bound::Squashed, so_far);
                 continue;
             }
             // Behind undoings that failed, each round would leave a frame more: two of them show what comes of it.
             if next.deep.1.is_some() && so_far >= Failed::Undo {
                 self.ends.insert(at);
+                self.cut(Bound::Left, so_far);
                 continue;
             }
             for (request, verdict) in &next.answers {
@@ -208,17 +215,14 @@ impl Graph<'_, '_> {
                     && !self.product.worlds.counts(id, request.requester)
                 {
                     let edge = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
-                    let pushes = self.pushes.entry((id, request.requester)).or_default();
-                    if pushes.len() < limits::CHECK_CIRCLE {
-                        pushes.push(edge);
-                    }
+                    self.pushes.entry((id, request.requester)).or_default().push(edge);
                 }
             }
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let again = state.stopping && self.product.is_shutdown(next.by);
             let dropped = matches!(next.by, Move::Dropped(_));
-            let (mut next, class) = self.abstracted(next);
+            let (mut next, class) = self.abstracted(next, so_far);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
@@ -231,7 +235,7 @@ impl Graph<'_, '_> {
     }
 
     /// What follows from a state: always the same.
-    fn nexts(&mut self, at: u32) -> Nexts {
+    pub(super) fn nexts(&mut self, at: u32) -> Nexts {
         let state = self.states[at as usize].clone();
         if !self.is_lean(at) {
             return self.product.nexts(&state);
@@ -244,108 +248,14 @@ impl Graph<'_, '_> {
         nexts
     }
 
-    /// Frames that nobody ever undoes pile up where a circle pushes one each time round, until the oldest frames are
-    /// squashed: what comes of that is followed too, for one circle of each configuration.
-    fn go_round(&mut self) {
-        let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
-        pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
-        let mut out: FxHashMap<u32, SmallVec<[u32; 4]>> = FxHashMap::default();
-        for (number, edge) in (0u32..).zip(&self.edges) {
-            // Where nothing is left, frames are forgotten: they do not pile up.
-            let left = self.states[edge.to as usize].world != EMPTY;
-            if edge.failed == Failed::Nothing && edge.place.is_some() && left {
-                out.entry(edge.from).or_default().push(number);
-            }
-        }
-        for (_, edges) in pushes {
-            let mut circles = edges.into_iter().filter_map(|edge| self.circle(edge, &out));
-            if let Some(circle) = circles.next() {
-                drop(circles);
-                self.round_and_round(&circle);
-            }
-        }
-    }
-
-    /// The edges of a circle without a failure that ends with this one.
-    fn circle(&self, edge: u32, out: &FxHashMap<u32, SmallVec<[u32; 4]>>) -> Option<Vec<u32>> {
-        let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
-        if failed != Failed::Nothing || self.failed[start as usize] != Failed::Nothing {
-            return None;
-        }
-        let mut by: FxHashMap<u32, u32> = FxHashMap::default();
-        let mut queue: VecDeque<u32> = VecDeque::from([start]);
-        while let Some(at) = queue.pop_front() {
-            if at == goal {
-                let mut circle = vec![edge];
-                let mut at = goal;
-                while at != start {
-                    let number = by[&at];
-                    circle.push(number);
-                    at = self.edges[number as usize].from;
-                }
-                circle.reverse();
-                return Some(circle);
-            }
-            for number in out.get(&at).into_iter().flatten() {
-                let to = self.edges[*number as usize].to;
-                if to != start && !by.contains_key(&to) {
-                    by.insert(to, *number);
-                    queue.push_back(to);
-                }
-            }
-        }
-        None
-    }
-
-    /// Goes round a circle until the oldest frames are squashed, or something on it is refused; what it leads to is followed.
-    fn round_and_round(&mut self, circle: &[u32]) {
-        let Some(first) = circle.first().map(|edge| self.edges[*edge as usize]) else { return };
-        let Some(mut world) = self.product.worlds.get(self.states[first.from as usize].world).cloned() else { return };
-        let mut requests: Vec<(u32, Vec<Request>)> = Vec::new();
-        for number in circle {
-            let edge = self.edges[*number as usize];
-            let next = self.nexts(edge.from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
-            let answered = next.into_iter().flat_map(|next| next.answers);
-            let done = answered.filter(|(_, verdict)| verdict.is_success()).map(|(request, _)| request).collect();
-            requests.push((edge.from, done));
-        }
-        let limit = self.product.deployment.limits.stack;
-        let mut at = first.from;
-        'round: for _ in 0..limit + 2 {
-            for (from, requests) in &requests {
-                if !self.product.worlds.carry_out(&mut world, requests) {
-                    at = *from;
-                    break 'round;
-                }
-            }
-        }
-        let mut state = self.states[at as usize].clone();
-        let world = self.product.worlds.met(world);
-        if world == state.world {
-            return;
-        }
-        state.world = world;
-        state.unconfirmed.clear();
-        let (failed, depth) = (self.failed[at as usize], self.depth[at as usize] + 1);
-        let to = self.reach(state, failed, depth);
-        self.edges.push(Edge {
-            from: at,
-            to,
-            place: None,
-            failed: Failed::Nothing,
-            quiet: false,
-            again: false,
-            dropped: false,
-        });
-    }
-
     /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
     /// that it is in force.
-    fn abstracted(&mut self, next: Next) -> (State, Failed) {
+    fn abstracted(&mut self, next: Next, so_far: Failed) -> (State, Failed) {
         let Next { mut state, failed, by_hand, .. } = next;
         if !by_hand || self.product.worlds.top(state.world).is_some() {
             return (state, failed);
         }
+        self.cut(Bound::ByHand, so_far);
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
         state.world = self.product.worlds.topped(top, std::iter::empty());
         state.unconfirmed.clear();

@@ -5,9 +5,8 @@ use super::explore::Graph;
 use super::reactions::triggers;
 use super::state::{Failed, State, Trouble};
 use super::trace::TraceStep;
-use crate::limits;
 use crate::model::codes::{
-    COORD_ENDLESS, COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD,
+    COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD,
     COORD_STACK_GROWS, COORD_STUCK, STACK_FULL,
 };
 use crate::model::{
@@ -357,49 +356,6 @@ impl Graph<'_, '_> {
         }
     }
 
-    /// Circles of answers in which no time passes and no step fails.
-    fn endless(&mut self, found: &mut Traced) {
-        let mut out: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
-        for edge in self.edges.iter().filter(|edge| edge.quiet) {
-            out[edge.from as usize].push(edge.to);
-        }
-        let mut said: FxHashSet<Vec<NodeId>> = FxHashSet::default();
-        for at in self.in_order() {
-            // Not known what is answered there, so nothing can be said of circles.
-            if self.product.worlds.top(self.states[at as usize].world).is_some() {
-                continue;
-            }
-            let Some(circle) = circle(&out, at, limits::CHECK_CIRCLE) else { continue };
-            let mut leaves: Vec<NodeId> =
-                circle.iter().flat_map(|at| self.states[*at as usize].leaves.iter().copied()).collect();
-            leaves.sort_unstable();
-            leaves.dedup();
-            if !said.insert(leaves) {
-                continue;
-            }
-            let places: Vec<String> = circle.iter().map(|at| self.product.place(&self.states[*at as usize])).collect();
-            let mut named: Vec<String> = places.into_iter().map(|place| format!("`{place}`")).collect();
-            named.dedup();
-            named.truncate(6);
-            let leaf = self.states[at as usize].leaves[0];
-            let behind_undo = self.failed[at as usize] >= Failed::Undo;
-            let severity = if behind_undo { Severity::Info } else { Severity::Warning };
-            let finding = Finding::new(
-                severity,
-                COORD_ENDLESS,
-                format!("answers go round for ever, with nothing failing and no time passing: {}", named.join(", ")),
-            )
-            .at(self.product.members[0].chart.origin(leaf))
-            .help("wait for an event or for a time (`e_after(1.0)`) somewhere on the way round");
-            let trace = self.trace(at);
-            found.push((finding, trace));
-            // One that is entered from many places is told once.
-            if said.len() >= limits::CHECK_TOLD {
-                return;
-            }
-        }
-    }
-
     /// Where nothing leads on.
     fn stuck(&mut self, found: &mut Traced) -> FxHashSet<u32> {
         let mut leads_on = vec![false; self.states.len()];
@@ -454,29 +410,4 @@ fn created(configuration: &Configuration) -> impl Iterator<Item = ComponentName>
         ChangeKind::Create { component, .. } => Some(*component),
         _ => None,
     })
-}
-
-/// A shortest circle through `at`, of at most so many states.
-fn circle(out: &[Vec<u32>], at: u32, most: usize) -> Option<Vec<u32>> {
-    let mut from: rustc_hash::FxHashMap<u32, u32> = rustc_hash::FxHashMap::default();
-    let mut queue = std::collections::VecDeque::from([at]);
-    while let Some(state) = queue.pop_front() {
-        for next in &out[state as usize] {
-            if *next == at {
-                let mut circle = vec![state];
-                let mut back = state;
-                while back != at {
-                    back = from[&back];
-                    circle.push(back);
-                }
-                circle.reverse();
-                return Some(circle);
-            }
-            if from.len() < most && !from.contains_key(next) {
-                from.insert(*next, state);
-                queue.push_back(*next);
-            }
-        }
-    }
-    None
 }

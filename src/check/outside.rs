@@ -55,7 +55,7 @@ impl Product<'_> {
     fn unheard_shutdown(&mut self, state: &State, heard: &BTreeSet<usize>, nexts: &mut Nexts) {
         let shutdown = self.deployment.shutdown.event;
         let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
-        if heard.contains(&at) || state.stopping || !self.minds_stopping() || self.all_in(state, |member| member.down) {
+        if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {
             return;
         }
         let next = State { stopping: true, ..state.clone() };
@@ -66,7 +66,7 @@ impl Product<'_> {
     /// An event comes to all that wait for it.
     pub(super) fn raised(&mut self, state: &State, name: EventName, by: Move, nexts: &mut Nexts) {
         let mut next = state.clone();
-        next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping();
+        next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping;
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
         self.confirm(&mut next, name);

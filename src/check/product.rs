@@ -51,6 +51,9 @@ pub struct Product<'a> {
     pub losable: Vec<(ConfigId, bool)>,
     /// Answers that nobody hears are given as well.
     pub tells_all: bool,
+    /// It is kept that the deployment is being stopped. Of several coordinators without an operator it is kept for long, until
+    /// all are down, and makes many states: only where these are few.
+    pub minds_stopping: bool,
 }
 
 impl<'a> Product<'a> {
@@ -75,6 +78,7 @@ impl<'a> Product<'a> {
         operator.dedup();
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
         let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
+        let minds_stopping = !operator.is_empty() || members.len() == 1;
         let mut product = Self {
             deployment,
             members,
@@ -88,6 +92,7 @@ impl<'a> Product<'a> {
             most_waiting: limits::CHECK_WAITING,
             losable,
             tells_all: false,
+            minds_stopping,
         };
         product.worlds.judged = super::stands::judged(deployment, charts);
         for (place, number) in numbers.iter().enumerate() {
@@ -201,12 +206,6 @@ impl<'a> Product<'a> {
             let next = Next::plain(by, self.settle(state), Failed::Nothing);
             nexts.all.push(next);
         }
-    }
-
-    /// Whether it is kept that the deployment is being stopped. Of several coordinators without an operator it would be
-    /// kept for long, until all are down, and make too many states.
-    pub(super) fn minds_stopping(&self) -> bool {
-        !self.operator.is_empty() || self.members.len() == 1
     }
 
     /// Whether the event that ends the deployment comes.

@@ -5,6 +5,7 @@ use super::explore::explore;
 use super::judge::Traced;
 use super::product::Product;
 use super::report::{Checked, Explored, Report};
+use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
     beside, configurations as single, coordinator, declared, monitors as watched, purity, safety, simulated, types,
@@ -94,13 +95,23 @@ fn follow(
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
         let product = apart.as_mut().unwrap_or(&mut product);
-        for most_waiting in limits::CHECK_WAITING..=limits::CHECK_WAITING_MOST {
+        let mut most_waiting = limits::CHECK_WAITING;
+        loop {
             product.follow_anew(most_waiting);
             let mut graph = explore(product);
             // Anew with more of them where they are few: often there never are more at once.
             let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
+            let minds = graph.product.minds_stopping;
             if easy && graph.bounds.contains_key(&Bound::Waiting) {
+                most_waiting += 1;
                 continue;
+            }
+            if !minds && graph.edges.len() <= limits::CHECK_STOPPING {
+                product.minds_stopping = true;
+                continue;
+            }
+            if !minds {
+                graph.cut(Bound::Stopping, Failed::Nothing);
             }
             found.extend(graph.judge());
             let verified = !graph.bounds.contains_key(&Bound::Budget) && !graph.bounds.contains_key(&Bound::Entered);

@@ -11,7 +11,7 @@ use super::alike::{hash_system, same_system};
 use super::outcome::{Beside, Comes, Held, SafeComes, Went, WorldId};
 use super::shape::{Counted, Shapes, Undone};
 use crate::limits;
-use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings};
+use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, RequestId};
 use crate::plan::{Context, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{Effort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
@@ -259,14 +259,23 @@ impl<'a> Worlds<'a> {
         fullest.map_or(Ok(()), |world| plan(&world.system, configuration, &self.context).map(|_| ()))
     }
 
-    /// Whether `request` would be refused if none but its requester had frames in force.
+    /// Whether `request` would be refused if none but its requester had asked for anything.
     pub fn is_refused_alone(&self, id: WorldId, request: &Request) -> bool {
         let Some(world) = self.get(id) else { return false };
+        let mut undone = world.clone();
+        for frame in world.stack.frames().iter().rev().filter(|frame| frame.requester != request.requester) {
+            let undo = Request::new(RequestId(0), Ask::UndoOf(frame.configuration), frame.requester);
+            let mut without = undone.clone();
+            if self.carry_out(&mut without, &[undo]) {
+                undone = without;
+            }
+        }
+        // Of what cannot be undone by itself it is not known how it would be without that.
         let mut stack = Stack::new(self.deployment.limits.stack);
-        for frame in world.stack.frames().iter().filter(|frame| frame.requester == request.requester) {
+        for frame in undone.stack.frames().iter().filter(|frame| frame.requester == request.requester) {
             stack.push((**frame).clone());
         }
-        let alone = World::new(world.system.clone(), stack);
+        let alone = World::new(undone.system, stack);
         let group = take_up(&alone, std::slice::from_ref(request), &self.rules());
         group.told.iter().any(|told| told.reason.is_some())
     }

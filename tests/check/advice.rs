@@ -141,3 +141,20 @@ fn a_bare_undo_is_answered_too() {
     let grasped = check("trans { src = \"up\", tgt = \"leaving\", events = { \"grasp.done\" } },", "");
     assert!(grasped.of("coord::unknown_answer").is_empty(), "{:#}", grasped.0);
 }
+
+/// What an operator's frame has done is no mistake of the coordinator, whether the frame or what it did stands in the way.
+#[test]
+fn what_an_operators_frame_has_changed_is_the_operators_doing() {
+    let running = CONFIGURATIONS.replace("\"Drive\") },", "\"Drive\"), post_conf_state = { \"a:running\" } },");
+    let check = |keys: &str| Small::new(&running, STATES, keys).check();
+    let alone = check("");
+    assert_eq!(alone.0["verdict"], "sound", "{:#}", alone.0);
+    for applied in ["soft", "halt"] {
+        let said = check(&format!("operator: [{applied}]\n"));
+        let found = said.of("coord::refused_by_other");
+        assert!(found.iter().any(|f| f["severity"] == "warning"), "{applied}: {:#}", said.0);
+        let own = said.refused("base.undo");
+        assert!(own.iter().all(|(severity, _)| *severity == "info"), "{applied}: {:#}", said.0);
+        assert_eq!(said.0["verdict"], "warnings", "{applied}: {:#}", said.0);
+    }
+}

@@ -7,6 +7,7 @@ mod demo;
 mod advice;
 mod asked;
 mod beside;
+mod circles;
 mod demands;
 mod follow;
 mod product;

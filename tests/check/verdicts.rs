@@ -79,3 +79,43 @@ fn each_finding_has_its_own_way() {
     }
     assert!(!ways.is_empty(), "{json:#}");
 }
+
+/// Each time round an undo fails and leaves a frame more: that is followed only so far, and told.
+#[test]
+fn frames_that_failed_undoings_leave_are_followed_only_so_far() {
+    let configurations = format!("{CONFIGURATIONS} one = Configuration {{ property_set(\"a.gain\", 2.0) }},");
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, on = state { config = \"one\" },
+        leaving = state { entry = \"base.undo\" }, stuck = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"building\", tgt = \"leaving\", events = { \"base.failed\", \"base.broken\", \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"on\", events = { \"e_on\" } },
+        trans { src = \"on\", tgt = \"up\", events = { \"e_off\", \"one.failed\", \"one.broken\" } },
+        trans { src = \"on\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+        trans { src = \"leaving\", tgt = \"stuck\", events = { \"base.undo.failed\", \"base.undo.broken\" } },
+        trans { src = \"stuck\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let small = Small::new(&configurations, states, "");
+    let (word, code, strict, text) = verdict(&small);
+    assert_eq!((word.as_str(), code, strict), ("followed", 0, 1), "{text}");
+    assert!(text.contains("more than 2 frames of one configuration were not followed, behind an undo"), "{text}");
+}
+
+/// An operator may apply a safe configuration at any time. It is the operator's to deal with what that leads to, which is not
+/// followed, and told: with it in force the system is not taken down by the coordinator alone.
+#[test]
+fn what_an_operators_safe_configuration_leads_to_is_not_called_sound() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" } },
+        stop = Configuration { safe = true, post_conf_state = { \"a:stopped\" } },";
+    let states = UP_AND_DOWN.replace("\"e_shutdown\", \"base.undo.failed\"", "\"base.undo.failed\"");
+    let small = Small::new(configurations, &states, "");
+    let (word, code, strict, text) = verdict(&small);
+    assert_eq!((word.as_str(), code, strict), ("followed", 0, 1), "{text}");
+    assert!(text.contains("an operator's safe configuration leads to was not followed"), "{text}");
+    let script = "deploy('small.yaml') apply('stop') shutdown()";
+    small.demo.write("forced.lua", script);
+    let ran = small.demo.run(&["run", "forced.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert!(ran.out.contains("base.undo.failed"), "{}{}", ran.out, ran.err);
+}

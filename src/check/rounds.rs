@@ -1,0 +1,163 @@
+//! Frames that nobody ever undoes pile up where a circle pushes one each time round, until the oldest frames are squashed:
+//! what comes of that is followed too.
+//!
+//! A circle is gone round for each configuration that is pushed on it, in each world in which it is, up to a bound. What else
+//! is pushed on another circle with the same push in the same world is followed for that.
+
+use super::bound::Bound;
+use super::explore::{Edge, Graph, NOWHERE};
+use super::outcome::EMPTY;
+use super::state::Failed;
+use crate::limits;
+use crate::stack::Request;
+use petgraph::algo::kosaraju_scc;
+use petgraph::graph::DiGraph;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::collections::VecDeque;
+
+/// The edges of circles on which no undo fails, by where they come from.
+type Circular = FxHashMap<u32, SmallVec<[u32; 4]>>;
+
+impl Graph<'_, '_> {
+    /// Goes round circles that were met since. True: there is more to follow.
+    pub(super) fn go_round(&mut self) -> bool {
+        let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
+        if pushes.is_empty() {
+            return false;
+        }
+        pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
+        let (circular, of) = self.circular();
+        let before = self.edges.len();
+        for ((id, by), edges) in pushes {
+            // A frame of a group takes the place of the one before: none piles up.
+            let piles = self.product.worlds.configuration(id).is_some_and(|c| c.group.is_none());
+            for edge in edges {
+                let Edge { from, to, .. } = self.edges[edge as usize];
+                let (class, world) = (self.failed[from as usize], self.states[from as usize].world);
+                if of.get(&from).is_none_or(|circle| of.get(&to) != Some(circle)) {
+                    continue;
+                }
+                let gone = self.gone_round.entry((id, by)).or_default();
+                if gone.contains(&world) || self.product.worlds.is_piled_up(world) {
+                    continue;
+                }
+                let (some, full) = (!gone.is_empty(), gone.len() >= limits::CHECK_ROUNDS);
+                // One is enough to see that nothing piles up.
+                if full || some && !piles {
+                    if piles {
+                        self.cut(Bound::Rounds, class);
+                    }
+                    continue;
+                }
+                let circle = [Failed::Nothing, Failed::Apply].into_iter().find_map(|worst| {
+                    let circle = self.circle(edge, &circular, worst)?;
+                    Some((circle, worst))
+                });
+                let Some((circle, worst)) = circle else { continue };
+                self.gone_round.entry((id, by)).or_default().insert(world);
+                if !self.round_and_round(&circle, worst) {
+                    self.cut(Bound::Rounds, class.max(worst));
+                }
+            }
+        }
+        self.edges.len() > before
+    }
+
+    /// The edges of circles on which no undo fails and something stays in force, and which states are on one circle.
+    fn circular(&self) -> (Circular, FxHashMap<u32, usize>) {
+        let fits = |edge: &Edge| {
+            // Where nothing is left, frames are forgotten: they do not pile up.
+            edge.failed <= Failed::Apply && edge.place.is_some() && self.states[edge.to as usize].world != EMPTY
+        };
+        let all = self.edges.iter().filter(|edge| fits(edge)).map(|edge| (edge.from, edge.to));
+        let mut of: FxHashMap<u32, usize> = FxHashMap::default();
+        for (number, states) in kosaraju_scc(&DiGraph::<(), ()>::from_edges(all)).into_iter().enumerate() {
+            of.extend(states.into_iter().filter_map(|at| Some((u32::try_from(at.index()).ok()?, number))));
+        }
+        let mut circular = Circular::default();
+        for (number, edge) in (0u32..).zip(&self.edges) {
+            if fits(edge) && of.get(&edge.from) == of.get(&edge.to) {
+                circular.entry(edge.from).or_default().push(number);
+            }
+        }
+        (circular, of)
+    }
+
+    /// The edges of a circle that ends with this one, on which nothing fails that is worse.
+    fn circle(&self, edge: u32, circular: &Circular, worst: Failed) -> Option<Vec<u32>> {
+        let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
+        if failed > worst || self.failed[start as usize] > worst {
+            return None;
+        }
+        let mut by: FxHashMap<u32, u32> = FxHashMap::default();
+        let mut queue: VecDeque<u32> = VecDeque::from([start]);
+        while let Some(at) = queue.pop_front() {
+            if at == goal {
+                let mut circle = vec![edge];
+                let mut at = goal;
+                while at != start {
+                    let number = by[&at];
+                    circle.push(number);
+                    at = self.edges[number as usize].from;
+                }
+                circle.reverse();
+                return Some(circle);
+            }
+            for number in circular.get(&at).into_iter().flatten() {
+                let Edge { to, failed, .. } = self.edges[*number as usize];
+                if failed <= worst && to != start && !by.contains_key(&to) {
+                    by.insert(to, *number);
+                    queue.push_back(to);
+                }
+            }
+        }
+        None
+    }
+
+    /// Goes round a circle until the oldest frames are squashed, or something on it is refused; what it leads to is followed.
+    /// False: it cannot be gone by what its requests come to alone.
+    fn round_and_round(&mut self, circle: &[u32], worst: Failed) -> bool {
+        let Some(first) = circle.first().map(|edge| self.edges[*edge as usize]) else { return false };
+        let Some(mut world) = self.product.worlds.get(self.states[first.from as usize].world).cloned() else {
+            return false;
+        };
+        let mut requests: Vec<(Edge, Vec<Request>)> = Vec::new();
+        for number in circle {
+            let edge = self.edges[*number as usize];
+            let next = self.nexts(edge.from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
+            let answered = next.into_iter().flat_map(|next| next.answers);
+            let done = answered.filter(|(_, verdict)| verdict.is_success()).map(|(request, _)| request).collect();
+            requests.push((edge, done));
+        }
+        let limit = self.product.deployment.limits.stack;
+        let mut at = first.from;
+        'round: for round in 0..limit + 2 {
+            for (edge, requests) in &requests {
+                if !self.product.worlds.carry_out(&mut world, requests) {
+                    at = edge.from;
+                    break 'round;
+                }
+                // What fails may leave something else than nothing done.
+                let squashed = || world.stack.frames().iter().any(|frame| frame.is_squashed());
+                if round == 0 && worst != Failed::Nothing && !squashed() {
+                    let met = self.product.worlds.met(world.clone());
+                    if met != self.states[edge.to as usize].world {
+                        return false;
+                    }
+                }
+            }
+        }
+        let mut state = self.states[at as usize].clone();
+        let world = self.product.worlds.met(world);
+        if world == state.world {
+            return true;
+        }
+        state.world = world;
+        state.unconfirmed.clear();
+        let (failed, depth) = (self.failed[at as usize].max(worst), self.depth[at as usize] + 1);
+        let to = self.reach(state, failed, depth);
+        self.edges.push(Edge { from: at, to, place: None, failed: worst, quiet: false, again: false, dropped: false });
+        true
+    }
+}
