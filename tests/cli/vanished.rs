@@ -54,3 +54,31 @@ fn the_socket_of_a_killed_process_is_removed_only_by_who_deploys_that_name_anew(
     assert_eq!(demo.run(&["shutdown"]).code, 0);
     assert!(!socket.exists());
 }
+
+#[test]
+fn of_many_that_start_at_once_one_has_the_name() {
+    let demo = Demo::new();
+    for round in 0..3 {
+        let starts: Vec<_> = (0..5)
+            .map(|_| {
+                let mut command = demo.command(&["deploy", "deployment.yaml", "--detach"]);
+                std::thread::spawn(move || command.output().expect("the program starts"))
+            })
+            .collect();
+        // Whoever looks meanwhile takes nothing away.
+        let looks = (0..10).map(|_| demo.command(&["status"])).map(|mut command| command.output().expect("it starts"));
+        assert_eq!(looks.count(), 10);
+        let mut codes: Vec<i32> = Vec::new();
+        for start in starts {
+            let ended = start.join().expect("it ends");
+            let err = String::from_utf8_lossy(&ended.stderr).into_owned();
+            let code = ended.status.code().expect("it ends by itself");
+            assert!(code == 0 || err.contains("cli::name_taken"), "{code}: {err}");
+            codes.push(code);
+        }
+        codes.sort_unstable();
+        assert_eq!(codes, [0, 1, 1, 1, 1], "round {round}");
+        assert_eq!(demo.run(&["status"]).code, 0);
+        assert_eq!(demo.run(&["shutdown"]).code, 0);
+    }
+}
