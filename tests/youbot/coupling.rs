@@ -214,7 +214,10 @@ fn forty_centimetres_need_the_base() {
     let script = "go 8 0.283 0.283 0; hold 4; go 8 -0.283 -0.283 0; hold 4";
     let five = Scenario { script, seconds: 24.0, ..Scenario::default() }.run();
     let eight = Scenario { script, seconds: 24.0, force_gain: 0.1, ..Scenario::default() }.run();
-    assert!(mm(eight.rms) <= 14.7 && eight.hand_rms <= 8.0 && eight.hand_max < 15.0 && eight.saturated == 0.0, "{eight:?}");
+    assert!(
+        mm(eight.rms) <= 14.7 && eight.hand_rms <= 8.0 && eight.hand_max < 15.0 && eight.saturated == 0.0,
+        "{eight:?}"
+    );
     assert!(five.worst > 4.0 * eight.worst && five.hand_max > 20.0, "{five:?}");
 }
 

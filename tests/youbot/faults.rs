@@ -3,26 +3,38 @@
 use crate::live::{Live, Row, jolt};
 use davit::model::{ComponentName, Step, Transition};
 
+/// A hand that brings the arms together and sways, sooner than the shipped one.
+const HAND: &str = "free 0.5; align 1.5; sway 600 0.06 0 0 0.15";
+
+/// Up and copying, swayed by the hand.
+fn swaying(name: &str) -> Live {
+    let live = Live::with_hand(name, HAND);
+    live.bring_up();
+    live.until_state("copying", 5.0);
+    live.run(2.0);
+    live
+}
+
 /// Where it is stopped: what is raised on the way there, and the state.
 const PLACES: [(&str, fn(&Live)); 11] = [
     ("calibrating", |live| way_up(live, "calibrating", 0.06)),
     ("unfolding", |live| way_up(live, "unfolding", 2.0)),
     ("unsync", |live| up(live, "unsync", 0.1)),
     ("harmonizing", |live| up(live, "harmonizing", 0.2)),
-    ("copying with eight", |live| up(live, "eight_DOF_mode", 9.5)),
+    ("copying with eight", |live| up(live, "eight_DOF_mode", 2.0)),
     ("copying with five", |live| {
-        up(live, "eight_DOF_mode", 1.0);
+        up(live, "eight_DOF_mode", 0.5);
         live.raise("e_5dof");
         live.until_state("five_DOF_mode", 1.0);
-        live.run(8.5);
+        live.run(1.0);
     }),
     ("soft_stop", |live| {
-        up(live, "eight_DOF_mode", 1.0);
+        up(live, "eight_DOF_mode", 0.5);
         live.raise("e_force_spike");
         live.until_state("soft_stop", 1.0);
     }),
     ("parking", |live| {
-        up(live, "eight_DOF_mode", 1.0);
+        up(live, "eight_DOF_mode", 0.5);
         live.raise("e_shutdown");
         live.until_state("parking", 1.0);
         live.run(1.8);
@@ -73,7 +85,7 @@ fn fastest(rows: &[Row], t: f64) -> f64 {
 
 /// Stops it with `stop`, and holds what is said to hold. What is not so, one line each.
 fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<String> {
-    let live = Live::new(name);
+    let live = Live::with_hand(name, HAND);
     go(&live);
     live.run(0.02);
     live.rows();
@@ -82,7 +94,7 @@ fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<Stri
         "e_estop" => live.raise(stop),
         fault => live.driver_fault(fault),
     }
-    live.run(3.0);
+    live.run(1.5);
     let rows = live.rows();
     let mut wrong = Vec::new();
     let mut say = |so: bool, what: String| {
@@ -100,7 +112,7 @@ fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<Stri
     // It takes a reset, and then it is to be told.
     let before = rows.last().unwrap().tool;
     live.raise("e_reset");
-    live.run(2.0);
+    live.run(0.7);
     let rows = live.rows();
     let moved = rows.iter().map(|row| (row.tool - before).norm()).fold(0.0, f64::max);
     // In operation the hand of the operator may take hold again.
@@ -151,8 +163,7 @@ fn a_fault_of_the_drives_is_heard_everywhere_scoped() {
 /// Somebody pushes with 40 N: whatever notices it first, the robot brakes.
 fn push(name: &str, direction: &str) {
     let live = Live::copying(name);
-    live.run(1.0);
-    live.set("Operator", "f_max", 60.0);
+    live.run(0.5);
     live.rows();
     let t = live.now();
     live.set("Operator", "script", format!("push 1 {direction}").as_str());
@@ -165,7 +176,11 @@ fn push(name: &str, direction: &str) {
     let way = rows.iter().map(|row| (row.tool - rows[0].tool).norm()).fold(0.0, f64::max);
     let quick = rows.iter().flat_map(|row| row.joints.vel).map(f64::abs).fold(0.0, f64::max);
     let (step, at) = jolt(&rows);
-    println!("{name}, push {direction}: fault after {:.3} s, {rest:.4} m/s 0.3 s later, {way:.3} m, {quick:.2} rad/s, {step:.2} N m/ms at {:.3}", fault - t, at - t);
+    println!(
+        "{name}, push {direction}: fault after {:.3} s, {rest:.4} m/s 0.3 s later, {way:.3} m, {quick:.2} rad/s, {step:.2} N m/ms at {:.3}",
+        fault - t,
+        at - t
+    );
     assert!(rest < 0.02, "{rest} m/s 0.3 s after the fault");
     assert!(way < 0.2, "{way} m");
 }
@@ -179,8 +194,7 @@ fn a_hard_push_ends_at_rest() {
 
 /// Taking hold, letting go, a link that is cut, two modes: no torque changes by more than half a newton metre in 1 ms.
 fn switches(name: &str) {
-    let live = Live::copying(name);
-    live.run(9.3);
+    let live = swaying(name);
     live.rows();
     let mut all = Vec::new();
     // In the middle of the sway, with the coupling at work.
@@ -232,14 +246,17 @@ fn what_dies_is_noticed() {
         ("Monitors", "e_watch_lost"),
         ("Cart_Impedance", "e_controller_lost"),
     ] {
-        let live = Live::copying("youbot_arm_scoped");
-        live.run(9.3);
+        let live = swaying("youbot_arm_scoped");
         live.rows();
         let t = live.now();
         live.step(&Step::State { component: ComponentName::new(component).unwrap(), transition: Transition::Stop });
         live.run(0.4);
         let noticed = live.first(event, t).map(|at| at - t);
-        assert!(noticed.is_some_and(|after| after <= 0.05), "{component}: {event} after {noticed:?} s\n{}", live.story(t));
+        assert!(
+            noticed.is_some_and(|after| after <= 0.05),
+            "{component}: {event} after {noticed:?} s\n{}",
+            live.story(t)
+        );
         assert!(live.first("safe_hold.ok", t).is_some_and(|at| at - t <= 0.055), "{component}\n{}", live.story(t));
         let rows = live.rows();
         let (step, at) = jolt(&rows);

@@ -101,6 +101,9 @@ const LOOKS: [(&str, &str); 7] = [
     ("youbot.odometry", "base"),
 ];
 
+/// What the hand does as shipped.
+const SHIPPED_HAND: &str = "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15";
+
 /// `text` with `new` put behind `old`, which stands in it once.
 fn behind(text: &str, old: &str, new: &str) -> String {
     assert_eq!(text.matches(old).count(), 1, "{old}");
@@ -112,7 +115,8 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/youbot/configurations.lua");
     let text = std::fs::read_to_string(shipped).unwrap();
     let each = |verb: &str| LOOKS.map(|(from, to)| format!("\n{verb}(\"{from}\", \"Probe.{to}\"),")).concat();
-    let created = format!("\ncreate(\"Probe\", \"test.Probe\", {{ activity = \"control\", properties = {{ id = {id} }} }}),");
+    let created =
+        format!("\ncreate(\"Probe\", \"test.Probe\", {{ activity = \"control\", properties = {{ id = {id} }} }}),");
     let text = behind(&text, "create_core = Configuration { description = \"the control loop\",", &created);
     let text = behind(&text, "\n  connect_all = Configuration {", &each("connect"));
     let text = behind(&text, "disconnect_all = Configuration {", &each("disconnect"));
@@ -177,6 +181,14 @@ impl Live {
         Self { clock, session, happened, id, _guard: guard }
     }
 
+    /// The same, with another hand on the tool than the shipped one.
+    pub fn with_hand(name: &str, script: &str) -> Self {
+        Self::with(name, |text| {
+            assert_eq!(text.matches(SHIPPED_HAND).count(), 1);
+            text.replace(SHIPPED_HAND, script)
+        })
+    }
+
     /// Brought up.
     pub fn up(name: &str) -> Self {
         let live = Self::new(name);
@@ -211,7 +223,12 @@ impl Live {
     pub fn until(&self, what: &str, within: f64, so: impl Fn(&Self) -> bool) {
         let deadline = self.now() + within;
         while !so(self) {
-            assert!(self.now() < deadline, "not {what} within {within} s: {}\n{}", self.place(), self.story(deadline - within));
+            assert!(
+                self.now() < deadline,
+                "not {what} within {within} s: {}\n{}",
+                self.place(),
+                self.story(deadline - within)
+            );
             self.run(0.001);
         }
     }

@@ -2,19 +2,6 @@
 
 use crate::live::{Live, Row};
 
-const SHIPPED: &str = "\"free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15\"";
-
-/// Up, with a hand that does something else.
-fn up_with(name: &str, hand: &str) -> Live {
-    let live = Live::with(name, |text| {
-        assert_eq!(text.matches(SHIPPED).count(), 1);
-        text.replace(SHIPPED, &format!("\"{hand}\""))
-    });
-    live.bring_up();
-    live.until_state("copying", 10.0);
-    live
-}
-
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (n, sum) = values.fold((0_u32, 0.0), |(n, sum), v| (n + 1, sum + v * v));
     (sum / f64::from(n.max(1))).sqrt()
@@ -67,7 +54,9 @@ fn a_minute_as_shipped_scoped() {
 /// Nobody touches it; 42 mm to and fro in both directions for a minute; 40 cm away and back.
 fn acceptance(name: &str) {
     let script = "free 0.5; align 4; free 20; sway 60 0.042 0.042 0 0.15; go 8 0.283 0.283 0; hold 4; go 8 -0.283 -0.283 0; hold 4";
-    let live = up_with(name, script);
+    let live = Live::with_hand(name, script);
+    live.bring_up();
+    live.until_state("copying", 10.0);
     // The hand's time runs from when the drives take torques.
     let up = live.first("in root.operational.unsync", 0.0).expect("up");
     copies(&live, up + 24.4 - live.now());

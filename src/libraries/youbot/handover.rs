@@ -74,7 +74,7 @@ mod tests {
             assert!((next - last).amax() <= 0.2 + 1e-9, "{last} {next}");
             (last, updates) = (next, updates + 1);
         }
-        assert_eq!(updates, 50);
+        assert!((50..=51).contains(&updates), "{updates} ms");
     }
 
     #[test]

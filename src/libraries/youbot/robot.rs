@@ -69,8 +69,7 @@ impl Robot {
         self.force = out.force;
         self.raw_norm = out.raw_norm;
         let coupled = Coupled { force: out.force, engaged: out.engaged };
-        let law =
-            self.dynamics.update(&self.arm.q, &self.arm.qd, &self.tool.jacobian, Some(&coupled), CONTROL_PERIOD);
+        let law = self.dynamics.update(&self.arm.q, &self.arm.qd, &self.tool.jacobian, Some(&coupled), CONTROL_PERIOD);
         self.saturated = law.saturated;
         if self.ticks.is_multiple_of(BASE_DIVISION) {
             #[allow(clippy::cast_precision_loss)]
