@@ -36,6 +36,7 @@ ConfiguratorConf {
     connect("Arm_Kinematics.tool_twist",     "Cart_Impedance.tool_twist"),
     connect("Link_Rx.ext_ref",               "Cart_Impedance.ext_ref"),
     connect("Cart_Impedance.f_des",          "Dynamics.f_des"),
+    connect("Cart_Impedance.engaged",        "Dynamics.engaged"),
     connect("youbot.jointstate",             "Dynamics.jointstate"),
     connect("youbot.odometry",               "Dynamics.odometry"),
     connect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
@@ -56,6 +57,8 @@ ConfiguratorConf {
     connect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     connect("youbot.control_mode",           "Operator.control_mode"),
     connect("Operator.ext_force",            "youbot.ext_force"),
+    -- who watches is watched
+    connect("Monitors.is_near",              "youbot.watched"),
     -- record
     connect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
     connect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
@@ -73,6 +76,7 @@ ConfiguratorConf {
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
     property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15"),
     property_set("Peer.delay",                   0.005),
+    property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
     post_conf_state = { "_default:configured" },
   },
 
@@ -121,7 +125,8 @@ ConfiguratorConf {
 
   -- Faults -----------------------------------------------------------------------------------------------------------
 
-  safe_hold = Configuration { safe = true, description = "no coupling, no base; the arm stays up, compensating gravity",
+  safe_hold = Configuration { safe = true, description = "the drives brake and hold the arm; no coupling, no base",
+    operation_call("youbot.brake"),
     port_write("Cart_Impedance.ext_ref_mode", false),
     property_set("Dynamics.force_gain", { 0, 0, 0 }),
     property_set("Base_Ctrl.enabled", false),
@@ -166,6 +171,7 @@ ConfiguratorConf {
     disconnect("Arm_Kinematics.tool_twist",     "Cart_Impedance.tool_twist"),
     disconnect("Link_Rx.ext_ref",               "Cart_Impedance.ext_ref"),
     disconnect("Cart_Impedance.f_des",          "Dynamics.f_des"),
+    disconnect("Cart_Impedance.engaged",        "Dynamics.engaged"),
     disconnect("youbot.jointstate",             "Dynamics.jointstate"),
     disconnect("youbot.odometry",               "Dynamics.odometry"),
     disconnect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
@@ -184,6 +190,7 @@ ConfiguratorConf {
     disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     disconnect("youbot.control_mode",           "Operator.control_mode"),
     disconnect("Operator.ext_force",            "youbot.ext_force"),
+    disconnect("Monitors.is_near",              "youbot.watched"),
     disconnect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
     disconnect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
     disconnect("youbot.jointstate",             "Reporter.jointstate"),

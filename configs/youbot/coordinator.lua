@@ -5,6 +5,50 @@
 -- here is said by the deployment's configurations, and the same file coordinates another platform over other ones
 -- (deployments/generic_arm.yaml). In an rFSM statechart the outer state's transition wins over the inner one's.
 
+-- These stop the robot wherever its drives have power: it brakes, and nothing moves until it is asked for.
+local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e_EC_TIMEOUT", "e_ENCODER_ERR",
+                "e_overspeed", "e_base_overspeed" }
+
+-- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop that comes while
+-- `safe_hold` is undone applies it again when that is answered. `more`: what is particular to a place.
+local function stopped(more)
+  local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
+  local all = {
+    braking = state { entry = "safe_hold",
+      staying = state {},
+      leaving = state {},
+      trans { src = "initial", tgt = "staying" },
+      trans { src = "staying", tgt = "leaving", events = { "e_shutdown" } },
+    },
+    waiting   = state {},
+    releasing = state { entry = "safe_hold.undo",
+      on              = state {},
+      leaving         = state {},
+      stopped         = state {},
+      stopped_leaving = state {},
+      trans { src = "initial", tgt = "on" },
+      trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
+      trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
+      trans { src = "on",      tgt = "stopped",         events = STOPS },
+      trans { src = "leaving", tgt = "stopped_leaving", events = STOPS },
+    },
+    trans { src = "initial",                    tgt = "braking" },
+    trans { src = ".braking.staying",           tgt = "waiting",            events = braked },
+    trans { src = ".braking.leaving",           tgt = ".releasing.leaving", events = braked },
+    trans { src = "waiting",                    tgt = ".releasing.leaving", events = { "e_shutdown" } },
+    trans { src = ".releasing.stopped",         tgt = "braking",            events = { "safe_hold.undone" } },
+    trans { src = ".releasing.stopped_leaving", tgt = ".braking.leaving",   events = { "safe_hold.undone" } },
+    trans { src = "releasing", tgt = "waiting", events = { "safe_hold.undo.failed", "safe_hold.undo.broken" } },
+  }
+  for name, particular in pairs(more) do
+    if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
+  end
+  return state(all)
+end
+
+-- What ends copying without being a fault.
+local PARTS = { "e_misaligned", "e_peer_left", "e_torque_sat", "e_JNT_SOFT_LIMIT_EXEEDED", "enable_copying.failed" }
+
 return state {
 
   idle = state {},
@@ -69,18 +113,30 @@ return state {
 
   operational = state {
 
-    -- The other robot is not heard.
-    unsync = state {},
+    -- The other robot is not heard. What the operator chose is kept, here and in `harmonizing`.
+    unsync = state {
+      for_eight = state {},
+      for_five  = state {},
+      trans { src = "initial",   tgt = "for_eight" },
+      trans { src = "for_eight", tgt = "for_five",  events = { "e_5dof" } },
+      trans { src = "for_five",  tgt = "for_eight", events = { "e_8dof" } },
+    },
 
     sync = state {
 
       -- Both robots are heard; the hands bring the arms together. The desired force is computed, not put out.
       harmonizing = state { entry = "five_DOF",
-        good     = state {},
-        degraded = state {},
-        trans { src = "initial",  tgt = "good" },
-        trans { src = "good",     tgt = "degraded", events = { "e_qos_degraded" } },
-        trans { src = "degraded", tgt = "good",     events = { "e_qos_restored" } },
+        for_eight = state {
+          good     = state {},
+          degraded = state {},
+          trans { src = "initial",  tgt = "good" },
+          trans { src = "good",     tgt = "degraded", events = { "e_qos_degraded" } },
+          trans { src = "degraded", tgt = "good",     events = { "e_qos_restored" } },
+        },
+        for_five  = state {},
+        trans { src = "initial",   tgt = "for_eight" },
+        trans { src = "for_eight", tgt = "for_five",  events = { "e_5dof" } },
+        trans { src = "for_five",  tgt = "for_eight", events = { "e_8dof" } },
       },
 
       copying = state { entry = "enable_copying", exit = "disable_copying",
@@ -98,45 +154,60 @@ return state {
         trans { src = ".five_DOF_mode.free", tgt = "eight_DOF_mode", events = { "e_8dof" } },
       },
 
-      trans { src = "initial",              tgt = "harmonizing" },
-      trans { src = ".harmonizing.good",     tgt = "copying", events = { "e_aligned" } },
-      trans { src = ".harmonizing.degraded", tgt = ".copying.five_DOF_mode.degraded", events = { "e_aligned" } },
-      trans { src = "copying",              tgt = "harmonizing",
-              events = { "e_misaligned", "e_peer_left", "e_torque_sat", "e_JNT_SOFT_LIMIT_EXEEDED",
-                         "enable_copying.failed" } },
+      trans { src = "initial",                         tgt = "harmonizing" },
+      trans { src = ".harmonizing.for_eight.good",     tgt = "copying", events = { "e_aligned" } },
+      trans { src = ".harmonizing.for_five",           tgt = ".copying.five_DOF_mode", events = { "e_aligned" } },
+      trans { src = ".harmonizing.for_eight.degraded", tgt = ".copying.five_DOF_mode.degraded", events = { "e_aligned" } },
+      trans { src = ".copying.eight_DOF_mode",         tgt = ".harmonizing.for_eight", events = PARTS },
+      trans { src = ".copying.five_DOF_mode",          tgt = ".harmonizing.for_five",  events = PARTS },
     },
 
     -- Somebody pushed hard. Nothing couples and the base stands until the operator says so.
     soft_stop = state { entry = "base_stop" },
 
     trans { src = "initial",   tgt = "unsync" },
-    trans { src = "unsync",    tgt = "sync",      events = { "e_qos_ok" } },
-    trans { src = "sync",      tgt = "unsync",    events = { "e_link_lost" } },
+    trans { src = ".unsync.for_eight",            tgt = "sync",                       events = { "e_qos_ok" } },
+    trans { src = ".unsync.for_five",             tgt = ".sync.harmonizing.for_five", events = { "e_qos_ok" } },
+    trans { src = ".sync.harmonizing.for_eight",  tgt = ".unsync.for_eight", events = { "e_link_lost" } },
+    trans { src = ".sync.harmonizing.for_five",   tgt = ".unsync.for_five",  events = { "e_link_lost" } },
+    trans { src = ".sync.copying.eight_DOF_mode", tgt = ".unsync.for_eight", events = { "e_link_lost" } },
+    trans { src = ".sync.copying.five_DOF_mode",  tgt = ".unsync.for_five",  events = { "e_link_lost" } },
     trans { src = ".sync.copying", tgt = "soft_stop", events = { "e_force_spike" } },
     trans { src = "soft_stop", tgt = "unsync",    events = { "e_reset" } },
   },
 
-  fault = state {
-    holding   = state { entry = "safe_hold" },
-    waiting   = state {},
+  -- Stopped in operation. What took torques takes them again when it is released, and nothing couples before the arms are
+  -- aligned again.
+  fault = stopped {
     clearing  = state { entry = "clear_faults" },
-    releasing = state { entry = "safe_hold.undo" },
+    losing    = state { entry = "safe_hold",
+      on      = state {},
+      leaving = state {},
+      trans { src = "initial", tgt = "on" },
+      trans { src = "on",      tgt = "leaving", events = { "e_shutdown" } },
+    },
+    repairing = state { entry = "restart_controller" },
+    trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
+    trans { src = "clearing",           tgt = "waiting",            events = STOPS },
+    trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
+    trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
+    trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
 
     -- The controller itself stopped: the same, then it is started again without asking anybody.
-    holding_controller = state { entry = "safe_hold" },
-    repairing          = state { entry = "restart_controller" },
-
-    trans { src = "initial",            tgt = "holding" },
-    trans { src = "holding",            tgt = "waiting",   events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
-    trans { src = "waiting",            tgt = "clearing",  events = { "e_reset" } },
-    trans { src = "clearing",           tgt = "releasing", events = { "clear_faults.ok" } },
-    trans { src = "clearing",           tgt = "waiting",   events = { "clear_faults.failed", "clear_faults.broken" } },
-    trans { src = "holding_controller", tgt = "repairing", events = { "safe_hold.ok" } },
-    trans { src = "holding_controller", tgt = "waiting",   events = { "safe_hold.failed", "safe_hold.broken" } },
-    trans { src = "repairing",          tgt = "releasing", events = { "restart_controller.ok" } },
-    trans { src = "repairing",          tgt = "waiting",   events = { "restart_controller.failed", "restart_controller.broken" } },
-    trans { src = "releasing",          tgt = "waiting",   events = { "safe_hold.undo.failed", "safe_hold.undo.broken" } },
+    trans { src = ".losing.on",         tgt = "repairing",          events = { "safe_hold.ok" } },
+    trans { src = ".losing.on",         tgt = "waiting",            events = { "safe_hold.failed", "safe_hold.broken" } },
+    trans { src = ".losing.leaving",    tgt = ".releasing.leaving",
+            events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
+    trans { src = "repairing",          tgt = "waiting",            events = STOPS },
+    trans { src = "repairing",          tgt = ".releasing.on",      events = { "restart_controller.ok" } },
+    trans { src = "repairing",          tgt = "waiting",
+            events = { "restart_controller.failed", "restart_controller.broken" } },
+    trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
   },
+
+  -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
+  halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
+  lowering = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
 
   -- The arm goes down before anything that holds it is stopped.
   shutting_down = state {
@@ -180,7 +251,7 @@ return state {
                      "load_properties.broken", "start_driver.broken", "calibrate.broken", "unfold.broken",
                      "start_control.broken", "take_over.broken" } },
   trans { src = "deploying",     tgt = "cancelling", events = { "e_shutdown" } },
-  trans { src = "deploy_failed", tgt = "cancelling", events = { "e_shutdown" } },
+  trans { src = "deploy_failed", tgt = "cancelling", events = { "e_shutdown", "e_go_on" } },
   trans { src = "cancel_failed", tgt = "cancelling", events = { "e_shutdown" } },
   trans { src = "cancelling", tgt = "cancel_failed",
           events = { "take_over.undo.failed", "start_control.undo.failed", "unfold.undo.failed",
@@ -195,17 +266,31 @@ return state {
   trans { src = "deploying.taking_over",    tgt = "operational", events = { "take_over.ok" } },
 
   trans { src = "operational", tgt = "shutting_down", events = { "e_shutdown" } },
+  trans { src = "operational", tgt = "fault", events = STOPS },
   trans { src = "operational", tgt = "fault",
-          events = { "e_overspeed", "e_base_overspeed", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP",
-                     "e_EC_TIMEOUT", "e_ENCODER_ERR", "e_cmd_watchdog", "e_estop",
+          events = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost", "e_drives_let_go",
                      "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
                      "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "operational", tgt = "fault.holding_controller", events = { "e_controller_lost" } },
+  trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
   -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault", tgt = "fault.holding",
+  trans { src = "fault", tgt = "fault.braking",
           events = { "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "fault", tgt = "shutting_down", events = { "e_shutdown" } },
-  trans { src = "fault.releasing", tgt = "operational", events = { "safe_hold.undone" } },
+  trans { src = "fault.releasing.on",       tgt = "operational",   events = { "safe_hold.undone" } },
+  trans { src = "fault.releasing.leaving",  tgt = "shutting_down", events = { "safe_hold.undone" } },
+
+  trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
+  trans { src = "shutting_down.holding",      tgt = "lowering", events = STOPS },
+  trans { src = "shutting_down.parking",      tgt = "lowering", events = STOPS },
+  trans { src = "stranded.before_parking",    tgt = "lowering", events = STOPS },
+  trans { src = "lowering.releasing.on",      tgt = "stranded.before_parking", events = { "safe_hold.undone" } },
+  trans { src = "lowering.releasing.leaving", tgt = "shutting_down",           events = { "safe_hold.undone" } },
+
+  trans { src = "deploying",                tgt = "halted", events = STOPS },
+  trans { src = "deploy_failed",            tgt = "halted", events = STOPS },
+  trans { src = "cancelling",               tgt = "halted", events = STOPS },
+  trans { src = "cancel_failed",            tgt = "halted", events = STOPS },
+  trans { src = "halted.releasing.on",      tgt = "deploy_failed", events = { "safe_hold.undone" } },
+  trans { src = "halted.releasing.leaving", tgt = "cancelling",    events = { "safe_hold.undone" } },
 
   trans { src = "shutting_down", tgt = "stranded.before_parking",
           events = { "base_stop.failed", "hold.failed", "park.failed", "base_stop.broken", "hold.broken", "park.broken",
@@ -215,7 +300,7 @@ return state {
   trans { src = "shutting_down", tgt = "stranded.stopped", events = { "cleanup_all.failed", "cleanup_all.broken" } },
   trans { src = "shutting_down", tgt = "stranded.cleaned", events = { "disconnect_all.failed", "disconnect_all.broken" } },
   trans { src = "shutting_down", tgt = "stranded.unwired", events = { "destroy_all.failed", "destroy_all.broken" } },
-  trans { src = "stranded.before_parking", tgt = "shutting_down",              events = { "e_shutdown" } },
+  trans { src = "stranded.before_parking", tgt = "shutting_down",              events = { "e_shutdown", "e_go_on" } },
   trans { src = "stranded.parked",         tgt = "shutting_down.stopping",     events = { "e_shutdown" } },
   trans { src = "stranded.stopped",        tgt = "shutting_down.cleaning",     events = { "e_shutdown" } },
   trans { src = "stranded.cleaned",        tgt = "shutting_down.unwiring",     events = { "e_shutdown" } },

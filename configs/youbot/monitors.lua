@@ -4,6 +4,8 @@
 -- second: a coordinator that was elsewhere when it began still hears of it.
 
 local AGAIN = 0.5
+-- What writes at least every 4 ms and was not heard for so long has stopped; it is told within 50 ms.
+local DEAD = 0.04
 
 -- The link to the other robot ------------------------------------------------------------------------------------------
 
@@ -73,6 +75,13 @@ Monitors {
     when = above(max { "youbot.driver_state.pd_send_err", "youbot.driver_state.pd_recv_err" }, 100),
     event = "e_EC_TIMEOUT", repeat_every = AGAIN },
   controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard",
-    when = silent("Cart_Impedance.active", 0.05),
+    when = silent("Cart_Impedance.active", DEAD),
     event = "e_controller_lost", repeat_every = AGAIN },
+  control_lost = monitor { description = "another part of the control loop, which writes in every update, is not heard",
+    when = any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
+                 silent("Base_Ctrl.cmd_twist", DEAD) },
+    event = "e_control_lost", repeat_every = AGAIN },
+  -- Told once: where the drives are meant to hold by themselves nobody listens.
+  drives_let_go = monitor { description = "the drives do not take torques any more",
+    when = differs("youbot.control_mode", 6):for_at_least(0.01), event = "e_drives_let_go" },
 }

@@ -57,7 +57,7 @@ impl Default for Scenario {
             quality: Quality { delay: 0.005, ..Quality::default() },
             friction_comp: 0.9,
             force_gain: 0.0,
-            recenter: 1.0,
+            recenter: 5.0,
             script: "sway 60 0.042 0.042 0 0.15",
             seconds: 20.0,
             send_every: 4,
@@ -197,7 +197,7 @@ fn rate_and_loss_hardly_matter() {
 #[test]
 fn eight_degrees_of_freedom_follow_closer_while_the_link_is_quick() {
     let five = Scenario::default().run();
-    for (delay, rms) in [(0.005, 8.2), (0.02, 8.9)] {
+    for (delay, rms) in [(0.005, 5.9), (0.02, 6.3)] {
         let eight = Scenario { force_gain: 0.1, quality: at_delay(delay), ..Scenario::default() }.run();
         about(&format!("RMS at {delay} s, mm"), mm(eight.rms), rms);
         assert!(eight.rms < 0.5 * five.rms && eight.hand_rms <= 8.0, "{eight:?}");
@@ -205,7 +205,7 @@ fn eight_degrees_of_freedom_follow_closer_while_the_link_is_quick() {
     }
     let quick = Scenario { force_gain: 0.1, ..Scenario::default() }.run();
     let slow = Scenario { force_gain: 0.1, quality: at_delay(0.1), ..Scenario::default() }.run();
-    assert!(slow.hand_max > 1.5 * quick.hand_max, "{slow:?}");
+    assert!(slow.rms > 1.3 * quick.rms && slow.rms < 0.6 * five.rms, "{slow:?}");
 }
 
 /// Forty centimetres are more than an arm reaches without its base: the demonstration of why the mode exists.
@@ -214,7 +214,10 @@ fn forty_centimetres_need_the_base() {
     let script = "go 8 0.283 0.283 0; hold 4; go 8 -0.283 -0.283 0; hold 4";
     let five = Scenario { script, seconds: 24.0, ..Scenario::default() }.run();
     let eight = Scenario { script, seconds: 24.0, force_gain: 0.1, ..Scenario::default() }.run();
-    assert!(mm(eight.rms) <= 14.7 && eight.hand_max < 10.0 && eight.saturated == 0.0, "{eight:?}");
+    assert!(
+        mm(eight.rms) <= 14.7 && eight.hand_rms <= 8.0 && eight.hand_max < 15.0 && eight.saturated == 0.0,
+        "{eight:?}"
+    );
     assert!(five.worst > 4.0 * eight.worst && five.hand_max > 20.0, "{five:?}");
 }
 

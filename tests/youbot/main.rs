@@ -3,8 +3,11 @@
 mod bench;
 mod chatter;
 mod coupling;
+mod faults;
 mod files;
 mod golden;
+mod live;
+mod motion;
 mod robot;
 mod two;
 

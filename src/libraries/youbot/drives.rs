@@ -1,6 +1,7 @@
-//! The youBot's drives as its driver sees them: control modes, limits, watchdogs, calibration, folding.
+//! The youBot's drives as its driver sees them: control modes, limits, watchdogs, calibration, folding, braking.
 
 use super::base::Twist2;
+use super::handover::{Handover, slowed, within_speed};
 use super::parameters::{JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::{ArmPlant, BasePlant, joint_ranges};
 use super::rigid_body::{J5, radians};
@@ -124,9 +125,12 @@ pub struct Drives {
     pub parameters: DriveParameters,
     /// Torques applied in the last update, in N m.
     pub torque: J5,
+    handover: Handover,
     /// Whether outward torque is reduced near the limits.
     pub limit_safety: bool,
     mode: Mode,
+    /// They took torques before they braked.
+    resumes: bool,
     calibrated: bool,
     task: Task,
     target: J5,
@@ -144,8 +148,10 @@ impl Drives {
             base: BasePlant::default(),
             parameters: DriveParameters::default(),
             torque: J5::zeros(),
+            handover: Handover::default(),
             limit_safety: true,
             mode: Mode::MotorStop,
+            resumes: false,
             calibrated: false,
             task: Task::Idle,
             target,
@@ -181,19 +187,42 @@ impl Drives {
         if mode == Mode::Torque && !self.calibrated {
             return Err("not calibrated");
         }
-        if mode == Mode::Positioning && self.mode != Mode::Positioning {
-            self.hold();
+        if mode != self.mode {
+            match mode {
+                Mode::Positioning => self.hold(),
+                Mode::MotorStop | Mode::Torque => {
+                    self.mode = mode;
+                    self.handover.begin();
+                }
+            }
         }
-        self.mode = mode;
+        self.resumes = false;
         Ok(())
     }
 
-    /// Whatever is under way ends; the drives hold the arm where it is.
+    /// Takes back that the drives braked, whoever asked for that: they take torques again if they did before.
+    pub fn release(&mut self) {
+        if std::mem::take(&mut self.resumes) && !self.busy() {
+            self.mode = Mode::Torque;
+            self.handover.begin();
+        }
+    }
+
+    /// Whatever is under way ends: a quick stop, then the drives hold the arm where it came to rest. The base stands.
     pub fn hold(&mut self) {
         self.task = Task::Idle;
         self.target = self.arm.q;
-        self.target_speed = J5::zeros();
+        self.target_speed = self.arm.qd;
+        self.resumes |= self.mode == Mode::Torque;
         self.mode = Mode::Positioning;
+        self.handover.begin();
+    }
+
+    /// The same while the drives have torque; drives that are off stay off: the arm is on its stops, or sinks onto them.
+    pub fn brake(&mut self) {
+        if self.mode != Mode::MotorStop {
+            self.hold();
+        }
     }
 
     /// Looks for the stops of joints 2 to 4; ends resting on them, drives off.
@@ -208,6 +237,7 @@ impl Drives {
             return Err("the drives take torques: set mode 0 or 1 first");
         }
         self.hold();
+        self.resumes = false;
         self.calibrated = false;
         self.task = Task::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
         Ok(())
@@ -240,6 +270,7 @@ impl Drives {
             return Err("not calibrated");
         }
         self.hold();
+        self.resumes = false;
         let from = self.arm.q;
         // A quintic's peak speed is 15/8 of its mean.
         let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
@@ -258,9 +289,10 @@ impl Drives {
     ) {
         self.advance_task(dt, report);
         let command = match twist {
+            // The base is heard while torques are: whoever stops the arm stops the base.
             Some((twist, age)) if age <= self.parameters.base_timeout => {
                 self.base_watched = true;
-                twist
+                if self.mode == Mode::Torque { twist } else { Twist2::default() }
             }
             _ => {
                 if std::mem::take(&mut self.base_watched) {
@@ -278,18 +310,26 @@ impl Drives {
             (Mode::Positioning, _) => self.position_control(),
             (Mode::MotorStop | Mode::Torque, _) => J5::zeros(),
         };
+        torque = self.handover.over(&torque, &self.torque, dt);
+        if self.mode == Mode::Torque {
+            torque = within_speed(&torque, &self.arm.qd, &self.parameters.tau_max);
+        }
         for i in 0..JOINTS {
             torque[i] = torque[i].clamp(-self.parameters.tau_max[i], self.parameters.tau_max[i]);
         }
         self.torque = torque;
-        let braked = self.mode == Mode::MotorStop;
+        // Windings are shorted when no torque is left.
+        let braked = self.mode == Mode::MotorStop && self.torque == J5::zeros();
         advance(&mut self.arm, &mut self.base, &torque, command, push, braked, dt);
         self.watch_limits(report);
     }
 
     fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(Happening)) {
         match &mut self.task {
-            Task::Idle => {}
+            Task::Idle => {
+                self.target_speed = slowed(&self.target_speed, dt);
+                self.target += self.target_speed * dt;
+            }
             Task::Moving { from, to, elapsed, duration } => {
                 *elapsed += dt;
                 let s = (*elapsed / *duration).min(1.0);
@@ -325,6 +365,7 @@ impl Drives {
                     self.task = Task::Idle;
                     let found = (1..4).all(|i| self.is_at_stop(i));
                     self.mode = if found { Mode::MotorStop } else { Mode::Positioning };
+                    self.handover.begin();
                     self.calibrated = found;
                     report(if found { Happening::Calibrated } else { Happening::CalibrationFailed });
                 } else if *elapsed > CALIBRATION_TIME {
@@ -388,6 +429,7 @@ impl Drives {
         self.task = Task::Idle;
         self.mode = Mode::MotorStop;
         self.torque = J5::zeros();
+        self.handover = Handover::default();
         let before = self.arm.posture().tool.z;
         for _ in 0..1000 {
             advance(
@@ -406,77 +448,4 @@ impl Drives {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::rigid_body::ArmModel;
-    use super::*;
-
-    fn run(drives: &mut Drives, seconds: f64) -> Vec<Happening> {
-        let mut seen = Vec::new();
-        for _ in 0..(seconds * 1000.0) as usize {
-            drives.update(None, None, &Vector3::zeros(), 0.001, &mut |h| seen.push(h));
-        }
-        seen
-    }
-
-    fn parked() -> Drives {
-        Drives::new(ArmPlant::new(ArmModel::youbot(0.219, 1.0), radians([0.0, -60.0, 140.0, -98.0, 0.0])))
-    }
-
-    #[test]
-    fn calibrate_unfold_fold_and_rest() {
-        let mut drives = parked();
-        assert!(drives.unfold().is_err() && drives.set_mode(Mode::Torque).is_err());
-        drives.calibrate().unwrap();
-        assert!(drives.calibrate().is_err() && drives.set_mode(Mode::MotorStop).is_err());
-        let seen = run(&mut drives, 3.0);
-        assert!(seen.contains(&Happening::Calibrated), "{seen:?} {}", drives.arm.q);
-        let rested = drives.arm.posture().tool;
-        run(&mut drives, 1.0);
-        assert!((drives.arm.posture().tool - rested).norm() < 0.005);
-
-        drives.unfold().unwrap();
-        let seen = run(&mut drives, 6.0);
-        assert!(seen.contains(&Happening::Arrived) && seen.contains(&Happening::SoftLimitExit), "{seen:?}");
-        assert!((drives.arm.q - radians(WORKING_POSE_DEG)).norm() < 0.01, "{}", drives.arm.q);
-        drives.fold().unwrap();
-        run(&mut drives, 6.0);
-        assert!(drives.switch_off() < 0.02);
-    }
-
-    #[test]
-    fn unparked_it_falls_and_without_commands_it_holds() {
-        let mut drives = parked();
-        drives.calibrate().unwrap();
-        run(&mut drives, 3.0);
-        drives.unfold().unwrap();
-        run(&mut drives, 6.0);
-        let at = drives.arm.q;
-        drives.set_mode(Mode::Torque).unwrap();
-        let seen = run(&mut drives, 1.0);
-        assert_eq!(seen, [Happening::CommandWatchdog]);
-        assert!((drives.arm.q - at).norm() < 0.01 && drives.mode() == Mode::Positioning);
-        assert!(drives.switch_off() > 0.03);
-    }
-
-    #[test]
-    fn a_motion_that_is_held_up_fails_and_the_arm_stays() {
-        let mut drives = parked();
-        drives.calibrate().unwrap();
-        run(&mut drives, 3.0);
-        drives.arm.friction_scale = 1e6;
-        drives.unfold().unwrap();
-        assert!(run(&mut drives, 10.0).contains(&Happening::MotionFailed));
-        assert!(drives.mode() == Mode::Positioning && !drives.busy());
-    }
-
-    #[test]
-    fn something_in_the_way_is_no_stop() {
-        let mut drives = parked();
-        drives.arm.q = radians([0.0, 0.0, 60.0, 0.0, 0.0]);
-        // So heavy a friction that the joints do not move is taken for a stop, and refused as one.
-        drives.arm.friction_scale = 1e6;
-        drives.calibrate().unwrap();
-        assert_eq!(run(&mut drives, 10.0), [Happening::CalibrationFailed]);
-        assert!(!drives.calibrated());
-    }
-}
+mod tests;

@@ -1,10 +1,11 @@
 //! From the wanted tool force to joint torques and a motion of the base.
 
 use super::base::Twist2;
+use super::handover::TORQUE_SLEW;
 use super::parameters::{COULOMB, FRICTION_SLOPE, JOINTS, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::joint_ranges;
 use super::rigid_body::{ArmModel, J5, Jacobian, Posture, radians};
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Cholesky, Const, Matrix3, SMatrix, Vector3};
 
 /// Tool velocity in the world per base twist (in the base's frame) and joint speed: 3×8.
 pub type Jacobian8 = SMatrix<f64, 3, 8>;
@@ -42,7 +43,7 @@ impl Default for DynamicsParameters {
             friction_comp: 0.9,
             posture_stiffness: 8.0,
             posture_damping: 3.0,
-            recenter_gain: 1.0,
+            recenter_gain: 5.0,
             r_nominal: [0.26, 0.0],
             soft_limit_k: 80.0,
             posture: radians(WORKING_POSE_DEG),
@@ -55,8 +56,11 @@ impl Default for DynamicsParameters {
 const WORKING_RANGE: f64 = 0.95;
 /// Damping of the operational-space inverse near singular poses, in 1/kg.
 const SINGULARITY_DAMPING: f64 = 1e-4;
-/// Time in which the posture control comes in after engaging, in s.
-const POSTURE_RAMP: f64 = 0.3;
+
+/// Speed of recentring from which the arm's counter-motion is helped with all of the friction compensation, in m/s.
+const COUNTER_SPEED: f64 = 0.01;
+/// Joint speed by which the counter-motion may be wrong before all of the friction compensation corrects it, in rad/s.
+const COUNTER_SLOPE: f64 = 0.03;
 
 /// The law with its memory.
 #[derive(Debug, Clone)]
@@ -65,7 +69,17 @@ pub struct Dynamics {
     pub model: ArmModel,
     /// Its parameters.
     pub parameters: DynamicsParameters,
-    engaged: f64,
+    /// Torque of the coupling (force and posture), in N m: whoever stops asking for it suddenly, it goes along a ramp.
+    coupling: J5,
+}
+
+/// What the coupling wants of the law.
+#[derive(Debug, Clone, Copy)]
+pub struct Coupled {
+    /// On the tool, in the world, in N.
+    pub force: Vector3<f64>,
+    /// How much of the coupling is in force, 0 to 1: that much of the posture control and of the base's motion.
+    pub engaged: f64,
 }
 
 /// What the law answers.
@@ -91,20 +105,38 @@ pub fn soft_limits(q: &J5, stiffness: f64) -> J5 {
     out
 }
 
+/// The arm as its tool feels it.
+struct ToolSpace {
+    /// Tool velocity in the world per joint speed.
+    arm: Jacobian,
+    mass: Cholesky<f64, Const<JOINTS>>,
+    /// Of the inverse of the tool's apparent mass.
+    inertia: Cholesky<f64, Const<3>>,
+}
+
+impl ToolSpace {
+    /// None: the masses given are not those of a body.
+    fn of(model: &ArmModel, at: &Posture, arm: &Jacobian) -> Option<Self> {
+        let mass = model.mass_matrix_with_drives(at).cholesky()?;
+        let mobility = arm * mass.solve(&arm.transpose()) + Matrix3::identity() * SINGULARITY_DAMPING;
+        Some(Self { arm: *arm, mass, inertia: mobility.cholesky()? })
+    }
+}
+
 impl Dynamics {
     /// A law for an arm.
     pub fn new(model: ArmModel) -> Self {
-        Self { model, parameters: DynamicsParameters::default(), engaged: 0.0 }
+        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros() }
     }
 
-    /// One step of `dt` seconds. `force` is the force wanted on the tool, in the world frame; none: it is stale or
-    /// uncoupled, and only gravity and friction are compensated.
+    /// One step of `dt` seconds. `coupled`: what the coupling wants; none: nothing, or it is not known any more, and only
+    /// gravity and friction are compensated.
     pub fn update(
         &mut self,
         q: &J5,
         qd: &J5,
         jacobian: &Jacobian8,
-        force: Option<&Vector3<f64>>,
+        coupled: Option<&Coupled>,
         dt: f64,
     ) -> DynamicsOutput {
         let p = &self.parameters;
@@ -113,24 +145,32 @@ impl Dynamics {
         for i in 0..JOINTS {
             torque[i] += p.friction_comp * COULOMB[i] * (qd[i] / FRICTION_SLOPE).tanh();
         }
-        // Exactly zero is what the impedance controller puts out when it does not couple.
-        let coupled = force.filter(|f| f.norm_squared() > 0.0);
-        let to = if coupled.is_some() { dt / POSTURE_RAMP } else { -dt / POSTURE_RAMP };
-        self.engaged = (self.engaged + to).clamp(0.0, 1.0);
-        let mut twist = Twist2::default();
-        if let Some(force) = coupled {
+        let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
+        if let Some(Coupled { force, engaged }) = coupled.filter(|coupled| coupled.engaged > 0.0) {
             let arm: Jacobian = jacobian.fixed_columns::<JOINTS>(3).into_owned();
-            torque += arm.tr_mul(force);
-            torque += self.posture_torque(&at, &arm, q, qd) * self.engaged;
+            coupling = arm.tr_mul(force);
+            let tool = ToolSpace::of(&self.model, &at, &arm);
+            if let Some(tool) = &tool {
+                coupling += self.posture_torque(tool, q, qd) * *engaged;
+            }
             if p.force_gain.iter().any(|g| *g > 0.0) {
-                let wrench = jacobian.fixed_columns::<3>(0).tr_mul(force);
+                let base = jacobian.fixed_columns::<3>(0);
+                let wrench = base.tr_mul(force);
+                let off = Vector3::new(at.tool.x - p.r_nominal[0], at.tool.y - p.r_nominal[1], 0.0);
+                let home = off * (p.recenter_gain * engaged);
                 twist = Twist2 {
-                    vx: p.force_gain.x * wrench.x + p.recenter_gain * (at.tool.x - p.r_nominal[0]),
-                    vy: p.force_gain.y * wrench.y + p.recenter_gain * (at.tool.y - p.r_nominal[1]),
+                    vx: p.force_gain.x * wrench.x + home.x,
+                    vy: p.force_gain.y * wrench.y + home.y,
                     wz: p.force_gain.z * wrench.z,
                 };
+                if let Some(tool) = &tool {
+                    coupling += self.counter_torque(tool, &(base * home), qd) * *engaged;
+                }
             }
         }
+        let most = TORQUE_SLEW * dt;
+        self.coupling += (coupling - self.coupling).map(|step| step.clamp(-most, most));
+        torque += self.coupling;
         let mut saturated = 0;
         for i in 0..JOINTS {
             let most = p.tau_max[i];
@@ -143,18 +183,24 @@ impl Dynamics {
     }
 
     /// Torque towards the nominal posture, in the null space of the tool's position.
-    fn posture_torque(&self, at: &Posture, arm: &Jacobian, q: &J5, qd: &J5) -> J5 {
+    fn posture_torque(&self, tool: &ToolSpace, q: &J5, qd: &J5) -> J5 {
         let p = &self.parameters;
         let wish = (p.posture - q) * p.posture_stiffness - qd * p.posture_damping;
-        let Some(mass) = self.model.mass_matrix_with_drives(at).cholesky() else { return J5::zeros() };
-        let mobility = arm * mass.solve(&arm.transpose()) + Matrix3::identity() * SINGULARITY_DAMPING;
-        let Some(inertia) = mobility.cholesky() else { return J5::zeros() };
-        wish - arm.tr_mul(&inertia.solve(&(arm * mass.solve(&wish))))
+        wish - tool.arm.tr_mul(&tool.inertia.solve(&(tool.arm * tool.mass.solve(&wish))))
+    }
+
+    /// Torque that lets the tool stay behind while the base goes `home` (m/s, in the world): without it the arm's friction
+    /// carries the tool along, the base never gets there, and drives on with nobody touching anything. It is friction
+    /// compensation, about the joint speeds that leave the tool where it is.
+    fn counter_torque(&self, tool: &ToolSpace, home: &Vector3<f64>, qd: &J5) -> J5 {
+        let speeds = -tool.mass.solve(&tool.arm.tr_mul(&tool.inertia.solve(home)));
+        let share = self.parameters.friction_comp * (home.norm() / COUNTER_SPEED).min(1.0);
+        J5::from_fn(|i, _| share * COULOMB[i] * ((speeds[i] - qd[i]) / COUNTER_SLOPE).tanh())
     }
 
     /// Forgets the past.
     pub fn reset(&mut self) {
-        self.engaged = 0.0;
+        self.coupling = J5::zeros();
     }
 }
 
@@ -204,7 +250,7 @@ mod tests {
         let q = radians([10.0, -20.0, 90.0, 50.0, 20.0]);
         let at = model.posture(&q);
         let arm = at.jacobian();
-        let torque = law.posture_torque(&at, &arm, &q, &J5::zeros());
+        let torque = law.posture_torque(&ToolSpace::of(&model, &at, &arm).unwrap(), &q, &J5::zeros());
         assert!(torque.norm() > 0.1);
         let acc = arm * model.mass_matrix_with_drives(&at).cholesky().unwrap().solve(&torque);
         assert!(acc.norm() < 0.01, "{acc}");
@@ -217,13 +263,38 @@ mod tests {
         law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
         let q = radians([0.0, -30.0, 100.0, 60.0, 0.0]);
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
-        for force in [None, Some(Vector3::zeros())] {
-            let out = law.update(&q, &J5::zeros(), &tool.jacobian, force.as_ref(), 0.001);
+        let pull = Coupled { force: Vector3::new(2.0, 0.0, 0.0), engaged: 1.0 };
+        for coupled in [None, Some(Coupled { engaged: 0.0, ..pull })] {
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian, coupled.as_ref(), 0.001);
             assert_eq!(out.torque, model.gravity(&model.posture(&q)));
             assert_eq!(out.twist, Twist2::default());
         }
-        let out = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&Vector3::new(2.0, 0.0, 0.0)), 0.001);
+        law.parameters.r_nominal = [at_tool(&model, &q).x, at_tool(&model, &q).y];
+        let out = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&pull), 0.001);
         assert!((out.twist.vx - 0.2).abs() < 2e-3, "{:?}", out.twist);
+    }
+
+    fn at_tool(model: &ArmModel, q: &J5) -> Vector3<f64> {
+        model.posture(q).tool
+    }
+
+    #[test]
+    fn what_coupled_and_died_is_let_go_of_along_a_ramp() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let mut law = Dynamics::new(model.clone());
+        let q = radians([20.0, -10.0, 80.0, 50.0, 10.0]);
+        let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
+        let alone = model.gravity(&model.posture(&q));
+        let pull = Coupled { force: Vector3::new(6.0, -8.0, 0.0), engaged: 1.0 };
+        let (mut last, mut most) = (alone, 0.0_f64);
+        for tick in 0..400 {
+            let coupled = (tick < 200).then_some(&pull);
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian, coupled, 0.001);
+            assert!((out.torque - last).amax() <= 0.2 + 1e-9);
+            last = out.torque;
+            most = most.max((last - alone).amax());
+        }
+        assert!(most > 1.5 && last == alone, "{most} {last}");
     }
 
     #[test]

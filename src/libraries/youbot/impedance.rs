@@ -46,8 +46,10 @@ impl Default for ImpedanceParameters {
     }
 }
 
-/// Time in which the force fades when the reference is stale, in s.
+/// Time in which the coupling lets go, asked to or because the reference is stale, in s.
 pub const FADE: f64 = 0.1;
+/// Time in which it takes hold, in s.
+pub const ENGAGE: f64 = 0.3;
 
 /// The law with its memory.
 #[derive(Debug, Clone, Default)]
@@ -56,19 +58,23 @@ pub struct Impedance {
     pub parameters: ImpedanceParameters,
     ramp: Vector3<f64>,
     trust: f64,
+    share: f64,
 }
 
 /// What the law answers.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImpedanceOutput {
-    /// The force to put on the tool, in N; zero unless coupled.
+    /// The force to put on the tool, in N; zero when let go of.
     pub force: Vector3<f64>,
+    /// How much of the coupling is in force: 0 let go of, 1 fully engaged. The force is of that share already.
+    pub engaged: f64,
     /// Norm of the force it would want, coupled or not, in N.
     pub raw_norm: f64,
 }
 
 impl Impedance {
-    /// One step of `dt` seconds. `coupled` is the port `ext_ref_mode`: false computes the wanted force and puts out none.
+    /// One step of `dt` seconds. `coupled` is the port `ext_ref_mode`: while it is false the wanted force is computed and, once
+    /// it has faded, none put out.
     ///
     /// Independent of any coordination the force fades within [`FADE`] when the reference is older than `ref_max_age`.
     pub fn update(
@@ -86,22 +92,25 @@ impl Impedance {
         let raw_norm = raw.norm();
         let fresh = reference.is_some_and(|r| r.age <= p.ref_max_age);
         self.trust = (self.trust + if fresh { dt / FADE } else { -dt / FADE }).clamp(0.0, 1.0);
-        if !coupled {
+        self.share = (self.share + if coupled { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
+        if self.share == 0.0 {
             self.ramp = Vector3::zeros();
-            return ImpedanceOutput { force: Vector3::zeros(), raw_norm };
+            return ImpedanceOutput { raw_norm, ..ImpedanceOutput::default() };
         }
         let wanted = if raw_norm > p.f_max { raw * (p.f_max / raw_norm) } else { raw };
         let step = wanted - self.ramp;
         let most = p.f_rate * dt;
         let length = step.norm();
         self.ramp += if length > most { step * (most / length) } else { step };
-        ImpedanceOutput { force: (self.ramp - velocity * p.damping_abs) * self.trust, raw_norm }
+        let engaged = self.share * self.trust;
+        ImpedanceOutput { force: (self.ramp - velocity * p.damping_abs) * engaged, engaged, raw_norm }
     }
 
     /// Forgets the past: the force starts from zero.
     pub fn reset(&mut self) {
         self.ramp = Vector3::zeros();
         self.trust = 0.0;
+        self.share = 0.0;
     }
 }
 
@@ -133,6 +142,24 @@ mod tests {
             last = f;
         }
         assert!((last - 10.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn it_takes_hold_and_lets_go_without_a_step() {
+        let mut law = Impedance::default();
+        // A moving tool: its damping comes in with the rest.
+        let fast = Vector3::new(0.0, 0.4, 0.0);
+        let mut last = ImpedanceOutput::default();
+        for tick in 0..1500 {
+            let out = law.update(&Vector3::zeros(), &fast, Some(&away(0.005)), (100..1000).contains(&tick), DT);
+            let step = (out.force - last.force).norm();
+            assert!(step < 0.15, "{step} N at {tick} ms");
+            assert!(out.engaged >= last.engaged || tick >= 1000);
+            last = out;
+            let whole = tick >= 100 + 300 && tick < 1000;
+            assert!((out.engaged > 0.999) == whole || tick == 399, "{} at {tick} ms", out.engaged);
+        }
+        assert_eq!((last.engaged, last.force), (0.0, Vector3::zeros()));
     }
 
     #[test]

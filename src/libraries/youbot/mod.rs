@@ -5,6 +5,7 @@ pub mod components;
 pub mod drives;
 pub mod dynamics;
 pub mod hand;
+pub mod handover;
 pub mod impedance;
 pub mod kinematics;
 pub mod link;

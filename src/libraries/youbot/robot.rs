@@ -2,7 +2,7 @@
 //! is made of, and two of them make the coupling that the figures are measured on.
 
 use super::base::Twist2;
-use super::dynamics::{BaseLimits, Dynamics};
+use super::dynamics::{BaseLimits, Coupled, Dynamics};
 use super::impedance::{Impedance, Reference};
 use super::kinematics::Tool;
 use super::parameters::JOINTS;
@@ -68,8 +68,8 @@ impl Robot {
         let out = self.impedance.update(&self.tool.position, &self.tool.velocity, reference, coupled, CONTROL_PERIOD);
         self.force = out.force;
         self.raw_norm = out.raw_norm;
-        let law =
-            self.dynamics.update(&self.arm.q, &self.arm.qd, &self.tool.jacobian, Some(&out.force), CONTROL_PERIOD);
+        let coupled = Coupled { force: out.force, engaged: out.engaged };
+        let law = self.dynamics.update(&self.arm.q, &self.arm.qd, &self.tool.jacobian, Some(&coupled), CONTROL_PERIOD);
         self.saturated = law.saturated;
         if self.ticks.is_multiple_of(BASE_DIVISION) {
             #[allow(clippy::cast_precision_loss)]

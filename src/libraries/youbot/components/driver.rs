@@ -14,6 +14,8 @@ use nalgebra::Vector3;
 const DROP: f64 = 0.02;
 /// A push older than this has ended, in s.
 const PUSH_STALE: f64 = 0.05;
+/// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
+const UNWATCHED: f64 = 0.04;
 /// Heating per current squared and time constant of a motor, °C/A² and s (assumed).
 const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
@@ -39,6 +41,7 @@ struct Events {
     blocked: EventName,
     dropped: EventName,
     emergency: EventName,
+    unwatched: EventName,
     faults: [EventName; FAULTS.len()],
 }
 
@@ -48,6 +51,7 @@ pub struct Driver {
     cmd_twist: In<Twist>,
     gripper: In<i32>,
     ext_force: In<Vector3<f64>>,
+    watched: In<bool>,
     jointstate: Out<JointState>,
     odometry: Out<Odometry>,
     motor_states: Out<MotorStates>,
@@ -70,6 +74,7 @@ pub struct Driver {
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
+    unwatched: bool,
 }
 
 impl Component for Driver {
@@ -133,6 +138,19 @@ impl Component for Driver {
                 Answer::Done(())
             },
         );
+        b.doc("Whatever moves comes to rest along a ramp and is held there; the base stands.")
+            .undone_by("release")
+            .operation("brake", |c, _, (): ()| {
+                c.task = None;
+                c.drives.brake();
+                Answer::Done(())
+            });
+        b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
+            .undone_by("brake")
+            .operation("release", |c, _, (): ()| {
+                c.drives.release();
+                Answer::Done(())
+            });
         b.doc("Whether torques are passed on also near the joints' limits.").operation(
             "disable_jntlim_safety",
             |c, _, (off,): (bool,)| {
@@ -143,9 +161,12 @@ impl Component for Driver {
         let p = DriveParameters::default();
         Self {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
-            cmd_twist: b.doc("Motion of the base, in its frame.").input("cmd_twist"),
+            cmd_twist: b.doc("Motion of the base, in its frame, heard in mode 6.").input("cmd_twist"),
             gripper: b.doc("1 opens, 0 closes the gripper.").input("gripper_cmd"),
             ext_force: b.doc("What pushes the tool in the simulation, in the world.").unit("N").input("ext_force"),
+            watched: b
+                .doc("Whatever whoever watches the robot writes. Silent for 40 ms in mode 6: e_watch_lost.")
+                .input("watched"),
             jointstate: b.doc("What the joints measure.").output("jointstate"),
             odometry: b.doc("Where the base is.").output("odometry"),
             motor_states: b.doc("How the motors are.").output("motor_states"),
@@ -208,6 +229,7 @@ impl Component for Driver {
                 blocked: b.event("e_motion_blocked"),
                 dropped: b.event("e_arm_dropped"),
                 emergency: b.event("e_EMERGENCY_STOP"),
+                unwatched: b.event("e_watch_lost"),
                 faults: FAULTS.map(|(_, event, _)| b.event(event)),
             },
             drives: Drives::new(ArmPlant::new(ArmModel::youbot(GRIPPER.mass, 1.0), radians(PARK_POSE_DEG))),
@@ -215,6 +237,7 @@ impl Component for Driver {
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
+            unwatched: false,
         }
     }
 
@@ -264,6 +287,12 @@ impl Component for Driver {
                 }
             }
         });
+        let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
+        let unwatched = lost && self.drives.mode() == Mode::Torque;
+        if unwatched && !self.unwatched {
+            self.events.raise(self.names.unwatched);
+        }
+        self.unwatched = unwatched;
         self.publish(cx);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::aged;
 use super::samples::{JointState, Odometry, Twist, seconds_since};
-use crate::libraries::youbot::dynamics::{Dynamics, DynamicsParameters, Jacobian8};
+use crate::libraries::youbot::dynamics::{Coupled, Dynamics, DynamicsParameters, Jacobian8};
 use crate::libraries::youbot::parameters::GRIPPER;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5};
 use crate::model::Tunable;
@@ -15,6 +15,7 @@ const STALE: f64 = 0.02;
 /// The component.
 pub struct DynamicsComponent {
     f_des: In<Vector3<f64>>,
+    engaged: In<f64>,
     jointstate: In<JointState>,
     jacobian: In<[f64; 24]>,
     odometry: In<Odometry>,
@@ -39,7 +40,7 @@ impl Component for DynamicsComponent {
         let p = DynamicsParameters::default();
         b.describe(
             "Torques that carry the arm and put the wanted force on the tool; a twist that lets the base give way to it \
-             (force_gain). With a stale force it carries the arm and does nothing else.",
+             (force_gain). Not engaged, or with a stale force, it carries the arm and does nothing else.",
         )
         .start_after("youbot.Cart_Impedance")
         .on_configure(|c, _| {
@@ -57,6 +58,9 @@ impl Component for DynamicsComponent {
             });
         Self {
             f_des: b.doc("Force wanted on the tool, in the world.").unit("N").input("f_des"),
+            engaged: b
+                .doc("How much of the coupling is in force, as Cart_Impedance gives it. Not connected: none.")
+                .input("engaged"),
             jointstate: b.doc("What the joints measure.").input("jointstate"),
             jacobian: b.doc("As Arm_Kinematics gives it.").input("jacobian"),
             odometry: b.doc("How the base moves.").input("odometry"),
@@ -94,7 +98,7 @@ impl Component for DynamicsComponent {
             recenter_gain: b
                 .doc("How fast the base moves to have the tool in front of it.")
                 .unit("1/s")
-                .range(0.0..=5.0)
+                .range(0.0..=20.0)
                 .property("recenter_gain", p.recenter_gain),
             r_nominal: b
                 .doc("Where the tool is wanted, in the arm's frame.")
@@ -126,10 +130,13 @@ impl Component for DynamicsComponent {
             tau_max: self.tau_max.get(),
         };
         let jacobian = aged(&mut self.jacobian, cx).filter(|(_, age)| *age <= STALE);
-        let force = aged(&mut self.f_des, cx).filter(|(_, age)| *age <= STALE && jacobian.is_some());
+        let fresh = |age: f64| age <= STALE && jacobian.is_some();
+        let force = aged(&mut self.f_des, cx).filter(|(_, age)| fresh(*age));
+        let engaged = aged(&mut self.engaged, cx).filter(|(_, age)| fresh(*age));
+        let coupled = force.zip(engaged).map(|((force, _), (engaged, _))| Coupled { force, engaged });
         let jacobian = jacobian.map_or_else(Jacobian8::zeros, |(flat, _)| Jacobian8::from_column_slice(&flat));
         let (q, qd) = (J5::from(joints.pos), J5::from(joints.vel));
-        let out = self.law.update(&q, &qd, &jacobian, force.as_ref().map(|(f, _)| f), cx.dt());
+        let out = self.law.update(&q, &qd, &jacobian, coupled.as_ref(), cx.dt());
         self.effort.write(out.torque);
         // The base moves only while it is known how it moves.
         let known = self.odometry.sample().is_some_and(|o| seconds_since(cx.now(), o.at) <= STALE);

@@ -16,6 +16,7 @@ pub struct CartImpedance {
     f_jump: Out<f64>,
     ref_age: Out<f64>,
     active: Out<bool>,
+    engaged: Out<f64>,
     stiffness: Prop<f64>,
     damping_rel: Prop<f64>,
     damping_abs: Prop<f64>,
@@ -53,7 +54,8 @@ impl Component for CartImpedance {
         let p = ImpedanceParameters::default();
         b.describe(
             "The force that pulls this tool to the other robot's: spring, damper, bounded, ramped. It is always computed \
-             and put out only while ext_ref_mode is true; it fades by itself when the reference grows stale.",
+             and put out only while ext_ref_mode is true, taking hold and letting go along ramps; it fades by itself when \
+             the reference grows stale.",
         )
         .start_after("youbot.Arm_Kinematics")
         .on_start(|c, _| {
@@ -71,13 +73,14 @@ impl Component for CartImpedance {
             ext_ref: b.doc("Where the other tool was.").input("ext_ref"),
             ext_ref_mode: b.doc("Whether the force is put out. Never written: no.").input("ext_ref_mode"),
             f_des: b
-                .doc("Force wanted on the tool, in the world; zero while ext_ref_mode is false.")
+                .doc("Force wanted on the tool, in the world; zero 0.1 s after ext_ref_mode became false.")
                 .unit("N")
                 .output("f_des"),
             f_raw_norm: b.doc("Norm of the force it would want, coupled or not.").unit("N").output("f_raw_norm"),
             f_jump: b.doc("How much that norm has risen within 10 ms.").unit("N").output("f_jump"),
             ref_age: b.doc("Age of the reference; not written before the first one.").unit("s").output("ref_age"),
-            active: b.doc("Whether the force is put out.").output("active"),
+            active: b.doc("Whether the force is to be put out: ext_ref_mode.").output("active"),
+            engaged: b.doc("How much of the coupling is in force: from 0, let go of, to 1.").output("engaged"),
             stiffness: b.doc("Spring.").unit("N/m").range(0.0..=1000.0).property("stiffness", p.stiffness),
             damping_rel: b
                 .doc("Damper on the difference of velocities.")
@@ -126,6 +129,7 @@ impl Component for CartImpedance {
         let coupled = self.ext_ref_mode.get().unwrap_or(false);
         let out = self.law.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, cx.dt());
         self.f_des.write(out.force);
+        self.engaged.write(out.engaged);
         if let Some(reference) = reference {
             self.f_raw_norm.write(out.raw_norm);
             self.f_jump.write(self.recent.rise(cx.now().as_secs_f64(), out.raw_norm));
