@@ -66,7 +66,9 @@ impl Bound {
                  oldest are squashed",
                 limits::CHECK_ROUNDS
             ),
-            Self::Stopping => "whether one event that ends the deployment leads all coordinators down was not followed".to_owned(),
+            Self::Stopping => {
+                "whether one event that ends the deployment leads all coordinators down was not followed".to_owned()
+            }
             Self::Entered => "a coordinator could not be entered".to_owned(),
         };
         let behind = match failed {

@@ -13,7 +13,7 @@ use super::trace::{Happened, Place, TraceStep};
 use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
-use crate::stack::{Request, Requester};
+use crate::stack::Requester;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 use std::cmp::Reverse;

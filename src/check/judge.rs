@@ -6,8 +6,8 @@ use super::reactions::triggers;
 use super::state::{Failed, State, Trouble};
 use super::trace::TraceStep;
 use crate::model::codes::{
-    COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD,
-    COORD_STACK_GROWS, COORD_STUCK, STACK_FULL,
+    COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD, COORD_STACK_GROWS,
+    COORD_STUCK, STACK_FULL,
 };
 use crate::model::{
     Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,

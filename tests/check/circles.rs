@@ -7,7 +7,8 @@ const CONFIGURATIONS: &str =
 
 /// It is up in `up`, and at `e_go` it asks for `one` and undoes it, so many times round, without waiting for anything else.
 fn round(times: usize) -> String {
-    let (ok, undone) = ("\"one.ok\", \"one.failed\", \"one.broken\"", "\"one.undone\", \"one.undo.failed\", \"one.undo.broken\"");
+    let (ok, undone) =
+        ("\"one.ok\", \"one.failed\", \"one.broken\"", "\"one.undone\", \"one.undo.failed\", \"one.undo.broken\"");
     let one = |n: usize| {
         let next = (n + 1) % times;
         format!(
@@ -57,7 +58,8 @@ fn frames_pile_up_on_rounds_on_which_a_request_fails() {
         "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
         one = Configuration { property_set(\"a.gain\", 2.0) }, two = Configuration { property_set(\"a.gain\", 3.0) },
         all = Configuration { destroy(\"a\") },";
-    let states = "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
+    let states =
+        "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
         first = state { entry = \"one\" }, second = state { entry = \"two\" }, far = state {},
         undoing = state { entry = \"keep.undo\" }, leaving = state { entry = \"all\" }, stuck = state {},
         trans { src = \"initial\", tgt = \"idle\" },
@@ -77,10 +79,12 @@ fn frames_pile_up_on_rounds_on_which_a_request_fails() {
         trans { src = \"keeping\", tgt = \"leaving\", events = { \"keep.failed\", \"keep.broken\" } },
         trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },
         trans { src = \"leaving\", tgt = \"stuck\", events = { \"all.failed\", \"all.broken\" } },"
-        .to_owned()
-        + &["building", "keeping", "up", "first", "second", "far", "stuck"]
-            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
-            .join(" ");
+            .to_owned()
+            + &["building", "keeping", "up", "first", "second", "far", "stuck"]
+                .map(|state| {
+                    format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},")
+                })
+                .join(" ");
     let said = Small::new(configurations, &states, "limits: { stack: 4 }\n").check();
     let refused = said.refused("keep.undo");
     let squashed = |(severity, message): &(&str, &str)| *severity == "warning" && message.contains("squashed");

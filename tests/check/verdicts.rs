@@ -84,7 +84,8 @@ fn each_finding_has_its_own_way() {
 #[test]
 fn frames_that_failed_undoings_leave_are_followed_only_so_far() {
     let configurations = format!("{CONFIGURATIONS} one = Configuration {{ property_set(\"a.gain\", 2.0) }},");
-    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, on = state { config = \"one\" },
+    let states =
+        "idle = state {}, building = state { entry = \"base\" }, up = state {}, on = state { config = \"one\" },
         leaving = state { entry = \"base.undo\" }, stuck = state {},
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
