@@ -77,7 +77,7 @@ fn full_pipe() -> (File, OwnedFd) {
     let flags = |flags: i32| assert_eq!(unsafe { libc::fcntl(ends[1], libc::F_SETFL, flags) }, 0);
     flags(libc::O_NONBLOCK);
     for size in [1 << 16, 1] {
-        while write.write(&vec![b'x'; size]).is_ok() {}
+        while write.write_all(&vec![b'x'; size]).is_ok() {}
     }
     flags(0);
     assert!(read.as_raw_fd() > 2);

@@ -62,21 +62,18 @@ impl Args {
         client.subscribe(ASK).map_err(failure)?;
         // Asked for behind the subscription: what happens in between is in both.
         let log = ask(Some(&name), "log", &json!({ "last": self.last }), ASK)?;
-        let mut told = log.as_array().cloned().unwrap_or_default();
+        let told = log.as_array().cloned().unwrap_or_default();
         let print = |entry: &Json| match self.json {
             true => context.out.json_line(entry),
             false => context.out.text(line(&context.out, entry, self.steps)),
         };
         told.iter().for_each(&print);
+        let mut overlap = Overlap(told);
         let mut phases = Phases::default();
         while let Some(entry) = client.next_entry() {
             phases.see(&entry);
-            match told.iter().position(|old| *old == entry) {
-                Some(place) => drop(told.drain(..=place)),
-                None => {
-                    told.clear();
-                    print(&entry);
-                }
+            if overlap.is_news(&entry) {
+                print(&entry);
             }
             if output::reader_is_gone() {
                 return Ok(Exit::Done);
@@ -90,6 +87,21 @@ impl Args {
             ));
         }
         Ok(Exit::Done)
+    }
+}
+
+/// What was told already of what comes: the end of a log that was asked for while it went on.
+struct Overlap(Vec<Json>);
+
+impl Overlap {
+    fn is_news(&mut self, entry: &Json) -> bool {
+        let known = self.0.iter().position(|old| old == entry);
+        match known {
+            Some(place) => drop(self.0.drain(..=place)),
+            // From the first that is new on all are.
+            None => self.0.clear(),
+        }
+        known.is_none()
     }
 }
 
@@ -197,5 +209,18 @@ pub fn duration(us: f64) -> String {
         us if us < 1000.0 => format!("{us:.1} µs"),
         us if us < 1e6 => format!("{:.1} ms", us / 1e3),
         us => format!("{:.2} s", us / 1e6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_log_had_already_is_not_told_twice() {
+        let entry = |number: u32| json!({ "at": number });
+        let mut overlap = Overlap((0..5).map(entry).collect());
+        let told: Vec<bool> = [3, 4, 5, 3, 6].map(|number| overlap.is_news(&entry(number))).to_vec();
+        assert_eq!(told, [false, false, true, true, true]);
     }
 }

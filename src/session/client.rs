@@ -135,7 +135,8 @@ impl Client {
             let refused = json.get("error");
             let own = json.get("id").and_then(Json::as_u64) == Some(id);
             // An error without an `id` is about the connection.
-            if !own && !(refused.is_some() && json.get("id").is_none_or(Json::is_null)) {
+            let about_all = refused.is_some() && json.get("id").is_none_or(Json::is_null);
+            if !own && !about_all {
                 continue;
             }
             if let Some(error) = refused {

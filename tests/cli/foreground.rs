@@ -94,7 +94,7 @@ pub fn full_pipe() -> (OwnedFd, OwnedFd) {
     blocking(&write, false);
     let mut to = File::from(write);
     for size in [1 << 16, 1] {
-        while to.write(&vec![b'x'; size]).is_ok() {}
+        while to.write_all(&vec![b'x'; size]).is_ok() {}
     }
     let write = OwnedFd::from(to);
     blocking(&write, true);

@@ -156,7 +156,7 @@ mod tests {
             assert!(step < 0.15, "{step} N at {tick} ms");
             assert!(out.engaged >= last.engaged || tick >= 1000);
             last = out;
-            let whole = tick >= 100 + 300 && tick < 1000;
+            let whole = (100 + 300..1000).contains(&tick);
             assert!((out.engaged > 0.999) == whole || tick == 399, "{} at {tick} ms", out.engaged);
         }
         assert_eq!((last.engaged, last.force), (0.0, Vector3::zeros()));
