@@ -42,7 +42,7 @@ const PLACES: [(&str, fn(&Live)); 11] = [
     ("cancelling", |live| {
         way_up(live, "unfolding", 3.0);
         live.raise("e_shutdown");
-        live.until_state("folding", 1.0);
+        live.until_state("folding", 5.0);
         live.run(1.0);
     }),
     ("stopped while parking", |live| {
@@ -99,6 +99,7 @@ fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<Stri
     let mut wrong = Vec::new();
     let mut say = |so: bool, what: String| {
         if !so {
+            println!("{name}, {place}, {stop}: {what}");
             wrong.push(format!("{name}, {place}, {stop}: {what}"));
         }
     };
@@ -108,7 +109,7 @@ fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<Stri
     say(rest < 0.02, format!("{rest:.3} m/s after 0.3 s"));
     let (step, at) = jolt(&rows);
     say(step < 0.5, format!("{step:.2} N m in 1 ms, {:.3} s after", at - t));
-    say(live.session.in_state("waiting"), format!("in {} instead of waiting", live.place()));
+    say(live.place().ends_with(".waiting"), format!("in {} instead of waiting", live.place()));
     // It takes a reset, and then it is to be told.
     let before = rows.last().unwrap().tool;
     live.raise("e_reset");
