@@ -27,7 +27,6 @@ pub struct Row {
     pub speed: Vector3<f64>,
     /// Where the other tool really is.
     pub other: Option<Vector3<f64>>,
-    pub force: Vector3<f64>,
     pub hand: Vector3<f64>,
     pub saturated: u8,
     pub mode: u8,
@@ -39,7 +38,6 @@ static ROWS: Mutex<BTreeMap<i64, Vec<Row>>> = Mutex::new(BTreeMap::new());
 
 struct Probe {
     other: In<ToolPose>,
-    force: In<Vector3<f64>>,
     hand: In<Vector3<f64>>,
     saturated: In<u8>,
     mode: In<u8>,
@@ -55,7 +53,6 @@ impl Component for Probe {
         b.describe("Records the control loop.");
         Self {
             other: b.input("other"),
-            force: b.input("force"),
             hand: b.input("hand"),
             saturated: b.input("saturated"),
             mode: b.input("mode"),
@@ -77,7 +74,6 @@ impl Component for Probe {
             tool: tool.position,
             speed: tool.velocity,
             other: self.other.get().map(|p| p.p.into()),
-            force: self.force.get().unwrap_or_default(),
             hand: self.hand.get().unwrap_or_default(),
             saturated: self.saturated.get().unwrap_or(0),
             mode: self.mode.get().unwrap_or(0),
@@ -93,7 +89,6 @@ impl Component for Probe {
 /// Where the probe looks.
 const LOOKS: [(&str, &str); 7] = [
     ("Peer.tool_pose", "other"),
-    ("Cart_Impedance.f_des", "force"),
     ("Operator.ext_force", "hand"),
     ("Dynamics.tau_sat", "saturated"),
     ("youbot.control_mode", "mode"),
@@ -257,10 +252,6 @@ impl Live {
     /// When something of that name happened first, at `t` or later.
     pub fn first(&self, what: &str, t: f64) -> Option<f64> {
         self.happened.lock().unwrap().iter().find(|(at, w)| *at >= t && w == what).map(|(at, _)| *at)
-    }
-
-    pub fn happened(&self) -> Vec<(f64, String)> {
-        self.happened.lock().unwrap().clone()
     }
 
     /// A property behind everybody's back, as the world does it.
