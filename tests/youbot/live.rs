@@ -87,7 +87,7 @@ impl Component for Probe {
 }
 
 /// Where the probe looks.
-const LOOKS: [(&str, &str); 7] = [
+const LOOKS: [(&str, &str); 6] = [
     ("Peer.tool_pose", "other"),
     ("Operator.ext_force", "hand"),
     ("Dynamics.tau_sat", "saturated"),
