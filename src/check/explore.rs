@@ -13,7 +13,7 @@ use super::trace::{Happened, Place, TraceStep};
 use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
-use crate::stack::{Request, Requester};
+use crate::stack::Requester;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
@@ -198,8 +198,10 @@ impl Graph<'_, '_> {
                 self.cut(Bound::Frames, so_far);
                 continue;
             }
-            // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
-            if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
+            // What is squashed is no more than it was for failures: they were followed with fewer frames in force. Those on a
+            // round on which something fails lead round.
+            let leads_round = next.failed <= Failed::Apply && so_far == Failed::Apply;
+            if next.failed != Failed::Nothing && !leads_round && self.product.worlds.is_piled_up(state.world) {
                 self.ends.insert(at);
                 self.cut(Bound::Squashed, so_far);
                 continue;
