@@ -7,7 +7,8 @@ const CONFIGURATIONS: &str =
 
 /// It is up in `up`, and at `e_go` it asks for `one` and undoes it, so many times round, without waiting for anything else.
 fn round(times: usize) -> String {
-    let (ok, undone) = ("\"one.ok\", \"one.failed\", \"one.broken\"", "\"one.undone\", \"one.undo.failed\", \"one.undo.broken\"");
+    let (ok, undone) =
+        ("\"one.ok\", \"one.failed\", \"one.broken\"", "\"one.undone\", \"one.undo.failed\", \"one.undo.broken\"");
     let one = |n: usize| {
         let next = (n + 1) % times;
         format!(
@@ -57,7 +58,8 @@ fn frames_pile_up_on_rounds_on_which_a_request_fails() {
         "base = Configuration { create(\"a\", \"Drive\") }, keep = Configuration { property_set(\"a.mode\", 1) },
         one = Configuration { property_set(\"a.gain\", 2.0) }, two = Configuration { property_set(\"a.gain\", 3.0) },
         all = Configuration { destroy(\"a\") },";
-    let states = "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
+    let states =
+        "idle = state {}, building = state { entry = \"base\" }, keeping = state { entry = \"keep\" }, up = state {},
         first = state { entry = \"one\" }, second = state { entry = \"two\" }, far = state {},
         undoing = state { entry = \"keep.undo\" }, leaving = state { entry = \"all\" }, stuck = state {},
         trans { src = \"initial\", tgt = \"idle\" },
@@ -77,13 +79,40 @@ fn frames_pile_up_on_rounds_on_which_a_request_fails() {
         trans { src = \"keeping\", tgt = \"leaving\", events = { \"keep.failed\", \"keep.broken\" } },
         trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },
         trans { src = \"leaving\", tgt = \"stuck\", events = { \"all.failed\", \"all.broken\" } },"
-        .to_owned()
-        + &["building", "keeping", "up", "first", "second", "far", "stuck"]
-            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
-            .join(" ");
+            .to_owned()
+            + &["building", "keeping", "up", "first", "second", "far", "stuck"]
+                .map(|state| {
+                    format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},")
+                })
+                .join(" ");
     let said = Small::new(configurations, &states, "limits: { stack: 4 }\n").check();
     let refused = said.refused("keep.undo");
     let squashed = |(severity, message): &(&str, &str)| *severity == "warning" && message.contains("squashed");
     assert!(refused.iter().any(squashed), "{:#}", said.0);
     assert_eq!(said.0["verdict"], "warnings", "{:#}", said.0);
+}
+
+/// Beside another coordinator that may be anywhere meanwhile, a circle is told once, at the one that goes round.
+#[test]
+fn a_circle_is_told_of_the_coordinator_that_goes_round() {
+    let configurations = format!("{CONFIGURATIONS} two = Configuration {{ create(\"b\", \"Drive\") }},");
+    let calm = "idle = state {},
+        up = state { entry = \"two\", low = state {}, heard = state {},
+            trans { src = \"initial\", tgt = \"low\" },
+            trans { src = \"low\", tgt = \"heard\", events = { \"e_hello\" } } },
+        leaving = state { entry = \"two.undo\" }, failed = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\", \"two.failed\", \"two.broken\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"two.undone\" } },
+        trans { src = \"leaving\", tgt = \"failed\", events = { \"two.undo.failed\", \"two.undo.broken\" } },
+        trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let looper = round(2).replace("up = state {}", "up = state { entry = \"e_hello\" }");
+    let small = Small::several(&configurations, &[("calm", calm), ("looper", &looper)], "emits: [e_hello]\n");
+    let said = small.check();
+    let found = said.of("coord::endless");
+    assert_eq!(found.len(), 1, "{:#}", said.0);
+    assert_eq!((found[0]["file"].as_str(), found[0]["severity"].as_str()), (Some("looper.lua"), Some("warning")));
+    let message = found[0]["message"].as_str().unwrap();
+    assert!(message.contains("looper:root.round.s0") && !message.contains("calm:"), "{message}");
 }
