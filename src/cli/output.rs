@@ -61,11 +61,6 @@ impl Output {
         Self { stdout_color: color.on(io::stdout().is_terminal()), stderr_color: color.on(io::stderr().is_terminal()) }
     }
 
-    /// Whether findings may be coloured.
-    pub fn color_on_stderr(&self) -> bool {
-        self.stderr_color
-    }
-
     /// `text` in `style`, where stdout shows colours.
     pub fn paint(&self, style: Style, text: impl Display) -> String {
         if !self.stdout_color {
