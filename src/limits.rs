@@ -353,7 +353,8 @@ pub const CHECK_WAITING_MOST: usize = 6;
 pub const CHECK_EASY: usize = 10_000;
 
 /// Worlds in which `check` goes round a circle that leaves a frame of one configuration each time, until the oldest frames are
-/// squashed. In each of them all requests of the circle are planned as often as frames have room.
+/// squashed, where following is easy; else in one. In each of them all requests of the circle are planned as often as frames have
+/// room.
 pub const CHECK_ROUNDS: usize = 4;
 
 /// Transitions of several coordinators up to which they are followed anew with it in mind whether the event that ends the

@@ -61,11 +61,10 @@ impl Bound {
                 limits::CHECK_FORKS
             ),
             Self::ByHand => "what an operator's safe configuration leads to was not followed".to_owned(),
-            Self::Rounds => format!(
-                "more than {} worlds in which going round leaves frames of one configuration were not followed to where the \
-                 oldest are squashed",
-                limits::CHECK_ROUNDS
-            ),
+            Self::Rounds => {
+                "of the rounds on which frames pile up not all were followed to where the oldest are squashed"
+                    .to_owned()
+            }
             Self::Stopping => {
                 "whether one event that ends the deployment leads all coordinators down was not followed".to_owned()
             }

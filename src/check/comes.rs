@@ -44,7 +44,8 @@ impl Worlds<'_> {
         let planned = group.planned.take();
         group.told.iter_mut().for_each(|told| told.reason = None);
         for warning in planned.iter().flat_map(|planned| &planned.warnings) {
-            if self.warned.insert((warning.code, warning.message.clone())) {
+            let place = (warning.code, warning.origin.0, warning.path.clone(), warning.message.clone());
+            if self.warned.insert(place) {
                 self.warnings.push(warning.clone());
             }
         }

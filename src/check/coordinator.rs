@@ -88,8 +88,7 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
         .collect()
 }
 
-/// Completion and time events: raised in the chart itself.
-/// Whether the statechart makes events of that name itself.
+/// Whether the statechart makes events of that name itself: completion and time events.
 pub fn is_internal(event: &str) -> bool {
     event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
 }

@@ -2,9 +2,9 @@
 //!
 //! They are looked for among all such moves at once, so that none is too long to be found.
 
-use super::explore::Graph;
+use super::explore::{Edge, Graph};
 use super::judge::Traced;
-use super::state::Failed;
+use super::state::{Failed, Move};
 use crate::limits;
 use crate::model::codes::COORD_ENDLESS;
 use crate::model::{Finding, Severity};
@@ -17,23 +17,30 @@ use std::collections::VecDeque;
 impl Graph<'_, '_> {
     /// Circles of answers, each told once however it is entered.
     pub(super) fn endless(&mut self, found: &mut Traced) {
-        let mut said: FxHashSet<Vec<NodeId>> = FxHashSet::default();
+        let mut said: FxHashSet<Vec<(usize, NodeId)>> = FxHashSet::default();
         for circle in self.circles() {
             let at = circle[0];
-            let mut leaves: Vec<NodeId> =
-                circle.iter().flat_map(|at| self.states[*at as usize].leaves.iter().copied()).collect();
-            leaves.sort_unstable();
-            leaves.dedup();
-            if !said.insert(leaves) {
+            let of = self.round_of(&circle);
+            let leaves = |number: &usize| {
+                let number = *number;
+                circle.iter().map(move |at| (number, *at))
+            };
+            let on: Vec<(usize, u32)> = of.iter().flat_map(leaves).collect();
+            let leaf = |(number, at): (usize, u32)| (number, self.states[at as usize].leaves[number]);
+            let mut round: Vec<(usize, NodeId)> = on.into_iter().map(leaf).collect();
+            round.sort_unstable();
+            round.dedup();
+            // The others may be anywhere meanwhile.
+            if !said.insert(round) {
                 continue;
             }
-            let places: Vec<String> = circle.iter().map(|at| self.product.place(&self.states[*at as usize])).collect();
-            let mut named: Vec<String> = places.into_iter().map(|place| format!("`{place}`")).collect();
+            let place = |at: &u32| format!("`{}`", self.product.place_of(&self.states[*at as usize], &of));
+            let mut named: Vec<String> = circle.iter().map(place).collect();
             named.dedup();
             let more = named.len().saturating_sub(6);
             named.truncate(6);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let leaf = self.states[at as usize].leaves[0];
+            let first = self.states[at as usize].leaves[of[0]];
             let behind_undo = self.failed[at as usize] >= Failed::Undo;
             let severity = if behind_undo { Severity::Info } else { Severity::Warning };
             let finding = Finding::new(
@@ -44,7 +51,7 @@ impl Graph<'_, '_> {
                     named.join(", ")
                 ),
             )
-            .at(self.product.members[0].chart.origin(leaf))
+            .at(self.product.members[of[0]].chart.origin(first))
             .help("wait for an event or for a time (`e_after(1.0)`) somewhere on the way round");
             let trace = self.trace(at);
             found.push((finding, trace));
@@ -53,6 +60,35 @@ impl Graph<'_, '_> {
                 return;
             }
         }
+    }
+
+    /// The coordinators that go round on a circle: those that change their state on it, or who hear something on it; one at
+    /// least.
+    fn round_of(&mut self, circle: &[u32]) -> Vec<usize> {
+        let all = 0..self.product.members.len();
+        let leaf = |at: u32, number: usize| self.states[at as usize].leaves[number];
+        let moves = |number: &usize| circle.iter().any(|at| leaf(*at, *number) != leaf(circle[0], *number));
+        let moving: Vec<usize> = all.clone().filter(moves).collect();
+        if !moving.is_empty() || all.len() < 2 {
+            return if moving.is_empty() { vec![0] } else { moving };
+        }
+        let mut hearing: Vec<usize> = Vec::new();
+        let on: FxHashSet<(u32, u32)> = circle.iter().copied().zip(circle.iter().copied().cycle().skip(1)).collect();
+        let on: Vec<Edge> =
+            self.edges.iter().filter(|edge| edge.quiet && on.contains(&(edge.from, edge.to))).copied().collect();
+        for edge in on {
+            let next = edge.place.and_then(|place| self.nexts(edge.from).all.into_iter().nth(place as usize));
+            match next.as_ref().map(|next| (next.by, &next.answers)) {
+                Some((Move::Taken(number, _), _)) => hearing.push(usize::from(number)),
+                Some((_, answers)) => {
+                    hearing.extend(answers.iter().filter_map(|(request, _)| self.product.member(request.requester)));
+                }
+                None => {}
+            }
+        }
+        hearing.sort_unstable();
+        hearing.dedup();
+        if hearing.is_empty() { vec![0] } else { hearing }
     }
 
     /// Of all states that lead to each other by quiet moves one circle, from the first of them; the first ones first.

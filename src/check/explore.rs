@@ -33,7 +33,7 @@ pub struct Edge {
     pub failed: Failed,
     /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
     pub quiet: bool,
-    /// The event that ends the deployment comes once more.
+    /// The event that ends the deployment comes once more, or somebody wants it up again.
     pub again: bool,
     /// It comes, and nobody hears it.
     pub dropped: bool,
@@ -198,8 +198,10 @@ impl Graph<'_, '_> {
                 self.cut(Bound::Frames, so_far);
                 continue;
             }
-            // What is squashed is no more than it was for failures: they were followed with fewer frames in force.
-            if next.failed != Failed::Nothing && self.product.worlds.is_piled_up(state.world) {
+            // What is squashed is no more than it was for failures: they were followed with fewer frames in force. Those on a
+            // round on which something fails lead round.
+            let leads_round = next.failed <= Failed::Apply && so_far == Failed::Apply;
+            if next.failed != Failed::Nothing && !leads_round && self.product.worlds.is_piled_up(state.world) {
                 self.ends.insert(at);
                 self.cut(Bound::Squashed, so_far);
                 continue;
@@ -220,7 +222,7 @@ impl Graph<'_, '_> {
             }
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
-            let again = state.stopping && self.product.is_shutdown(next.by);
+            let again = state.stopping && self.product.is_first_or_last(next.by);
             let dropped = matches!(next.by, Move::Dropped(_));
             let (mut next, class) = self.abstracted(next, so_far);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.

@@ -15,7 +15,7 @@ use crate::model::{
 use crate::stack::{Request, Requester, claims};
 use crate::statechart::{NodeId, RaiseSite, When};
 use crate::system::View;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 use std::time::Duration;
@@ -51,19 +51,28 @@ impl Graph<'_, '_> {
     }
 
     fn refusals(&mut self, found: &mut Traced) {
-        let mut said: FxHashSet<(Requester, Ask, Code, String)> = FxHashSet::default();
+        // What is said of a refusal is told again only where it is worse.
+        let mut said: FxHashMap<(Requester, Ask, Code, u32, String), Severity> = FxHashMap::default();
+        let mut judged = FxHashSet::default();
         for (at, trouble) in self.firsts(&self.troubles) {
             let Trouble::Refused(request, reasons) = trouble else { continue };
             let Some(first) = reasons.first() else { continue };
-            if !said.insert((request.requester, request.ask, first.code, first.message.clone())) {
+            let told = (request.requester, request.ask, first.code, first.origin.0, first.message.clone());
+            let (class, world) = (self.failed[at as usize], self.states[at as usize].world);
+            let worse = |severity| said.get(&told).is_none_or(|said| severity > *said);
+            if !worse(severity_of(class)) || !judged.insert((told.clone(), world, class)) {
                 continue;
             }
+            let finding = self.refused(at, &request, &reasons);
+            if !worse(finding.severity) {
+                continue;
+            }
+            said.insert(told, finding.severity);
             let mut trace = self.trace(at);
             if let Some(last) = trace.last_mut() {
                 let within = self.runs_out(at, &request).unwrap_or_default();
                 last.replay.then = Some((request.ask.failed().event(request.ask), within));
             }
-            let finding = self.refused(at, &request, &reasons);
             // The reasons are findings of their own, each at its place.
             let number = self.product.member(request.requester);
             let made = number.is_some_and(|n| self.maker(n, &self.states[at as usize], request.ask).is_some());
@@ -80,11 +89,7 @@ impl Graph<'_, '_> {
     fn refused(&self, at: u32, request: &Request, reasons: &Rc<Findings>) -> Finding {
         let state = &self.states[at as usize];
         let why = reasons.first().map_or("", |f| f.message.as_str());
-        let class = match self.failed[at as usize] {
-            Failed::Nothing => Severity::Error,
-            Failed::Apply => Severity::Warning,
-            Failed::Undo | Failed::Broken => Severity::Info,
-        };
+        let class = severity_of(self.failed[at as usize]);
         let ask = request.ask;
         let Some(number) = self.product.member(request.requester) else {
             return Finding::new(class, COORD_REQUEST_REFUSED, format!("`{ask}` is refused: {why}"));
@@ -153,11 +158,7 @@ impl Graph<'_, '_> {
             if !said.insert(id) {
                 continue;
             }
-            let severity = match self.failed[at as usize] {
-                Failed::Nothing => Severity::Error,
-                Failed::Apply => Severity::Warning,
-                Failed::Undo | Failed::Broken => Severity::Info,
-            };
+            let severity = severity_of(self.failed[at as usize]);
             let number = self.product.member(request.requester);
             let shared =
                 number.is_some_and(|n| self.shares(n, request.ask) || !self.product.members[n].chart.is_pure());
@@ -401,6 +402,15 @@ impl Graph<'_, '_> {
             )
         };
         finding.at(chart.origin(leaf)).path(format!("coordinator.{fqn}"))
+    }
+}
+
+/// How bad it is at most that something is refused where this failed before.
+fn severity_of(failed: Failed) -> Severity {
+    match failed {
+        Failed::Nothing => Severity::Error,
+        Failed::Apply => Severity::Warning,
+        Failed::Undo | Failed::Broken => Severity::Info,
     }
 }
 

@@ -208,9 +208,10 @@ impl<'a> Product<'a> {
         }
     }
 
-    /// Whether the event that ends the deployment comes.
-    pub(super) fn is_shutdown(&self, by: Move) -> bool {
-        matches!(by, Move::Event(at) if self.outside[usize::from(at)] == self.deployment.shutdown.event)
+    /// Whether the event that starts or the one that ends the deployment comes.
+    pub(super) fn is_first_or_last(&self, by: Move) -> bool {
+        let ends = [self.deployment.deploy.event, self.deployment.shutdown.event];
+        matches!(by, Move::Event(at) if ends.contains(&self.outside[usize::from(at)]))
     }
 
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no

@@ -29,6 +29,7 @@ impl Graph<'_, '_> {
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
         let (circular, of) = self.circular();
         let before = self.edges.len();
+        let most = if before <= limits::CHECK_EASY { limits::CHECK_ROUNDS } else { 1 };
         for ((id, by), edges) in pushes {
             // A frame of a group takes the place of the one before: none piles up.
             let piles = self.product.worlds.configuration(id).is_some_and(|c| c.group.is_none());
@@ -42,7 +43,7 @@ impl Graph<'_, '_> {
                 if gone.contains(&world) || self.product.worlds.is_piled_up(world) {
                     continue;
                 }
-                let (some, full) = (!gone.is_empty(), gone.len() >= limits::CHECK_ROUNDS);
+                let (some, full) = (!gone.is_empty(), gone.len() >= most);
                 // One is enough to see that nothing piles up.
                 if full || some && !piles {
                     if piles {

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Findings, StepFault};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, StepFault};
 use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;
@@ -63,7 +63,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
             explored = follow(deployment, &views, &charts, catalogue, &mut traced, &mut left);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
-                traced.iter().any(|(f, _)| (f.code, f.origin) == (finding.code, finding.origin))
+                traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))
             };
             let unheard: Findings = safety::unheard(deployment, &charts).into_iter().filter(|f| !said(f)).collect();
             traced.extend(unheard.into_iter().map(|finding| (finding, Vec::new())));
@@ -128,8 +128,15 @@ fn follow(
     found.extend(unasked.into_iter().map(|finding| (finding, Vec::new())));
     found.sort_by_key(|(finding, _)| Reverse(finding.severity));
     for (finding, way) in found {
-        if !traced.iter().any(|(known, _)| known.code == finding.code && known.message == finding.message) {
-            traced.push((finding, way));
+        // What is said twice of one place is told once, as the worse of both.
+        let same = |known: &Finding| {
+            let place = (known.code, known.origin.0, &known.path) == (finding.code, finding.origin.0, &finding.path);
+            place && known.message == finding.message
+        };
+        match traced.iter_mut().find(|(known, _)| same(known)) {
+            Some((known, _)) if known.severity >= finding.severity => {}
+            Some(known) => *known = (finding, way),
+            None => traced.push((finding, way)),
         }
     }
     explored

@@ -18,11 +18,18 @@ impl Product<'_> {
 
     /// Where all of them are, in words.
     pub fn place(&self, state: &State) -> String {
+        let all: Vec<usize> = (0..self.members.len()).collect();
+        self.place_of(state, &all)
+    }
+
+    /// Where these are, in words.
+    pub fn place_of(&self, state: &State, numbers: &[usize]) -> String {
         let told = |place: Place| match place.coordinator {
             Some(name) => format!("{name}:{}", place.state),
             None => place.state,
         };
-        self.places(state).into_iter().map(told).collect::<Vec<_>>().join(", ")
+        let places = self.places(state).into_iter().enumerate().filter(|(number, _)| numbers.contains(number));
+        places.map(|(_, place)| told(place)).collect::<Vec<_>>().join(", ")
     }
 
     /// A move as it is told.

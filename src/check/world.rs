@@ -66,7 +66,7 @@ pub struct Worlds<'a> {
     pub(super) judged: FxHashSet<ConfigId>,
     /// Warnings of plans, each once.
     pub warnings: Findings,
-    pub(super) warned: FxHashSet<(Code, String)>,
+    pub(super) warned: FxHashSet<(Code, u32, String, String)>,
 }
 
 /// Requests without what means nothing to what they come to.

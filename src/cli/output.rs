@@ -66,11 +66,6 @@ impl Output {
         Self { stdout_color: color.on(out), stderr_color: color.on(err) }
     }
 
-    /// Whether findings may be coloured.
-    pub fn color_on_stderr(&self) -> bool {
-        self.stderr_color
-    }
-
     /// `text` in `style`, where stdout shows colours.
     pub fn paint(&self, style: Style, text: impl Display) -> String {
         if !self.stdout_color {

@@ -180,19 +180,6 @@ impl SourceMap {
         matches!(self.places.get(origin.0 as usize), Some(Place::Exact { .. }))
     }
 
-    /// The file an origin stands in.
-    pub fn file_of(&self, mut origin: Origin) -> Option<FileId> {
-        loop {
-            match self.places.get(origin.0 as usize)? {
-                Place::Nowhere => return None,
-                Place::File(file) | Place::Exact { file, .. } | Place::Line { file, .. } | Place::Call { file, .. } => {
-                    return Some(*file);
-                }
-                Place::Within { parent, .. } => origin = *parent,
-            }
-        }
-    }
-
     /// The bytes of the whole element at `origin`, as far as they are known: of a call in Lua up to its closing bracket.
     pub fn extent(&self, origin: Origin) -> Option<(FileId, Range<usize>)> {
         let (file, span) = self.base(origin)?;

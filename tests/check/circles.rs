@@ -91,3 +91,28 @@ fn frames_pile_up_on_rounds_on_which_a_request_fails() {
     assert!(refused.iter().any(squashed), "{:#}", said.0);
     assert_eq!(said.0["verdict"], "warnings", "{:#}", said.0);
 }
+
+/// Beside another coordinator that may be anywhere meanwhile, a circle is told once, at the one that goes round.
+#[test]
+fn a_circle_is_told_of_the_coordinator_that_goes_round() {
+    let configurations = format!("{CONFIGURATIONS} two = Configuration {{ create(\"b\", \"Drive\") }},");
+    let calm = "idle = state {},
+        up = state { entry = \"two\", low = state {}, heard = state {},
+            trans { src = \"initial\", tgt = \"low\" },
+            trans { src = \"low\", tgt = \"heard\", events = { \"e_hello\" } } },
+        leaving = state { entry = \"two.undo\" }, failed = state {},
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\", \"two.failed\", \"two.broken\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"two.undone\" } },
+        trans { src = \"leaving\", tgt = \"failed\", events = { \"two.undo.failed\", \"two.undo.broken\" } },
+        trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let looper = round(2).replace("up = state {}", "up = state { entry = \"e_hello\" }");
+    let small = Small::several(&configurations, &[("calm", calm), ("looper", &looper)], "emits: [e_hello]\n");
+    let said = small.check();
+    let found = said.of("coord::endless");
+    assert_eq!(found.len(), 1, "{:#}", said.0);
+    assert_eq!((found[0]["file"].as_str(), found[0]["severity"].as_str()), (Some("looper.lua"), Some("warning")));
+    let message = found[0]["message"].as_str().unwrap();
+    assert!(message.contains("looper:root.round.s0") && !message.contains("calm:"), "{message}");
+}

@@ -265,3 +265,53 @@ fn what_can_never_hold_is_found_where_it_is_applied() {
     assert!(!after.of("coord::lost_unheard").is_empty(), "it may be in force: {:#}", after.0);
     assert_eq!(severities(&after), ["error"], "{:#}", after.0);
 }
+
+/// The same of two coordinators that hear of each other.
+#[test]
+fn one_shutdown_event_leads_all_coordinators_down() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, park = Configuration { description = \"rest\" },
+        two = Configuration { create(\"b\", \"Drive\") },";
+    let first = |parked: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{ entry = \"e_hello\" }}, parked = state {{ entry = \"park\" }},
+             leaving = state {{ entry = \"base.undo\" }}, failed = state {{}},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"building\", tgt = \"up\", events = {{ \"base.ok\" }} }},
+             trans {{ src = \"building\", tgt = \"failed\", events = {{ \"base.failed\", \"base.broken\" }} }},
+             trans {{ src = \"failed\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"building\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"up\", tgt = \"parked\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"parked\", tgt = \"leaving\", events = {{ \"{parked}\", \"park.failed\", \"park.broken\" }} }},
+             trans {{ src = \"leaving\", tgt = \"idle\", events = {{ \"base.undone\" }} }},
+             trans {{ src = \"leaving\", tgt = \"failed\", events = {{ \"base.undo.failed\", \"base.undo.broken\" }} }},"
+        )
+    };
+    let second = "idle = state {}, leaving = state { entry = \"two.undo\" }, failed = state {},
+        up = state { entry = \"two\", low = state {}, heard = state {},
+            trans { src = \"initial\", tgt = \"low\" },
+            trans { src = \"low\", tgt = \"heard\", events = { \"e_hello\" } } },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\", \"two.failed\", \"two.broken\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"two.undone\" } },
+        trans { src = \"leaving\", tgt = \"failed\", events = { \"two.undo.failed\", \"two.undo.broken\" } },
+        trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let check = |parked: &str| {
+        Small::several(configurations, &[("first", &first(parked)), ("second", second)], "emits: [e_hello]\n").check()
+    };
+    let twice = check("e_shutdown");
+    let found = twice.of("coord::no_way_down");
+    assert_eq!(found.len(), 1, "{:#}", twice.0);
+    assert_eq!((found[0]["severity"].as_str(), found[0]["file"].as_str()), (Some("warning"), Some("first.lua")));
+    let message = found[0]["message"].as_str().unwrap();
+    assert!(
+        message.starts_with("from `first:root.parked") && message.contains("only a second `e_shutdown`"),
+        "{message}"
+    );
+    assert_eq!(twice.0["verdict"], "warnings");
+    // It is no matter for those who go on by an answer.
+    let once = check("park.ok");
+    assert!(once.of("coord::no_way_down").iter().all(|f| f["severity"] == "info"), "{:#}", once.0);
+}

@@ -123,6 +123,8 @@ fn boss_and_hand(holds: &str, free: &str) -> Value {
       trans { src = \"initial\", tgt = \"idle\" },
       trans { src = \"idle\", tgt = \"closing\", events = { \"e_start\" } },
       trans { src = \"closing\", tgt = \"held\", events = { \"e_holds\" } },
+      late = state {}, trans { src = \"closing\", tgt = \"late\", events = { \"e_shutdown\" } },
+      trans { src = \"late\", tgt = \"opening\", events = { \"e_holds\" } },
       trans { src = \"held\", tgt = \"opening\", events = { \"e_shutdown\" } },
       trans { src = \"opening\", tgt = \"idle\", events = { \"e_free\" } },
     }";
