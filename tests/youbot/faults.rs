@@ -131,7 +131,9 @@ fn scenario(name: &str, (place, go): &(&str, fn(&Live)), stop: &str) -> Vec<Stri
         live.run(0.05);
     }
     say(live.session.in_state("idle"), format!("not down but in {}", live.place()));
-    say(live.first("e_arm_dropped", 0.0).is_none(), "the arm was dropped".into());
+    // On the way back an undo of `unfold` that was interrupted half way counts as done, and is not asked for again.
+    let dropped = live.first("e_arm_dropped", 0.0).is_some();
+    say(dropped == (*place == "cancelling"), format!("the arm was dropped: {dropped}"));
     live.clock.shutdown();
     wrong
 }
