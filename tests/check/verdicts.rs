@@ -134,7 +134,7 @@ fn what_an_operators_safe_configuration_leads_to_is_not_called_sound() {
 fn findings_with_equal_words_at_two_places_are_two() {
     let coordinator = |base: &str| {
         UP_AND_DOWN.replace("base", base).replace("\"e_shutdown\", \"", "\"")
-            + &format!("lost = state {{}}, trans {{ src = \"up\", tgt = \"lost\", events = {{ \"e_lost\" }} }},")
+            + "lost = state {}, trans { src = \"up\", tgt = \"lost\", events = { \"e_lost\" } },"
             + "trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },"
     };
     let configurations =
