@@ -9,7 +9,7 @@ use super::explore::{Edge, Graph, NOWHERE};
 use super::outcome::EMPTY;
 use super::state::Failed;
 use crate::limits;
-use crate::stack::Request;
+use crate::stack::{Request, World};
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
@@ -23,6 +23,14 @@ impl Graph<'_, '_> {
     /// Goes round circles that were met since. True: there is more to follow.
     pub(super) fn go_round(&mut self) -> bool {
         let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
+        for (who, edges) in &mut pushes {
+            let gone = self.gone_round.get(who);
+            edges.retain(|edge| {
+                let world = self.states[self.edges[*edge as usize].from as usize].world;
+                gone.is_none_or(|gone| !gone.contains(&world)) && !self.product.worlds.is_piled_up(world)
+            });
+        }
+        pushes.retain(|(_, edges)| !edges.is_empty());
         if pushes.is_empty() {
             return false;
         }
@@ -40,7 +48,7 @@ impl Graph<'_, '_> {
                     continue;
                 }
                 let gone = self.gone_round.entry((id, by)).or_default();
-                if gone.contains(&world) || self.product.worlds.is_piled_up(world) {
+                if gone.contains(&world) {
                     continue;
                 }
                 let (some, full) = (!gone.is_empty(), gone.len() >= most);
@@ -133,20 +141,25 @@ impl Graph<'_, '_> {
         }
         let limit = self.product.deployment.limits.stack;
         let mut at = first.from;
+        let squashed = |world: &World| world.stack.frames().iter().any(|frame| frame.is_squashed());
         'round: for round in 0..limit + 2 {
+            let frames = world.stack.len();
             for (edge, requests) in &requests {
                 if !self.product.worlds.carry_out(&mut world, requests) {
                     at = edge.from;
                     break 'round;
                 }
                 // What fails may leave something else than nothing done.
-                let squashed = || world.stack.frames().iter().any(|frame| frame.is_squashed());
-                if round == 0 && worst != Failed::Nothing && !squashed() {
+                if round == 0 && worst != Failed::Nothing && !squashed(&world) {
                     let met = self.product.worlds.met(world.clone());
                     if met != self.states[edge.to as usize].world {
                         return false;
                     }
                 }
+            }
+            // None piles up.
+            if world.stack.len() == frames && !squashed(&world) {
+                break;
             }
         }
         let mut state = self.states[at as usize].clone();
