@@ -37,7 +37,9 @@ impl Graph<'_, '_> {
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
         let (circular, of) = self.circular();
         let before = self.edges.len();
-        let most = if before <= limits::CHECK_EASY { limits::CHECK_ROUNDS } else { 1 };
+        let easy = before <= limits::CHECK_EASY;
+        let most = if easy { limits::CHECK_ROUNDS } else { 1 };
+        let worsts = if easy { &[Failed::Nothing, Failed::Apply][..] } else { &[Failed::Nothing][..] };
         for ((id, by), edges) in pushes {
             // A frame of a group takes the place of the one before: none piles up.
             let piles = self.product.worlds.configuration(id).is_some_and(|c| c.group.is_none());
@@ -59,11 +61,16 @@ impl Graph<'_, '_> {
                     }
                     continue;
                 }
-                let circle = [Failed::Nothing, Failed::Apply].into_iter().find_map(|worst| {
-                    let circle = self.circle(edge, &circular, worst)?;
-                    Some((circle, worst))
+                let circle = worsts.iter().find_map(|worst| {
+                    let circle = self.circle(edge, &circular, *worst)?;
+                    Some((circle, *worst))
                 });
-                let Some((circle, worst)) = circle else { continue };
+                let Some((circle, worst)) = circle else {
+                    if !easy && piles {
+                        self.cut(Bound::Rounds, class);
+                    }
+                    continue;
+                };
                 self.gone_round.entry((id, by)).or_default().insert(world);
                 if !self.round_and_round(&circle, worst) {
                     self.cut(Bound::Rounds, class.max(worst));
