@@ -9,7 +9,7 @@ use super::explore::{Edge, Graph, NOWHERE};
 use super::outcome::EMPTY;
 use super::state::Failed;
 use crate::limits;
-use crate::stack::Request;
+use crate::stack::{Request, World};
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
@@ -23,13 +23,23 @@ impl Graph<'_, '_> {
     /// Goes round circles that were met since. True: there is more to follow.
     pub(super) fn go_round(&mut self) -> bool {
         let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
+        for (who, edges) in &mut pushes {
+            let gone = self.gone_round.get(who);
+            edges.retain(|edge| {
+                let world = self.states[self.edges[*edge as usize].from as usize].world;
+                gone.is_none_or(|gone| !gone.contains(&world)) && !self.product.worlds.is_piled_up(world)
+            });
+        }
+        pushes.retain(|(_, edges)| !edges.is_empty());
         if pushes.is_empty() {
             return false;
         }
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
         let (circular, of) = self.circular();
         let before = self.edges.len();
-        let most = if before <= limits::CHECK_EASY { limits::CHECK_ROUNDS } else { 1 };
+        let easy = before <= limits::CHECK_EASY;
+        let most = if easy { limits::CHECK_ROUNDS } else { 1 };
+        let worsts = if easy { &[Failed::Nothing, Failed::Apply][..] } else { &[Failed::Nothing][..] };
         for ((id, by), edges) in pushes {
             // A frame of a group takes the place of the one before: none piles up.
             let piles = self.product.worlds.configuration(id).is_some_and(|c| c.group.is_none());
@@ -40,7 +50,7 @@ impl Graph<'_, '_> {
                     continue;
                 }
                 let gone = self.gone_round.entry((id, by)).or_default();
-                if gone.contains(&world) || self.product.worlds.is_piled_up(world) {
+                if gone.contains(&world) {
                     continue;
                 }
                 let (some, full) = (!gone.is_empty(), gone.len() >= most);
@@ -51,11 +61,16 @@ impl Graph<'_, '_> {
                     }
                     continue;
                 }
-                let circle = [Failed::Nothing, Failed::Apply].into_iter().find_map(|worst| {
-                    let circle = self.circle(edge, &circular, worst)?;
-                    Some((circle, worst))
+                let circle = worsts.iter().find_map(|worst| {
+                    let circle = self.circle(edge, &circular, *worst)?;
+                    Some((circle, *worst))
                 });
-                let Some((circle, worst)) = circle else { continue };
+                let Some((circle, worst)) = circle else {
+                    if !easy && piles {
+                        self.cut(Bound::Rounds, class);
+                    }
+                    continue;
+                };
                 self.gone_round.entry((id, by)).or_default().insert(world);
                 if !self.round_and_round(&circle, worst) {
                     self.cut(Bound::Rounds, class.max(worst));
@@ -133,20 +148,25 @@ impl Graph<'_, '_> {
         }
         let limit = self.product.deployment.limits.stack;
         let mut at = first.from;
+        let squashed = |world: &World| world.stack.frames().iter().any(|frame| frame.is_squashed());
         'round: for round in 0..limit + 2 {
+            let frames = world.stack.len();
             for (edge, requests) in &requests {
                 if !self.product.worlds.carry_out(&mut world, requests) {
                     at = edge.from;
                     break 'round;
                 }
                 // What fails may leave something else than nothing done.
-                let squashed = || world.stack.frames().iter().any(|frame| frame.is_squashed());
-                if round == 0 && worst != Failed::Nothing && !squashed() {
+                if round == 0 && worst != Failed::Nothing && !squashed(&world) {
                     let met = self.product.worlds.met(world.clone());
                     if met != self.states[edge.to as usize].world {
                         return false;
                     }
                 }
+            }
+            // None piles up.
+            if world.stack.len() == frames && !squashed(&world) {
+                break;
             }
         }
         let mut state = self.states[at as usize].clone();
