@@ -431,10 +431,11 @@ impl Transaction {
         let items: Vec<Item> = if whole && !undone {
             Vec::new()
         } else if undone {
-            // What is still to be undone of the frame; so is what safe configurations have done again, for whom it never was.
+            // What is still to be undone of the frame; so is what safe configurations have done again, for whom it never was, and
+            // a call that was given up: taking back half of it is not taking it back.
             let theirs = |i: &u32| self.interrupted && self.touched.has(&forward.list[*i as usize].step);
             let done: FxHashSet<u32> = (forward.done.iter())
-                .filter(|i| !self.taken_back.contains(*i) && !theirs(i))
+                .filter(|i| !self.taken_back.contains(*i) && !theirs(i) && !self.told.contains(i))
                 .filter_map(|i| self.planned.place(*i as usize))
                 .collect();
             let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));

@@ -114,6 +114,8 @@ pub struct Transaction {
     /// The first part that does not stand for what it should.
     fallen: Option<usize>,
     cancels: Vec<u32>,
+    /// Calls of the forward list that were told that they are given up: how far they came nobody knows.
+    told: SmallVec<[u32; 1]>,
     /// What the components are compared with after mending, and whether that has nothing of what was done.
     target: Option<Box<(System, bool)>>,
     /// Mending was interrupted; whether that was of all that is left.
@@ -159,6 +161,7 @@ impl Transaction {
             asked: Vec::new(),
             fallen: None,
             cancels: Vec::new(),
+            told: SmallVec::new(),
             target: None,
             mended: None,
             broke_off: false,
@@ -320,6 +323,9 @@ impl Transaction {
         let run = self.in_hand();
         let calls = run.outstanding().filter(|i| matches!(run.list[*i as usize].step, Step::Operation(_)));
         let calls: Vec<u32> = calls.collect();
+        if self.back.is_none() {
+            self.told.extend_from_slice(&calls);
+        }
         self.cancels.extend(calls);
     }
 

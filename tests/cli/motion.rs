@@ -253,6 +253,17 @@ fn what_is_left_beside_a_safe_configuration_is_told_and_can_be_undone() {
     assert_eq!(steps(&log, "swap.undone"), ["cleanup c", "property_set c.n", "configure c"]);
 }
 
+/// A call that takes something back, and was given up half way, has not taken it back: it is called again.
+#[test]
+fn what_was_being_taken_back_by_a_call_is_still_to_be_taken_back() {
+    let log = run("apply('lift', {force = true}) wait_answer('lift.ok', 1)
+        fault('operation_call a.dn', 'slow', 1, 0.8) undo('lift') wait(0.4)
+        apply('safe') wait_answer('safe.ok', 0.1) wait_answer('lift.undo.broken', 5) assert(#stack() == 3)
+        undo('safe') wait_answer('safe.undone', 1) undo('lift') wait_answer('lift.undone', 1) assert(#stack() == 1)");
+    assert_eq!(steps(&log, "lift.undo.broken"), ["operation_call a.dn"], "{log}");
+    assert_eq!(steps(&log, "lift.undone"), ["operation_call a.dn"], "{log}");
+}
+
 /// While a safe configuration is in force, who recovers moves nothing.
 #[test]
 fn recovering_moves_nothing_while_a_safe_configuration_is_in_force() {
