@@ -58,7 +58,7 @@ fn acceptance(name: &str) {
     live.bring_up();
     live.until_state("copying", 10.0);
     // The hand's time runs from when the drives take torques.
-    let up = live.first("in root.operational.unsync", 0.0).expect("up");
+    let up = live.first("in root.operational.unsync.for_eight", 0.0).expect("up");
     copies(&live, up + 24.4 - live.now());
     let untouched = copies(&live, 0.1);
     let last = untouched.last().unwrap();

@@ -321,7 +321,7 @@ impl Driver {
         if let Some(i) = FAULTS.iter().position(|(name, ..)| name == wanted) {
             self.motors.error_flags |= FAULTS[i].2;
             self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
-            self.task = None;
+            // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
             self.drives.hold();
             self.events.raise(self.names.faults[i]);
         }
