@@ -361,6 +361,10 @@ pub const CHECK_ROUNDS: usize = 4;
 /// deployment has come: that makes up to twice as many of each state.
 pub const CHECK_STOPPING: usize = 20_000;
 
+/// Transitions up to which they are followed anew with what an operator's safe configuration leads to: that makes many times
+/// as many.
+pub const CHECK_BY_HAND: usize = 20_000;
+
 /// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
 /// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
 pub const CHECK_LEAN: usize = 5_000;

@@ -24,7 +24,7 @@ pub enum Bound {
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
     Forks,
-    /// A safe configuration of an operator: it is the operator's to deal with.
+    /// [`limits::CHECK_BY_HAND`]: a safe configuration of an operator.
     ByHand,
     /// [`limits::CHECK_ROUNDS`].
     Rounds,

@@ -250,12 +250,15 @@ impl Graph<'_, '_> {
         nexts
     }
 
-    /// What an operator's safe configuration leads to is the operator's to deal with: from there on nothing is known but
-    /// that it is in force.
+    /// What an operator's safe configuration leads to is the operator's to deal with: not every request fits in there. Where
+    /// following that is not easy, nothing is known from there on but that it is in force.
     fn abstracted(&mut self, next: Next, so_far: Failed) -> (State, Failed) {
         let Next { mut state, failed, by_hand, .. } = next;
         if !by_hand || self.product.worlds.top(state.world).is_some() {
             return (state, failed);
+        }
+        if self.product.follows_by_hand {
+            return (state, failed.max(Failed::Undo));
         }
         self.cut(Bound::ByHand, so_far);
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };

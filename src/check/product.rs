@@ -54,6 +54,8 @@ pub struct Product<'a> {
     /// It is kept that the deployment is being stopped. Of several coordinators without an operator it is kept for long, until
     /// all are down, and makes many states: only where these are few.
     pub minds_stopping: bool,
+    /// What an operator's safe configuration leads to is followed: only where that is easy.
+    pub follows_by_hand: bool,
 }
 
 impl<'a> Product<'a> {
@@ -93,6 +95,7 @@ impl<'a> Product<'a> {
             losable,
             tells_all: false,
             minds_stopping,
+            follows_by_hand: false,
         };
         product.worlds.judged = super::stands::judged(deployment, charts);
         for (place, number) in numbers.iter().enumerate() {

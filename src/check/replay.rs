@@ -122,9 +122,13 @@ impl Product<'_> {
             // At the end of the way it may have become one that is refused.
             let begins = &way[batch.at].1.state;
             let state = batch.over.map_or(&way[way.len() - 1].1.state, |_| begins);
-            let arms = self.arms(state, &batch.requests, answers, until.saturating_sub(times[batch.at]));
-            let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);
-            all[armed].arms.extend(arms);
+            match self.arms(state, &batch.requests, answers, until.saturating_sub(times[batch.at])) {
+                Ok(arms) => {
+                    let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);
+                    all[armed].arms.extend(arms);
+                }
+                Err(why) => all[batch.over.unwrap_or(batch.at)].does = Does::Cannot(why),
+            }
         }
         all
     }
@@ -205,19 +209,25 @@ impl Product<'_> {
     }
 
     /// What must be slow or go wrong for a batch that begins in a state.
+    ///
+    /// # Errors
+    /// Why no single fault makes it end so.
     fn arms(
         &self,
         state: &State,
         requests: &[Request],
         answers: &[(Request, Verdict)],
         takes: Duration,
-    ) -> Vec<(String, FaultKind, Duration)> {
+    ) -> Result<Vec<(String, FaultKind, Duration)>, &'static str> {
         let mut arms = Vec::new();
-        let Some(group) = self.worlds.group(state.world, requests, &Beside::default()) else { return arms };
-        let Some(planned) = &group.planned else { return arms };
+        let Some(group) = self.worlds.group(state.world, requests, &Beside::default()) else { return Ok(arms) };
+        let Some(planned) = &group.planned else { return Ok(arms) };
         let text = |at: usize| pattern(&planned.steps[at].step);
+        let broken = |(_, verdict): &(Request, Verdict)| matches!(verdict, Verdict::Broken | Verdict::UndoBroken);
+        // What hangs takes its time by itself.
         if let Some(first) = planned.steps.first()
             && !takes.is_zero()
+            && !answers.iter().any(broken)
         {
             arms.push((pattern(&first.step), FaultKind::Slow, takes));
         }
@@ -228,10 +238,18 @@ impl Product<'_> {
                 Some(Verdict::Broken | Verdict::UndoBroken) => FaultKind::Hang,
                 _ => continue,
             };
-            let first = (0..planned.steps.len()).find(|at| planned.part_of(planned.place(*at)) == part);
+            // A component that was not created is known not to be there, however that call ends.
+            let serves = |at: &usize| {
+                let created = how == FaultKind::Hang && matches!(planned.steps[*at].step, Step::Create { .. });
+                planned.part_of(planned.place(*at)) == part && !created
+            };
+            let first = (0..planned.steps.len()).find(serves);
+            if first.is_none() && how == FaultKind::Hang && !planned.steps.is_empty() {
+                return Err("what only creates is left in between by nothing that a script can bring about");
+            }
             arms.extend(first.map(|at| (text(at), how, Duration::ZERO)));
         }
-        arms
+        Ok(arms)
     }
 
     fn does(&self, next: &Next) -> Does {

@@ -95,7 +95,7 @@ fn follow(
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
         let product = apart.as_mut().unwrap_or(&mut product);
-        let mut most_waiting = limits::CHECK_WAITING;
+        let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);
         loop {
             product.follow_anew(most_waiting);
             let mut graph = explore(product);
@@ -108,6 +108,15 @@ fn follow(
             }
             if !minds && graph.edges.len() <= limits::CHECK_STOPPING {
                 product.minds_stopping = true;
+                continue;
+            }
+            if graph.bounds.contains_key(&Bound::ByHand) && graph.edges.len() <= limits::CHECK_BY_HAND && by_hand {
+                product.follows_by_hand = true;
+                continue;
+            }
+            if graph.product.follows_by_hand && graph.bounds.contains_key(&Bound::Budget) {
+                // It was not.
+                (by_hand, product.follows_by_hand) = (false, false);
                 continue;
             }
             if !minds {

@@ -369,9 +369,11 @@ impl Transaction {
         back.map(|i| (&forward.list[*i as usize], &forward.list[*i as usize].undo))
     }
 
-    /// Whether it has done anything that was not taken back.
+    /// Whether it has done anything that was not taken back, or brought a component into a fault.
     pub fn did_anything(&self) -> bool {
-        self.origin.is_some() || self.done_so_far().next().is_some()
+        let forward = self.forward.as_ref().expect("something was carried out");
+        let faulted = forward.faulted.iter().chain(&self.faulted).next().is_some();
+        self.origin.is_some() || faulted || self.done_so_far().next().is_some()
     }
 
     /// Takes what it has done out of a picture of the system, but for what safe configurations that came before have
@@ -386,6 +388,7 @@ impl Transaction {
             return;
         }
         let forward = self.forward.as_ref().expect("something was carried out");
+        self.without_faults(picture, &theirs);
         let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
             let goes_back = self.goes_back(*i, 0, &theirs, &mut heed);

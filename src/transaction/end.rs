@@ -3,6 +3,7 @@
 use super::back::{WayBack, chain};
 use super::heed::Heed;
 use super::run::Run;
+use super::touched::Touched;
 use super::{Can, Phase, Transaction};
 use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
@@ -159,18 +160,24 @@ impl Transaction {
         (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
     }
 
+    /// Puts components that it has brought into a fault back to where they were, unless these safe configurations want them
+    /// somewhere: also those that are on their way from there, where they were being mended.
+    pub(super) fn without_faults(&self, system: &mut System, heeding: &Touched) {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        // The last fault of a component first: between two of them the way back may have brought it somewhere else.
+        for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
+            let on_its_way = (self.broke_off || self.mended.is_some()) && heeding.wants(*component).is_none();
+            if system.component(*component).is_some_and(|node| on_its_way || node.state == RunState::Faulted) {
+                system.set_state(*component, *state);
+            }
+        }
+    }
+
     /// The system as it should be now, from the model: without the faults that this brought about, and, where nothing keeps
     /// it from that, without what could not be taken back. Tells whether the latter.
     fn wanted(&self, part: usize, live: &System) -> (System, bool) {
         let mut wanted = live.clone();
-        let forward = self.forward.as_ref().expect("it was carried out");
-        // The last fault of a component first: between two of them the way back may have brought it somewhere else.
-        for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
-            let on_its_way = self.broke_off && self.touched.wants(*component).is_none();
-            if wanted.component(*component).is_some_and(|node| on_its_way || node.state == RunState::Faulted) {
-                wanted.set_state(*component, *state);
-            }
-        }
+        self.without_faults(&mut wanted, &self.touched);
         let remaining = self.remaining(part);
         let plain = |i: &u32| {
             let steps = self.steps_back(*i, part);

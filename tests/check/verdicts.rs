@@ -112,17 +112,22 @@ fn frames_that_failed_undoings_leave_are_followed_only_so_far() {
     assert_eq!(json["explored"]["complete"], false, "{left:?}");
 }
 
-/// An operator may apply a safe configuration at any time. It is the operator's to deal with what that leads to, which is not
-/// followed, and told: with it in force the system is not taken down by the coordinator alone.
+/// An operator may apply a safe configuration at any time, and that is followed. What it is in the way of is the operator's to
+/// deal with: a note.
 #[test]
-fn what_an_operators_safe_configuration_leads_to_is_not_called_sound() {
+fn what_an_operators_safe_configuration_leads_to_is_followed() {
     let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" } },
         stop = Configuration { safe = true, post_conf_state = { \"a:stopped\" } },";
     let states = UP_AND_DOWN.replace("\"e_shutdown\", \"base.undo.failed\"", "\"base.undo.failed\"");
     let small = Small::new(configurations, &states, "");
     let (word, code, strict, text) = verdict(&small);
-    assert_eq!((word.as_str(), code, strict), ("followed", 0, 1), "{text}");
-    assert!(text.contains("an operator's safe configuration leads to was not followed"), "{text}");
+    assert_eq!((word.as_str(), code, strict), ("sound", 0, 0), "{text}");
+    let said = small.check();
+    let notes = said.of("coord::refused_by_other");
+    let [note] = notes[..] else { panic!("{:#}", said.0) };
+    assert_eq!(note["severity"], "info");
+    assert!(note["message"].as_str().unwrap().contains("before `stop` (a frame of operator)"), "{note:#}");
+    assert_eq!(note["help"], "let the operator undo that first (`davit undo`)", "{note:#}");
     let script = "deploy('small.yaml') apply('stop') shutdown()";
     small.demo.write("forced.lua", script);
     let ran = small.demo.run(&["run", "forced.lua", "--clock", "simulated", "--platform", "simulated"]);

@@ -310,6 +310,16 @@ fn there_is_a_way_out_of_what_was_found() {
         (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", panic)]),
         // What was undone of a safe frame, and another safe configuration has done again, is still to be undone.
         (vec![(safe("brake"), 4), (Act::UndoSafe(place(&SAFE, "brake")), 2), (safe("quiet"), 0)], vec![]),
+        // What was being mended when a safe configuration came is known to it as it was before it failed.
+        (
+            vec![
+                (Act::Operator(place(&PLAIN, "roll")), 0),
+                (apply("swap"), 3),
+                (Act::UndoSafe(0), 3),
+                (safe("rest"), 0),
+            ],
+            vec![on("operation_call A.up", panic)],
+        ),
     ];
     for (acts, faults) in found {
         leads_out(&acts, &faults).unwrap_or_else(|failed| panic!("{acts:?} {faults:?}: {failed}"));
