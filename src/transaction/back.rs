@@ -369,11 +369,11 @@ impl Transaction {
         back.map(|i| (&forward.list[*i as usize], &forward.list[*i as usize].undo))
     }
 
-    /// Whether it has done anything that was not taken back, or brought a component into a fault.
+    /// Whether it has done anything that was not taken back, brought a component into a fault, or found one otherwise.
     pub fn did_anything(&self) -> bool {
         let forward = self.forward.as_ref().expect("something was carried out");
         let faulted = forward.faulted.iter().chain(&self.faulted).next().is_some();
-        self.origin.is_some() || faulted || self.done_so_far().next().is_some()
+        self.origin.is_some() || self.mending.broke() || faulted || self.done_so_far().next().is_some()
     }
 
     /// Takes what it has done out of a picture of the system, but for what safe configurations that came before have
@@ -388,7 +388,7 @@ impl Transaction {
             return;
         }
         let forward = self.forward.as_ref().expect("something was carried out");
-        self.without_faults(picture, &theirs);
+        self.put_back(picture, &theirs);
         let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
             let goes_back = self.goes_back(*i, 0, &theirs, &mut heed);

@@ -1,16 +1,12 @@
 //! How a transaction ends: what was done is compared with what is there, and what is left is named.
 
-use super::back::{WayBack, chain};
 use super::heed::Heed;
-use super::run::Run;
-use super::touched::Touched;
 use super::{Can, Phase, Transaction};
-use crate::model::{Cause, ComponentName, OnFailure, RunState, Snapshot, Step};
+use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
 use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
-use crate::system::{Overlay, System, Undo, View as _, moves_any, step, touch};
-use crate::time::Time;
+use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
@@ -154,30 +150,11 @@ impl Transaction {
         forward.done.iter().copied().filter(left).collect()
     }
 
-    /// Whether a difference may be mended by itself.
-    fn mends(&self, part: usize) -> bool {
-        let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
-        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
-    }
-
-    /// Puts components that it has brought into a fault back to where they were, unless these safe configurations want them
-    /// somewhere: also those that are on their way from there, where they were being mended.
-    pub(super) fn without_faults(&self, system: &mut System, heeding: &Touched) {
-        let forward = self.forward.as_ref().expect("it was carried out");
-        // The last fault of a component first: between two of them the way back may have brought it somewhere else.
-        for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
-            let on_its_way = (self.broke_off || self.mended.is_some()) && heeding.wants(*component).is_none();
-            if system.component(*component).is_some_and(|node| on_its_way || node.state == RunState::Faulted) {
-                system.set_state(*component, *state);
-            }
-        }
-    }
-
     /// The system as it should be now, from the model: without the faults that this brought about, and, where nothing keeps
     /// it from that, without what could not be taken back. Tells whether the latter.
-    fn wanted(&self, part: usize, live: &System) -> (System, bool) {
+    pub(super) fn wanted(&self, part: usize, live: &System) -> (System, bool) {
         let mut wanted = live.clone();
-        self.without_faults(&mut wanted, &self.touched);
+        self.put_back(&mut wanted, &self.touched);
         let remaining = self.remaining(part);
         let plain = |i: &u32| {
             let steps = self.steps_back(*i, part);
@@ -231,42 +208,8 @@ impl Transaction {
         all
     }
 
-    /// Compares what was seen of its components with what should be; mends the difference once; names what remains.
-    pub(super) fn compare(&mut self, seen: Option<Snapshot>, live: &mut System, can: &Can<'_>) {
-        let part = self.failed_part();
-        let own = self.own();
-        self.note_perhaps(live);
-        let (wanted, whole) = match self.target.take() {
-            Some(target) => *target,
-            None => self.wanted(part, live),
-        };
-        let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
-        let observed = adopted == Some(true);
-        if observed && self.phase == Phase::Looking && self.mends(part) {
-            let asked =
-                self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
-            let steps = self.own_difference(live, &wanted);
-            let steps: Vec<Step> = steps
-                .into_iter()
-                .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
-                .collect();
-            if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
-                return self.mend(steps, (wanted, whole));
-            }
-        }
-        self.judge(part, &wanted, whole, observed, live, can);
-    }
-
-    /// Mends the difference between what is there and what should be.
-    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
-        self.target = Some(Box::new(target));
-        let list = chain(steps);
-        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
-        self.phase = Phase::Mending;
-    }
-
     /// Notes what may have happened and can still be taken back: not what was called of a component that is gone.
-    fn note_perhaps(&mut self, live: &System) {
+    pub(super) fn note_perhaps(&mut self, live: &System) {
         let part = self.failed_part();
         let open = |i: &u32| {
             let back = self.steps_back(*i, part);
@@ -284,7 +227,7 @@ impl Transaction {
     }
 
     /// Names the end. `whole`: `wanted` has nothing of what was done.
-    fn judge(&mut self, part: usize, wanted: &System, whole: bool, observed: bool, live: &System, can: &Can<'_>) {
+    pub(super) fn judge(&mut self, part: usize, wanted: &System, whole: bool, observed: bool, live: &System, can: &Can<'_>) {
         let forward = self.forward.as_ref().expect("it was carried out");
         let open = forward.unsettled.iter().filter(|i| !self.taken_back.contains(i));
         let mut unsettled: Vec<Step> = open.map(|i| forward.list[*i as usize].step.clone()).collect();

@@ -7,7 +7,8 @@
 //!
 //! `run`: a list of steps being carried out; `immediate`: without a detour. `order`: which may begin. `settle`: unknown
 //! outcomes. `stand`: whether what was applied stands. `back`: the way back; `touched`, `heed`: what it leaves to safe
-//! configurations; `bring`: where it goes on for them. `end`: what comes of each part; `endings`: what may. `messages`: what
+//! configurations; `bring`: where it goes on for them. `mending`: what is found different. `end`: what comes of each part;
+//! `endings`: what may. `messages`: what
 //! goes in and out.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
@@ -19,6 +20,7 @@ mod end;
 mod endings;
 mod heed;
 mod immediate;
+mod mending;
 mod messages;
 mod order;
 mod run;
@@ -38,6 +40,7 @@ use crate::stack::{Planned, Reason};
 use crate::system::System;
 use crate::time::Time;
 use back::WayBack;
+use mending::Mending;
 use run::Run;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -116,12 +119,7 @@ pub struct Transaction {
     cancels: Vec<u32>,
     /// Calls of the forward list that were told that they are given up: how far they came nobody knows.
     told: SmallVec<[u32; 1]>,
-    /// What the components are compared with after mending, and whether that has nothing of what was done.
-    target: Option<Box<(System, bool)>>,
-    /// Mending was interrupted; whether that was of all that is left.
-    mended: Option<bool>,
-    /// Mending has broken off: what had failed may be on its way to where it should be.
-    broke_off: bool,
+    mending: Mending,
     end: Option<End>,
 }
 
@@ -162,9 +160,7 @@ impl Transaction {
             fallen: None,
             cancels: Vec::new(),
             told: SmallVec::new(),
-            target: None,
-            mended: None,
-            broke_off: false,
+            mending: Mending::default(),
             end: None,
         }
     }
@@ -295,7 +291,7 @@ impl Transaction {
                 // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
                 let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
                 if self.between.take().is_some() || looks {
-                    self.mended = self.target.take().map(|target| target.1);
+                    self.mending.interrupt();
                     self.phase = Phase::Stopping;
                 }
             }
@@ -439,7 +435,7 @@ impl Transaction {
 
     /// Nothing is out any more: the way back begins, goes on, or is over.
     fn turn_back(&mut self, live: &mut System) {
-        if self.target.is_some() {
+        if self.mending.target.is_some() {
             self.back = None;
             self.phase = Phase::LookingAgain;
             return;
@@ -449,13 +445,14 @@ impl Transaction {
             (failed, whole) = (self.took_back(&run, &way), back::whole(&run));
         }
         let part = self.failed_part();
-        match self.mended.take() {
+        match self.mending.interrupted.take() {
             Some(true) if whole => {
+                self.mending.known = None;
                 self.taken_back.extend(self.remaining(part));
                 self.faulted.clear();
                 self.forward.iter_mut().for_each(|forward| forward.faulted.clear());
             }
-            Some(_) => self.broke_off = true,
+            Some(_) => self.mending.broke_off = true,
             None => {}
         }
         if self.between.is_none() && part > 0 {

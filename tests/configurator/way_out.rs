@@ -286,7 +286,7 @@ fn there_is_a_way_out_of_what_was_found() {
     let apply = |word: &str| Act::Apply(place(&PLAIN, word));
     let safe = |word: &str| Act::Safe(place(&SAFE, word));
     let on = |step: &str, kind: usize| (place(&STEPS, step), kind, 1);
-    let (late, lie, silent, panic) = (4, 7, 8, 9);
+    let (fails, late, lie, silent, panic) = (0, 4, 7, 8, 9);
     let found = [
         // `_default` is about what another safe configuration under way is about.
         (vec![(safe("rest"), 0), (safe("quiet"), 0)], vec![]),
@@ -320,6 +320,8 @@ fn there_is_a_way_out_of_what_was_found() {
             ],
             vec![on("operation_call A.up", panic)],
         ),
+        // What was found otherwise, and was being mended when a safe configuration came, is otherwise still.
+        (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", silent), on("start C", fails)]),
     ];
     for (acts, faults) in found {
         leads_out(&acts, &faults).unwrap_or_else(|failed| panic!("{acts:?} {faults:?}: {failed}"));

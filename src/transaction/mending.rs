@@ -1,0 +1,101 @@
+//! What is found different from what should be is mended, once; what becomes of that where a safe configuration comes.
+
+use super::back::{WayBack, chain};
+use super::run::Run;
+use super::touched::Touched;
+use super::{Can, Phase, Transaction};
+use crate::model::{OnFailure, RunState, Snapshot, Step};
+use crate::system::{System, View as _, moves_any, step};
+use crate::time::Time;
+use std::sync::Arc;
+
+/// What is known of mending.
+#[derive(Debug, Default)]
+pub(super) struct Mending {
+    /// What the components are compared with after it, and whether that has nothing of what was done.
+    pub target: Option<Box<(System, bool)>>,
+    /// It was interrupted; whether it was of all that is left.
+    pub interrupted: Option<bool>,
+    /// It has broken off: what had failed may be on its way to where it should be.
+    pub broke_off: bool,
+    /// The components as the model had them before it took over what was found: where they still should be, if it breaks off.
+    pub known: Option<Snapshot>,
+}
+
+impl Mending {
+    /// A safe configuration comes.
+    pub fn interrupt(&mut self) {
+        self.interrupted = self.target.take().map(|target| target.1);
+    }
+
+    /// Whether it was not brought to its end.
+    pub fn broke(&self) -> bool {
+        self.broke_off || self.interrupted.is_some()
+    }
+}
+
+impl Transaction {
+    /// Puts components that it has brought into a fault, or found elsewhere, back to where they were, unless these safe
+    /// configurations want them somewhere: also those that are on their way from there, where they were being mended.
+    pub(super) fn put_back(&self, system: &mut System, heeding: &Touched) {
+        let broke = self.mending.broke();
+        if let Some(known) = self.mending.known.as_ref().filter(|_| broke) {
+            let mut before = system.clone();
+            // Its types were known.
+            let _ = before.adopt(&self.own(), known);
+            for step in self.own_difference(system, &before).iter().filter(|step| !heeding.has(step)) {
+                let _ = step::apply(step, system);
+            }
+        }
+        let forward = self.forward.as_ref().expect("it was carried out");
+        // The last fault of a component first: between two of them the way back may have brought it somewhere else.
+        for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
+            let on_its_way = broke && heeding.wants(*component).is_none();
+            if system.component(*component).is_some_and(|node| on_its_way || node.state == RunState::Faulted) {
+                system.set_state(*component, *state);
+            }
+        }
+    }
+
+    /// Whether a difference may be mended by itself.
+    pub(super) fn mends(&self, part: usize) -> bool {
+        let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
+        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
+    }
+
+    /// Compares what was seen of its components with what should be; mends the difference once; names what remains.
+    pub(super) fn compare(&mut self, seen: Option<Snapshot>, live: &mut System, can: &Can<'_>) {
+        let part = self.failed_part();
+        let own = self.own();
+        self.note_perhaps(live);
+        let (wanted, whole) = match self.mending.target.take() {
+            Some(target) => *target,
+            None => self.wanted(part, live),
+        };
+        let known = live.snapshot_some(&own);
+        let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
+        let observed = adopted == Some(true);
+        if observed && self.phase == Phase::Looking && self.mends(part) {
+            let asked =
+                self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
+            let steps = self.own_difference(live, &wanted);
+            let steps: Vec<Step> = steps
+                .into_iter()
+                .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
+                .collect();
+            if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
+                self.mending.known.get_or_insert(known);
+                return self.mend(steps, (wanted, whole));
+            }
+        }
+        self.judge(part, &wanted, whole, observed, live, can);
+    }
+
+    /// Mends the difference between what is there and what should be.
+    fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
+        self.mending.target = Some(Box::new(target));
+        let list = chain(steps);
+        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
+        self.phase = Phase::Mending;
+    }
+}
