@@ -149,7 +149,7 @@ impl Transaction {
             }
         }
         let perhaps = perhaps.into_iter().filter(|_| self.asked_back).rev();
-        for i in perhaps.chain(forward.done.iter().rev().copied()) {
+        'way: for i in perhaps.chain(forward.done.iter().rev().copied()) {
             if self.taken_back.contains(&i) || self.part_of(i) < part {
                 continue;
             }
@@ -162,6 +162,12 @@ impl Transaction {
                 continue;
             }
             let goes_back = self.goes_back(i, part, &self.touched, &mut heed);
+            // Past what stays since it moves goes only what safe configurations want.
+            let demanded = || goes_back.late && goes_back.steps.last().is_some_and(|back| self.touched.wants_step(back));
+            if way.withheld.is_some() && !demanded() {
+                order.leave(original, &after);
+                continue;
+            }
             let before = way.list.len();
             let mut left_out = goes_back.overwritten;
             for back in goes_back.steps {
@@ -172,8 +178,9 @@ impl Transaction {
                     // What came in late goes back where safe configurations want that; nothing else of it moves either.
                     let wanted = goes_back.late && at == last && self.touched.wants_step(&back);
                     if !wanted && !self.may_move(i) && step::moves(&back, &view) {
-                        way.withheld = Some(back);
-                        return way;
+                        way.withheld.get_or_insert(back);
+                        order.leave(original, &after);
+                        continue 'way;
                     }
                     let _ = step::apply(&back, &mut view);
                     let id = way.add(back, order.wave(original), after, (at == last).then_some(i), None);
@@ -186,6 +193,9 @@ impl Transaction {
                 _ => way.left_out.extend(left_out.then_some(i)),
             }
             order.leave(original, &after);
+        }
+        if way.withheld.is_some() {
+            return way;
         }
         if self.interrupted {
             self.bring_as_wanted(&mut view, &mut way);

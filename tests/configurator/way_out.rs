@@ -310,6 +310,8 @@ fn there_is_a_way_out_of_what_was_found() {
         (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", panic)]),
         // What was undone of a safe frame, and another safe configuration has done again, is still to be undone.
         (vec![(safe("brake"), 4), (Act::UndoSafe(place(&SAFE, "brake")), 2), (safe("quiet"), 0)], vec![]),
+        // What a safe configuration wants stopped is stopped, though something else that came up with it stays.
+        (vec![(safe("quiet"), 2), (Act::UndoSafe(place(&SAFE, "quiet")), 1), (safe("brake"), 0)], vec![]),
         // What was being mended when a safe configuration came is known to it as it was before it failed.
         (
             vec![
