@@ -5,7 +5,7 @@ use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
-use crate::statechart::EventId;
+use crate::statechart::{EdgeId, EventId};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
@@ -19,7 +19,7 @@ impl Product<'_> {
             for event in self.members[number].offers(state.leaves[number]).iter() {
                 let name = self.members[number].name_of(*event);
                 match name.and_then(|name| self.outside.iter().position(|outside| *outside == name)) {
-                    Some(at) => _ = heard.insert(at),
+                    Some(at) => _ = heard.insert(self.alike[at]),
                     None if busy[number] => nexts.cut = true,
                     None => self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts),
                 }
@@ -49,6 +49,28 @@ impl Product<'_> {
             next.unconfirmed.clear();
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
+    }
+
+    /// Of each event from outside the first that leads every coordinator to the same everywhere: one of them is followed for
+    /// all. What begins and ends the deployment, and what confirms, is by itself.
+    pub(super) fn alike_events(&self) -> Vec<usize> {
+        let confirms = |name: EventName| {
+            self.deployment.configurations.iter().any(|c| c.confirm.is_some_and(|confirm| confirm.event == name))
+        };
+        let triggered = |name: EventName| -> Option<Vec<(usize, EdgeId)>> {
+            let own = [self.deployment.deploy.event, self.deployment.shutdown.event].contains(&name) || confirms(name);
+            let pure = self.members.iter().all(|member| member.chart.is_pure());
+            let of = |(number, member): (usize, &Member<'_>)| {
+                let (chart, event) = (member.chart, member.chart.event(name));
+                let edges = chart.nodes().flat_map(|node| chart.outgoing(node));
+                let edges = edges.filter(move |edge| event != EventId::OTHER && chart.may_trigger(*edge, event));
+                edges.map(move |edge| (number, edge)).collect::<Vec<_>>()
+            };
+            (pure && !own).then(|| self.members.iter().enumerate().flat_map(of).collect())
+        };
+        let all: Vec<_> = self.outside.iter().map(|name| triggered(*name)).collect();
+        let first = |at: usize| all[at].as_ref().and_then(|_| all[..at].iter().position(|other| *other == all[at]));
+        (0..all.len()).map(|at| first(at).unwrap_or(at)).collect()
     }
 
     /// The event that ends the deployment comes where nobody waits for it: it is raised once, and gone.

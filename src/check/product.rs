@@ -34,6 +34,8 @@ pub struct Product<'a> {
     pub worlds: Worlds<'a>,
     /// Events that come from outside.
     pub outside: Vec<EventName>,
+    /// Of each the first that no coordinator tells from it.
+    pub(super) alike: Vec<usize>,
     /// What an operator may apply at any time.
     pub operator: Vec<ConfigId>,
     /// There are coordinators that have nothing to do with these, and are not followed with them.
@@ -86,6 +88,7 @@ impl<'a> Product<'a> {
             members,
             worlds: Worlds::new(deployment, catalogue, undone),
             outside: outside.into_iter().collect(),
+            alike: Vec::new(),
             operator,
             others: numbers.len() < deployment.coordinators.len(),
             overflow: false,
@@ -98,6 +101,7 @@ impl<'a> Product<'a> {
             follows_by_hand: false,
         };
         product.worlds.judged = super::stands::judged(deployment, charts);
+        product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(&views[*number], charts, *number);
             product.members[place].listen(deployment, &own);

@@ -43,6 +43,17 @@ impl World {
         meant
     }
 
+    /// A picture (that as it is, where there is none) in which what was seen otherwise is as the model has it. None: nothing was.
+    pub fn as_all_meant(&self, picture: Option<System>) -> Option<System> {
+        let mut otherwise = self.broken.iter().filter(|broken| broken.seen.is_some()).peekable();
+        if otherwise.peek().is_none() {
+            return picture;
+        }
+        let mut meant = picture.unwrap_or_else(|| self.system.clone());
+        otherwise.for_each(|broken| self.put_meant(broken, &mut meant));
+        Some(meant)
+    }
+
     /// Something is broken from now on. What the model has of it may have been written by safe configurations in force: what is
     /// expected is without that, since their undo is to lead there.
     pub fn breaks(&mut self, mut broken: Broken) {
