@@ -46,6 +46,21 @@ local function stopped(more)
   return state(all)
 end
 
+-- A step of the way down that is not asked for twice: a stop leaves it only with its answer.
+local function once(request)
+  return state { entry = request,
+    going  = state {},
+    braked = state { entry = "safe_hold",
+      braking = state {},
+      waiting = state {},
+      trans { src = "initial", tgt = "braking" },
+      trans { src = "braking", tgt = "waiting", events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
+    },
+    trans { src = "initial", tgt = "going" },
+    trans { src = "going",   tgt = "braked", events = STOPS },
+  }
+end
+
 -- What ends copying without being a fault.
 local PARTS = { "e_misaligned", "e_peer_left", "e_torque_sat", "e_JNT_SOFT_LIMIT_EXEEDED", "enable_copying.failed" }
 
@@ -209,6 +224,15 @@ return state {
   halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
   lowering = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
 
+  -- Stopped when the arm lies on its stops already: how far the way down had come is kept.
+  resting = state {
+    parked  = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
+    stopped = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
+    cleaned = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
+    unwired = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
+    trans { src = "initial", tgt = "parked" },
+  },
+
   -- The arm goes down before anything that holds it is stopped.
   shutting_down = state {
     quieting     = state { entry = "base_stop" },
@@ -217,8 +241,8 @@ return state {
     stopping     = state { entry = "stop_control" },
     powering_off = state { entry = "stop_all" },
     cleaning     = state { entry = "cleanup_all" },
-    unwiring     = state { entry = "disconnect_all" },
-    destroying   = state { entry = "destroy_all" },
+    unwiring     = once("disconnect_all"),
+    destroying   = once("destroy_all"),
 
     trans { src = "initial",      tgt = "quieting" },
     trans { src = "quieting",     tgt = "holding",      events = { "base_stop.ok" } },
@@ -227,7 +251,7 @@ return state {
     trans { src = "stopping",     tgt = "powering_off", events = { "stop_control.ok" } },
     trans { src = "powering_off", tgt = "cleaning",     events = { "stop_all.ok" } },
     trans { src = "cleaning",     tgt = "unwiring",     events = { "cleanup_all.ok" } },
-    trans { src = "unwiring",     tgt = "destroying",   events = { "disconnect_all.ok" } },
+    trans { src = ".unwiring.going", tgt = "destroying", events = { "disconnect_all.ok" } },
   },
 
   -- A step of the teardown failed: everything stays as it is, the arm where it is. `e_shutdown` goes on from there.
@@ -287,6 +311,27 @@ return state {
   trans { src = "lowering.releasing.on",      tgt = "stranded.before_parking", events = { "safe_hold.undone" } },
   trans { src = "lowering.releasing.leaving", tgt = "shutting_down",           events = { "safe_hold.undone" } },
 
+  trans { src = "shutting_down.stopping",     tgt = "resting.parked",  events = STOPS },
+  trans { src = "shutting_down.powering_off", tgt = "resting.parked",  events = STOPS },
+  trans { src = "shutting_down.cleaning",     tgt = "resting.stopped", events = STOPS },
+  trans { src = "shutting_down.unwiring.braked",   tgt = "resting.unwired.waiting", events = { "disconnect_all.ok" } },
+  trans { src = "shutting_down.unwiring.braked",   tgt = "resting.cleaned.waiting",
+          events = { "disconnect_all.failed", "disconnect_all.cancelled", "disconnect_all.broken" } },
+  trans { src = "shutting_down.destroying.braked", tgt = "resting.unwired.waiting",
+          events = { "destroy_all.failed", "destroy_all.cancelled", "destroy_all.broken" } },
+  trans { src = "stranded.parked",            tgt = "resting.parked",  events = STOPS },
+  trans { src = "stranded.stopped",           tgt = "resting.stopped", events = STOPS },
+  trans { src = "stranded.cleaned",           tgt = "resting.cleaned", events = STOPS },
+  trans { src = "stranded.unwired",           tgt = "resting.unwired", events = STOPS },
+  trans { src = "resting.parked.releasing.on",       tgt = "stranded.parked",           events = { "safe_hold.undone" } },
+  trans { src = "resting.stopped.releasing.on",      tgt = "stranded.stopped",          events = { "safe_hold.undone" } },
+  trans { src = "resting.cleaned.releasing.on",      tgt = "stranded.cleaned",          events = { "safe_hold.undone" } },
+  trans { src = "resting.unwired.releasing.on",      tgt = "stranded.unwired",          events = { "safe_hold.undone" } },
+  trans { src = "resting.parked.releasing.leaving",  tgt = "shutting_down.stopping",    events = { "safe_hold.undone" } },
+  trans { src = "resting.stopped.releasing.leaving", tgt = "shutting_down.cleaning",    events = { "safe_hold.undone" } },
+  trans { src = "resting.cleaned.releasing.leaving", tgt = "shutting_down.unwiring",    events = { "safe_hold.undone" } },
+  trans { src = "resting.unwired.releasing.leaving", tgt = "shutting_down.destroying",  events = { "safe_hold.undone" } },
+
   trans { src = "deploying",                tgt = "halted", events = STOPS },
   trans { src = "deploy_failed",            tgt = "halted", events = STOPS },
   trans { src = "cancelling",               tgt = "halted", events = STOPS },
@@ -301,12 +346,12 @@ return state {
   trans { src = "shutting_down", tgt = "stranded.parked",
           events = { "stop_control.failed", "stop_all.failed", "stop_control.broken", "stop_all.broken" } },
   trans { src = "shutting_down", tgt = "stranded.stopped", events = { "cleanup_all.failed", "cleanup_all.broken" } },
-  trans { src = "shutting_down", tgt = "stranded.cleaned", events = { "disconnect_all.failed", "disconnect_all.broken" } },
-  trans { src = "shutting_down", tgt = "stranded.unwired", events = { "destroy_all.failed", "destroy_all.broken" } },
+  trans { src = "shutting_down.unwiring.going",   tgt = "stranded.cleaned", events = { "disconnect_all.failed", "disconnect_all.broken" } },
+  trans { src = "shutting_down.destroying.going", tgt = "stranded.unwired", events = { "destroy_all.failed", "destroy_all.broken" } },
   trans { src = "stranded.before_parking", tgt = "shutting_down",              events = { "e_shutdown", "e_go_on" } },
-  trans { src = "stranded.parked",         tgt = "shutting_down.stopping",     events = { "e_shutdown" } },
-  trans { src = "stranded.stopped",        tgt = "shutting_down.cleaning",     events = { "e_shutdown" } },
-  trans { src = "stranded.cleaned",        tgt = "shutting_down.unwiring",     events = { "e_shutdown" } },
-  trans { src = "stranded.unwired",        tgt = "shutting_down.destroying",   events = { "e_shutdown" } },
+  trans { src = "stranded.parked",         tgt = "shutting_down.stopping",     events = { "e_shutdown", "e_go_on" } },
+  trans { src = "stranded.stopped",        tgt = "shutting_down.cleaning",     events = { "e_shutdown", "e_go_on" } },
+  trans { src = "stranded.cleaned",        tgt = "shutting_down.unwiring",     events = { "e_shutdown", "e_go_on" } },
+  trans { src = "stranded.unwired",        tgt = "shutting_down.destroying",   events = { "e_shutdown", "e_go_on" } },
   trans { src = "shutting_down.destroying", tgt = "idle", events = { "destroy_all.ok" } },
 }

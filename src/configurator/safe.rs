@@ -60,8 +60,8 @@ impl Engine {
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
-        // The frame as it would be if what is interrupted had never been, and what was seen otherwise were as it is meant.
-        let before = self.world.as_all_meant(before);
+        // The frame as it would be if what is interrupted had never been, and what is broken were as others had left it.
+        let before = self.world.as_left_by_safe(before);
         let frame = before.map_or(frame, |before| plan(&before, &self.world.stack, &earlier).frame);
         frame.steps().iter().for_each(|planned| touched.add(&planned.step));
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {

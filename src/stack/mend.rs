@@ -43,15 +43,15 @@ impl World {
         meant
     }
 
-    /// A picture (that as it is, where there is none) in which what was seen otherwise is as the model has it. None: nothing was.
-    pub fn as_all_meant(&self, picture: Option<System>) -> Option<System> {
-        let mut otherwise = self.broken.iter().filter(|broken| broken.seen.is_some()).peekable();
-        if otherwise.peek().is_none() {
+    /// A picture (that as it is, where there is none) in which what is broken is as safe configurations in force had left it:
+    /// their undo takes that back, not that of one that comes now. None: nothing is broken.
+    pub fn as_left_by_safe(&self, picture: Option<System>) -> Option<System> {
+        if self.broken.is_empty() {
             return picture;
         }
-        let mut meant = picture.unwrap_or_else(|| self.system.clone());
-        otherwise.for_each(|broken| self.put_meant(broken, &mut meant));
-        Some(meant)
+        let mut left = picture.unwrap_or_else(|| self.system.clone());
+        self.broken.iter().for_each(|broken| self.put_left_by_safe(broken, &mut left));
+        Some(left)
     }
 
     /// Something is broken from now on. What the model has of it may have been written by safe configurations in force: what is
@@ -114,6 +114,10 @@ impl World {
     pub fn put_meant(&self, broken: &Broken, system: &mut System) {
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let _ = system.adopt(&components, &broken.expected);
+        self.put_left_by_safe(broken, system);
+    }
+
+    fn put_left_by_safe(&self, broken: &Broken, system: &mut System) {
         for (_, saved) in self.overwritten(broken) {
             let written = match (saved.slot, self.written(broken, saved.slot)) {
                 (Slot::Property(property), Some(Saved::Property(value))) => Some(Step::PropertySet { property, value }),
@@ -128,7 +132,7 @@ impl World {
             // Not a step that is done: nothing need allow it.
             written.iter().for_each(|step| step::effect(step, system));
         }
-        for component in components {
+        for component in broken.components.iter().copied() {
             // Where their undo leads somewhere else than is expected, that is told all the time.
             let state = system.component(component).map(|node| node.state);
             if let Some((_, after)) = self.moved_by_safe(component).filter(|(before, _)| Some(*before) == state) {

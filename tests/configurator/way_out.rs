@@ -314,6 +314,10 @@ fn there_is_a_way_out_of_what_was_found() {
         (vec![(safe("quiet"), 2), (Act::UndoSafe(place(&SAFE, "quiet")), 1), (safe("brake"), 0)], vec![]),
         // What a safe configuration had not stopped is stopped by the next, and started again by the undo of the first.
         (vec![(safe("quiet"), 0), (apply("swap"), 5), (safe("quiet"), 0)], vec![on("stop C", lie)]),
+        (
+            vec![(safe("brake"), 2), (Act::Undo(0), 2), (apply("hold"), 4), (safe("quiet"), 0)],
+            vec![on("configure C", 2), (place(&STEPS, "stop C"), lie, 2)],
+        ),
         // What was being mended when a safe configuration came is known to it as it was before it failed.
         (
             vec![
