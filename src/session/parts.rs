@@ -79,14 +79,13 @@ impl Part {
         parts
     }
 
-    /// Its state of that name, which may have the coordinator's name before it.
-    pub fn find(&self, state: &str) -> Option<NodeId> {
-        let own = match state.split_once(':') {
-            Some((name, own)) if name == self.name.as_str() => own,
-            Some(_) => return None,
-            None => state,
-        };
-        self.chart.find(own).ok()
+    /// Its states of that name, which may have the coordinator's name before it.
+    pub fn named(&self, state: &str) -> Vec<NodeId> {
+        match state.split_once(':') {
+            Some((name, own)) if name == self.name.as_str() => self.chart.named(own),
+            Some(_) => Vec::new(),
+            None => self.chart.named(state),
+        }
     }
 
     /// Its active state that means that the bring-up failed.

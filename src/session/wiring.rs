@@ -208,13 +208,14 @@ impl Session {
 
     /// Whether a coordinator has a state of that name (`STATE`, or `COORDINATOR:STATE`).
     pub fn knows_state(&self, state: &str) -> bool {
-        self.parts.iter().any(|part| part.find(state).is_some())
+        self.parts.iter().any(|part| !part.named(state).is_empty())
     }
 
-    /// Whether a state is active: in all coordinators that have one of that name.
+    /// Whether a state is active: in all coordinators that have one of that name, any of those that a name stands for.
     pub fn in_state(&self, state: &str) -> bool {
-        let mut found = self.parts.iter().filter_map(|part| Some((part, part.find(state)?))).peekable();
-        found.peek().is_some() && found.all(|(part, id)| part.coordinator.is_active(id))
+        let named = self.parts.iter().map(|part| (part, part.named(state)));
+        let mut found = named.filter(|(_, ids)| !ids.is_empty()).peekable();
+        found.peek().is_some() && found.all(|(part, ids)| ids.iter().any(|id| part.coordinator.is_active(*id)))
     }
 
     /// Leaves a command for whoever drives the session.

@@ -425,20 +425,11 @@ impl Chart {
     /// # Errors
     /// [`FindError`] when no state or more than one is named so. A full name is never ambiguous.
     pub fn find(&self, text: &str) -> Result<NodeId, FindError> {
-        let parts: Vec<&str> = text.split('.').collect();
-        let mut found = Vec::new();
-        for node in self.nodes().filter(|node| self.is_state(*node)) {
-            if self.ends_with(node, &parts) {
-                if self.depth(node) + 1 == parts.len() {
-                    return Ok(node);
-                }
-                found.push(node);
-            }
-        }
+        let found = self.named(text);
         match found[..] {
             [node] => Ok(node),
             [] => {
-                let last = parts.last().copied().unwrap_or_default();
+                let last = text.rsplit('.').next().unwrap_or_default();
                 let names: Vec<String> =
                     self.nodes().filter(|n| self.is_state(*n)).map(|n| self.name(n).to_string()).collect();
                 let near = crate::model::finding::nearest(last, names.iter().map(String::as_str)).map(str::to_owned);
@@ -449,6 +440,15 @@ impl Chart {
                 candidates: found.iter().map(|n| self.fqn(*n).to_string()).collect(),
             }),
         }
+    }
+
+    /// All states that `text` names, as [`Self::find`] reads it: one where that is a full name.
+    pub fn named(&self, text: &str) -> Vec<NodeId> {
+        let parts: Vec<&str> = text.split('.').collect();
+        let fits = |node: &NodeId| self.is_state(*node) && self.ends_with(*node, &parts);
+        let found: Vec<NodeId> = self.nodes().filter(fits).collect();
+        let whole = found.iter().find(|node| self.depth(**node) + 1 == parts.len());
+        whole.map_or(found.clone(), |whole| vec![*whole])
     }
 
     fn ends_with(&self, node: NodeId, parts: &[&str]) -> bool {

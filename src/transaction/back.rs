@@ -163,7 +163,8 @@ impl Transaction {
             }
             let goes_back = self.goes_back(i, part, &self.touched, &mut heed);
             // Past what stays since it moves goes only what safe configurations want.
-            let demanded = || goes_back.late && goes_back.steps.last().is_some_and(|back| self.touched.wants_step(back));
+            let demanded =
+                || goes_back.late && goes_back.steps.last().is_some_and(|back| self.touched.wants_step(back));
             if way.withheld.is_some() && !demanded() {
                 order.leave(original, &after);
                 continue;

@@ -227,7 +227,15 @@ impl Transaction {
     }
 
     /// Names the end. `whole`: `wanted` has nothing of what was done.
-    pub(super) fn judge(&mut self, part: usize, wanted: &System, whole: bool, observed: bool, live: &System, can: &Can<'_>) {
+    pub(super) fn judge(
+        &mut self,
+        part: usize,
+        wanted: &System,
+        whole: bool,
+        observed: bool,
+        live: &System,
+        can: &Can<'_>,
+    ) {
         let forward = self.forward.as_ref().expect("it was carried out");
         let open = forward.unsettled.iter().filter(|i| !self.taken_back.contains(i));
         let mut unsettled: Vec<Step> = open.map(|i| forward.list[*i as usize].step.clone()).collect();

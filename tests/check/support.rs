@@ -92,9 +92,16 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
                 let cannot = ["lost", "rounds", "down"];
                 let told = trace.iter().any(|step| cannot.contains(&step["what"].as_str().unwrap()));
                 assert!(
-                    told || ["on its way", "at once", "at different times", "not known", "only with time", "only creates"]
-                        .iter()
-                        .any(|why| made.err.contains(why)),
+                    told || [
+                        "on its way",
+                        "at once",
+                        "at different times",
+                        "not known",
+                        "only with time",
+                        "only creates"
+                    ]
+                    .iter()
+                    .any(|why| made.err.contains(why)),
                     "{}",
                     made.err
                 );

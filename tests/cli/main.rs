@@ -20,6 +20,7 @@ mod lost;
 mod monitor;
 mod motion;
 mod recovery;
+mod resting;
 mod several;
 mod simulated;
 mod stalled;

