@@ -5,8 +5,10 @@ use super::run::Run;
 use super::touched::Touched;
 use super::{Can, Phase, Transaction};
 use crate::model::{OnFailure, RunState, Snapshot, Step};
+use crate::system::touch::{Slot, slot};
 use crate::system::{System, View as _, moves_any, step};
 use crate::time::Time;
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// What is known of mending.
@@ -18,8 +20,9 @@ pub(super) struct Mending {
     pub interrupted: Option<bool>,
     /// It has broken off: what had failed may be on its way to where it should be.
     pub broke_off: bool,
-    /// The components as the model had them before it took over what was found: where they still should be, if it breaks off.
-    pub known: Option<Snapshot>,
+    /// What leads from what was found, and the model took over, to what it had before, but for what the transaction itself has
+    /// done: it still should be so, if mending breaks off.
+    pub otherwise: Vec<Step>,
 }
 
 impl Mending {
@@ -39,13 +42,8 @@ impl Transaction {
     /// configurations want them somewhere: also those that are on their way from there, where they were being mended.
     pub(super) fn put_back(&self, system: &mut System, heeding: &Touched) {
         let broke = self.mending.broke();
-        if let Some(known) = self.mending.known.as_ref().filter(|_| broke) {
-            let mut before = system.clone();
-            // Its types were known.
-            let _ = before.adopt(&self.own(), known);
-            for step in self.own_difference(system, &before).iter().filter(|step| !heeding.has(step)) {
-                let _ = step::apply(step, system);
-            }
+        for step in self.mending.otherwise.iter().filter(|step| broke && !heeding.has(step)) {
+            let _ = step::apply(step, system);
         }
         let forward = self.forward.as_ref().expect("it was carried out");
         // The last fault of a component first: between two of them the way back may have brought it somewhere else.
@@ -72,7 +70,7 @@ impl Transaction {
             Some(target) => *target,
             None => self.wanted(part, live),
         };
-        let known = live.snapshot_some(&own);
+        let known = live.clone();
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
         let observed = adopted == Some(true);
         if observed && self.phase == Phase::Looking && self.mends(part) {
@@ -84,7 +82,12 @@ impl Transaction {
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
-                self.mending.known.get_or_insert(known);
+                let done = self.forward.iter().flat_map(|run| run.done.iter().map(|i| slot(&run.list[*i as usize].step)));
+                let done: FxHashSet<Slot> = done.collect();
+                let otherwise = self.own_difference(live, &known);
+                if !self.mending.broke() {
+                    self.mending.otherwise = otherwise.into_iter().filter(|step| !done.contains(&slot(step))).collect();
+                }
                 return self.mend(steps, (wanted, whole));
             }
         }

@@ -447,7 +447,7 @@ impl Transaction {
         let part = self.failed_part();
         match self.mending.interrupted.take() {
             Some(true) if whole => {
-                self.mending.known = None;
+                self.mending.otherwise.clear();
                 self.taken_back.extend(self.remaining(part));
                 self.faulted.clear();
                 self.forward.iter_mut().for_each(|forward| forward.faulted.clear());
