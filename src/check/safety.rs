@@ -10,7 +10,7 @@ use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
 /// Events that no coordinator listens to.
@@ -37,11 +37,16 @@ impl Graph<'_, '_> {
     pub(super) fn safety(&mut self, found: &mut Traced) {
         let events: Vec<_> = self.product.deployment.safety.clone();
         let order = self.in_order();
+        // Where nothing comes from outside, it does not matter what came first.
+        let mut walk = Walk { good: FxHashSet::default(), on_the_way: Vec::new() };
+        let mut alike: FxHashMap<usize, (Option<u32>, Vec<String>)> = FxHashMap::default();
         for (event, origin) in events {
             let mut known: FxHashSet<(Vec<NodeId>, u32)> = FxHashSet::default();
-            let mut first: Option<u32> = None;
-            let mut places: Vec<String> = Vec::new();
-            for at in &order {
+            let class =
+                self.product.outside.iter().position(|outside| *outside == event).map(|at| self.product.alike[at]);
+            let said = class.and_then(|class| alike.get(&class).cloned());
+            let (mut first, mut places) = said.clone().unwrap_or_default();
+            for at in order.iter().filter(|_| said.is_none()) {
                 let state = &self.states[*at as usize];
                 let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_empty());
                 if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
@@ -52,7 +57,7 @@ impl Graph<'_, '_> {
                 if state.desk.is_empty() && !known.insert((state.leaves.to_vec(), world)) {
                     continue;
                 }
-                if leads_to_safe(self.product, &state, event) {
+                if leads_to_safe(self.product, &state, event, &mut walk) {
                     continue;
                 }
                 first.get_or_insert(*at);
@@ -61,6 +66,7 @@ impl Graph<'_, '_> {
                     places.push(place);
                 }
             }
+            class.into_iter().for_each(|class| _ = alike.insert(class, (first, places.clone())));
             let Some(at) = first else { continue };
             let more = places.len().saturating_sub(6);
             places.truncate(6);
@@ -94,7 +100,7 @@ fn is_asked(product: &Product<'_>, state: &State) -> bool {
 }
 
 /// Whether `event` leads to a safe configuration from this state on every way on which nothing else comes from outside.
-fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName) -> bool {
+fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName, walk: &mut Walk) -> bool {
     if is_asked(product, state) {
         return true;
     }
@@ -105,7 +111,6 @@ fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName) -> 
             after = after.into_iter().flat_map(|state| product.react(state, number, id)).collect();
         }
     }
-    let mut walk = Walk { good: FxHashSet::default(), on_the_way: Vec::new() };
     after.iter().all(|state| walk.leads(product, state))
 }
 

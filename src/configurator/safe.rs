@@ -155,7 +155,9 @@ impl Engine {
         if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
             broken = Some(part);
         }
-        let interrupted = self.running.iter().any(|running| !running.is_safe() && !running.over);
+        // Planned as if that had never been.
+        let interrupted =
+            !self.world.broken.is_empty() || self.running.iter().any(|running| !running.is_safe() && !running.over);
         let held = self.held_frames();
         let failed = broken.as_ref().map(|part| part.frame.as_ref());
         let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };

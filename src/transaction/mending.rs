@@ -82,7 +82,8 @@ impl Transaction {
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
-                let done = self.forward.iter().flat_map(|run| run.done.iter().map(|i| slot(&run.list[*i as usize].step)));
+                let done =
+                    self.forward.iter().flat_map(|run| run.done.iter().map(|i| slot(&run.list[*i as usize].step)));
                 let done: FxHashSet<Slot> = done.collect();
                 let otherwise = self.own_difference(live, &known);
                 if !self.mending.broke() {

@@ -317,6 +317,10 @@ fn there_is_a_way_out_of_what_was_found() {
             vec![(safe("brake"), 2), (Act::Undo(0), 2), (apply("hold"), 4), (safe("quiet"), 0)],
             vec![on("configure C", 2), (place(&STEPS, "stop C"), lie, 2)],
         ),
+        (
+            vec![(safe("quiet"), 0), (apply("again"), 0), (apply("swap"), 5), (safe("quiet"), 0)],
+            vec![on("start C", silent), (place(&STEPS, "stop A"), late, 2)],
+        ),
         // What was being mended when a safe configuration came is known to it as it was before it failed.
         (
             vec![
