@@ -71,7 +71,7 @@ pub struct SafeEnd<'f> {
     pub missed: &'f [Step],
     /// A piece of it could not even be planned.
     pub left_out: bool,
-    /// Something is interrupted for its sake.
+    /// It was planned for another system than there was: something is interrupted for its sake, or was broken.
     pub interrupts: bool,
 }
 
