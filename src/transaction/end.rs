@@ -401,8 +401,11 @@ impl Transaction {
         } else {
             self.items_left(part, live)
         };
+        // A safe configuration that is being undone demands nothing any more of what is back, and perhaps broken.
+        let demands = !(undone && planned.frame.as_ref().is_some_and(|frame| frame.safe));
+        let left = residual.components().filter(|_| demands);
         let components: FxHashSet<ComponentName> =
-            items.iter().flat_map(|item| touch::components(&item.step)).chain(residual.components()).collect();
+            items.iter().flat_map(|item| touch::components(&item.step)).chain(left).collect();
         let slots: FxHashSet<_> = items.iter().filter_map(|item| touch::absolute(&item.step)).collect();
         let irreversible = residual.irreversible.first().cloned();
         let frame = planned.frame.as_deref().map(|frame| {

@@ -321,6 +321,11 @@ fn there_is_a_way_out_of_what_was_found() {
             vec![(safe("quiet"), 0), (apply("again"), 0), (apply("swap"), 5), (safe("quiet"), 0)],
             vec![on("start C", silent), (place(&STEPS, "stop A"), late, 2)],
         ),
+        // What is half undone of a safe configuration is no longer kept as that wanted it.
+        (
+            vec![(safe("quiet"), 0), (Act::UndoSafe(place(&SAFE, "quiet")), 0)],
+            vec![on("start C", lie), on("start A", fails)],
+        ),
         // What was being mended when a safe configuration came is known to it as it was before it failed.
         (
             vec![
