@@ -115,14 +115,29 @@ pub const SIM_NOTES: usize = 1024;
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;
 
-/// Answers and operators' events that may wait for a coordinator. Requests are answered once each, and a person types.
-pub const INBOX_CONTROL: usize = 1024;
+/// Answers that a coordinator may wait for or has not heard yet: it asks for a few in one step. What it asks for beyond that is
+/// answered *failed* at once.
+pub const INBOX_ANSWERS: usize = 1024;
 
-/// Events of monitors and components that may wait for a coordinator: some milliseconds of reacting. What waits longer is
-/// no news any more.
+/// Events of monitors, components and other coordinators that may wait for a coordinator: some milliseconds of reacting. What
+/// waits longer is no news any more; of each event that it waits for there is room for one beside them.
 pub const INBOX_REPORT: usize = 4096;
 
-/// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: twice
+/// Events from outside that may wait for a coordinator: a person types, and a program that sends faster than that is told.
+pub const INBOX_OUTSIDE: usize = 1024;
+
+/// Safety events, losses and the like for which an inbox has room from the beginning. There is one of each name at most;
+/// beyond that it grows, and stays as large.
+pub const INBOX_SINGLES: usize = 64;
+
+/// Clients that may want to know what becomes of one urgent event that waits: one a connection.
+pub const INBOX_JOINED: usize = SOCKET_CONNECTIONS + SOCKET_KEPT;
+
+/// Turns in a row that a class of waiting events has while another one waits: enough for a burst of answers to be heard
+/// before anything else, few enough that nobody notices the wait.
+pub const INBOX_ROW: usize = 16;
+
+/// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: more than
 /// what its inbox holds.
 pub const MOMENT_TURNS: u32 = 10_000;
 

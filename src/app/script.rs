@@ -346,8 +346,7 @@ fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
         error(format!("the coordinator knows no event `{name}`: {help}"))
     })?;
     listen_anew(host, &session);
-    session.raise(event, "script");
-    Ok(())
+    session.offer(event, "script").map_err(|why| error(format!("`{name}` was not delivered: {why}")))
 }
 
 /// From now on only what comes is news.

@@ -551,6 +551,10 @@ codes! {
     QUEUE_FULL = "run::queue_full", "the configurator's queue is full",
         "More requests are waiting than the configurator's bounded queue holds. The request was answered *failed* instead of \
          being dropped silently. A coordinator should wait for an answer before it asks for more.";
+    ANSWERS_FULL = "run::answers_full", "the coordinator has no room for another answer",
+        "Room for an answer is taken when a coordinator asks. This one has asked for so much without hearing the answers that there \
+         is none left, so the request was answered *failed* at once and nothing was done. A coordinator should wait for an answer \
+         before it asks for more.";
     STEP_FAILED = "run::step_failed", "a step failed",
         "The platform answered that a step did not happen: it was refused, or the component's own code failed or panicked. \
          What the request had done before was undone, unless the answer is *broken*. Mend what the message names and ask again.";

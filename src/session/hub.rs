@@ -6,7 +6,7 @@
 use super::lanes::Lanes;
 use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
 use super::tap::Hears;
-use crate::coordinator::Refused;
+use crate::coordinator::{Put, Refused};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
 use crate::time::{Clock, Signal, Time};
@@ -142,10 +142,10 @@ impl Hub {
         self.record(what, true);
     }
 
-    /// Counts an event that found its coordinator's inbox full. That is told at once, and what comes after it at most once
-    /// in [`limits::DROPS_TOLD`], with the next event that comes then.
-    pub fn taken(&self, taken: Result<(), Refused>) {
-        let full = taken == Err(Refused::Full);
+    /// Counts an event that was lost since its coordinator's inbox is full. That is told at once, and what comes after it at
+    /// most once in [`limits::DROPS_TOLD`], with the next event that comes then.
+    pub fn taken(&self, taken: Result<Put, Refused>) {
+        let full = matches!(taken, Err(Refused::Full) | Ok(Put::Displaced));
         if !full && !self.untold.load(Ordering::Relaxed) {
             return;
         }
@@ -293,6 +293,11 @@ impl Hub {
     /// A component is well again, or gone.
     pub fn clear_fault(&self, component: &str) {
         self.lock().faults.retain(|f| f.component != component);
+    }
+
+    /// The session's time.
+    pub fn now(&self) -> Time {
+        self.clock.now()
     }
 
     /// Counts what was noted: between two looks with the same count nothing happened.
