@@ -92,6 +92,12 @@ pub const CHART_RUN: u64 = 10_000;
 /// chart past it is stepped by searching, which takes longer but not the more the larger it is.
 pub const CHART_REACTIONS: usize = 1 << 20;
 
+/// What finding these reactions may cost, in transitions and events looked at: a tenth of a second.
+pub const CHART_WORK: u64 = 1 << 24;
+
+/// Outgoing transitions of a node past which those of an event are looked up; up to it they are gone through faster.
+pub const CHART_WIDE: usize = 32;
+
 /// Transitions of a statechart that a running model may still add to, with the rows that are left behind when they move:
 /// about 20 MB.
 pub const GROWN_EDGES: usize = 1 << 18;
@@ -111,6 +117,25 @@ pub const SIM_ACTIONS_SHOWN: usize = 200;
 
 /// Notes of one line of `davit sim` (what functions print, what goes wrong); more are counted.
 pub const SIM_NOTES: usize = 1024;
+
+/// Attributes of one XML element; ours has a few. Whether one stands twice is found by comparing each with each.
+pub const XML_ATTRIBUTES: usize = 64;
+
+/// Declarations of namespaces in one XML document: what an element declares is copied for it with all that is declared around it.
+pub const XML_NAMESPACES: usize = 256;
+
+/// Bytes of one line of `davit sim`: more events than its queue takes.
+pub const SIM_LINE: usize = 1 << 20;
+
+/// Bytes of events for one `davit sim`: days of an eager typist. What it has read of names it keeps.
+pub const SIM_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Names of events that no transition lists and that come from outside all the same, since functions may see them. A name is
+/// kept for ever.
+pub const EVENTS_UNLISTED: usize = 4096;
+
+/// Bytes of such a name.
+pub const UNLISTED_BYTES: usize = 256;
 
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;

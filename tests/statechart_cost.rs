@@ -180,6 +180,35 @@ fn what_a_step_costs_does_not_depend_on_the_size_of_the_chart() {
 }
 
 #[test]
+fn what_a_step_costs_does_not_depend_on_how_many_transitions_leave_its_state() {
+    // Through the general engine, as compiling asks it for every reaction.
+    let cost = |count: usize| {
+        let mut root = state("root");
+        root.children.extend([Node::State(state("a")), Node::State(state("b"))]);
+        root.transitions.push(transition("initial", "a", ""));
+        root.transitions.push(transition("b", "a", "back"));
+        root.transitions.extend((0..count).map(|n| transition("a", "b", &format!("e{n}"))));
+        let (chart, _) = compile(&Statechart::new(root));
+        let chart = chart.unwrap();
+        let mut machine = Machine::new(&chart);
+        machine.run(&chart, Time(0), &mut Nobody);
+        let event = |text: &str| chart.event(EventName::new(text).unwrap());
+        let before = machine.work();
+        for n in (0..count).step_by(count / 100) {
+            for name in [format!("e{n}"), "nobody_knows_this".to_owned(), "back".to_owned()] {
+                machine.send(event(&name));
+                machine.run(&chart, Time(0), &mut Nobody);
+            }
+        }
+        assert_eq!(machine.leaf(), chart.find("a").ok());
+        machine.work() - before
+    };
+    let few = cost(1_000);
+    assert!(few > 0);
+    assert_eq!(cost(100_000), few);
+}
+
+#[test]
 fn a_net_of_connectors_costs_its_transitions_not_its_paths() {
     // 60 layers of two connectors, each leading to both of the next layer, and nothing at the end: 2^60 paths.
     let mut root = state("root");

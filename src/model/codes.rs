@@ -73,7 +73,8 @@ codes! {
          itself.";
     TEXT_TOO_MANY_NODES = "text::too_many_values", "a text unfolds to too many values",
         "Aliases in YAML and loops in Lua can make millions of values out of a few lines. Their number is bounded, so \
-         that no text can exhaust the memory. Write less of them, or split the file.";
+         that no text can exhaust the memory; so are the attributes of one XML element and the namespaces of a document. Write \
+         less of them, or split the file.";
     TEXT_SEVERAL_DOCUMENTS = "text::several_documents", "a YAML file holds several documents",
         "A line `---` begins a new YAML document. Davit reads one document a file and does not guess which one is \
          meant. Put the others into files of their own.";
@@ -652,7 +653,8 @@ codes! {
          the files that the deployment lists under `configurations`. Correct the name; without names, the bring-up is planned.";
     CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
-         a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
+         a directory, is no text, or has no end that is in sight: a line has at most 1 MiB, and all of them 64 MiB. Name another \
+         one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
     CLI_WHICH_WAY = "cli::which_way", "it is not said how to recover",

@@ -5,6 +5,7 @@
 
 use super::lanes::Lanes;
 use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
+use super::names::Unlisted;
 use super::tap::Hears;
 use crate::coordinator::{Put, Refused};
 use crate::limits;
@@ -34,6 +35,8 @@ pub struct Hub {
     outside: Condvar,
     configurations: FxHashSet<ConfigId>,
     emits: FxHashSet<EventName>,
+    /// Names from outside that only functions may hear.
+    pub(super) unlisted: Unlisted,
 }
 
 struct State {
@@ -114,6 +117,7 @@ impl Hub {
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
+            unlisted: Unlisted::default(),
         }
     }
 

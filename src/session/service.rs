@@ -166,13 +166,8 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
     let known = session.events();
     let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
     let mut answer = json!({ "accepted": true });
-    let listed = known.iter().any(|known| known.as_str() == name);
-    // Asked before it becomes a name: names are kept for ever.
-    if !listed && !session.sees_all_events() {
-        return Err(refused(format!("the coordinator knows no event `{name}`"), near()));
-    }
-    let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
-    if !listed {
+    let event = session.named(&name).map_err(|why| refused(why.to_string(), near()))?;
+    if !known.contains(&event) {
         answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
     }
     if let Some(why) = wait_for.as_ref().and_then(|name| session.never_heard(name)) {

@@ -9,6 +9,7 @@ mod commands;
 mod crowded;
 mod declared;
 mod demo;
+mod endless;
 mod explored;
 mod faults;
 mod force;
