@@ -696,6 +696,11 @@ codes! {
          or the directory was cleaned up (a logout does that to XDG_RUNTIME_DIR). It runs on, and no second deployment of \
          that name can start. It can be reached by signals only: Ctrl-C in its terminal, or SIGINT to its process (`pgrep -af \
          davit` shows the number), shuts it down in order.";
+    CLI_UNTRUSTED = "cli::untrusted", "a control socket is not the user's own",
+        "A command talks to a deployment only where the directory of the control sockets, the socket and the process that listens \
+         on it all belong to the user, others may not write to the directory, and neither is a symbolic link: who else put \
+         something there could answer in the deployment's name. A deployment turns away the processes of other users in the \
+         same way. Set XDG_RUNTIME_DIR to a directory of your own, for the deployment and for the commands.";
     CLI_REFUSED = "cli::refused", "the running deployment refused",
         "The running deployment understood the request and said no; the message is its own. An unknown event or \
          configuration is refused at once; a wait that ran out is told as such, and the request itself may still be \

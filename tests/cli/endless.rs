@@ -38,7 +38,7 @@ fn a_file_without_an_end_is_refused() {
 #[test]
 fn lines_without_an_end_are_refused() {
     let demo = Demo::new();
-    let mut command = demo.command(&["sim", "coordinator.lua", "--events", "-", "--json"]);
+    let mut command = demo.command(&["sim", "coordinator.lua", "--events", "-"]);
     let mut sim = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut input = sim.stdin.take().unwrap();
     let line = format!("{}\n", " ".repeat(davit::limits::SIM_LINE - 1));

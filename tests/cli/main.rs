@@ -14,6 +14,7 @@ mod explored;
 mod faults;
 mod force;
 mod foreground;
+mod foreign;
 mod hot_swap;
 mod lies;
 mod listed;
