@@ -92,6 +92,12 @@ pub const CHART_RUN: u64 = 10_000;
 /// chart past it is stepped by searching, which takes longer but not the more the larger it is.
 pub const CHART_REACTIONS: usize = 1 << 20;
 
+/// What finding these reactions may cost, in transitions and events looked at: a tenth of a second.
+pub const CHART_WORK: u64 = 1 << 24;
+
+/// Outgoing transitions of a node past which those of an event are looked up; up to it they are gone through faster.
+pub const CHART_WIDE: usize = 32;
+
 /// Transitions of a statechart that a running model may still add to, with the rows that are left behind when they move:
 /// about 20 MB.
 pub const GROWN_EDGES: usize = 1 << 18;
@@ -112,17 +118,51 @@ pub const SIM_ACTIONS_SHOWN: usize = 200;
 /// Notes of one line of `davit sim` (what functions print, what goes wrong); more are counted.
 pub const SIM_NOTES: usize = 1024;
 
+/// Attributes of one XML element; ours has a few. Whether one stands twice is found by comparing each with each.
+pub const XML_ATTRIBUTES: usize = 64;
+
+/// Declarations of namespaces in one XML document: what an element declares is copied for it with all that is declared around it.
+pub const XML_NAMESPACES: usize = 256;
+
+/// Bytes of one line of `davit sim`: more events than its queue takes.
+pub const SIM_LINE: usize = 1 << 20;
+
+/// Bytes of events for one `davit sim`: days of an eager typist. What it has read of names it keeps.
+pub const SIM_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Names of events that no transition lists and that come from outside all the same, since functions may see them. A name is
+/// kept for ever.
+pub const EVENTS_UNLISTED: usize = 4096;
+
+/// Bytes of such a name.
+pub const UNLISTED_BYTES: usize = 256;
+
 /// Connectors one after the other on a path. People write three; the search is recursive.
 pub const CONNECTOR_CHAIN: usize = 200;
 
-/// Answers and operators' events that may wait for a coordinator. Requests are answered once each, and a person types.
-pub const INBOX_CONTROL: usize = 1024;
+/// Answers that a coordinator may wait for or has not heard yet: it asks for a few in one step. What it asks for beyond that is
+/// answered *failed* at once.
+pub const INBOX_ANSWERS: usize = 1024;
 
-/// Events of monitors and components that may wait for a coordinator: some milliseconds of reacting. What waits longer is
-/// no news any more.
+/// Events of monitors, components and other coordinators that may wait for a coordinator: some milliseconds of reacting. What
+/// waits longer is no news any more; of each event that it waits for there is room for one beside them.
 pub const INBOX_REPORT: usize = 4096;
 
-/// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: twice
+/// Events from outside that may wait for a coordinator: a person types, and a program that sends faster than that is told.
+pub const INBOX_OUTSIDE: usize = 1024;
+
+/// Safety events, losses and the like for which an inbox has room from the beginning. There is one of each name at most;
+/// beyond that it grows, and stays as large.
+pub const INBOX_SINGLES: usize = 64;
+
+/// Clients that may want to know what becomes of one urgent event that waits: one a connection.
+pub const INBOX_JOINED: usize = SOCKET_CONNECTIONS + SOCKET_KEPT;
+
+/// Turns in a row that a class of waiting events has while another one waits: enough for a burst of answers to be heard
+/// before anything else, few enough that nobody notices the wait.
+pub const INBOX_ROW: usize = 16;
+
+/// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: more than
 /// what its inbox holds.
 pub const MOMENT_TURNS: u32 = 10_000;
 

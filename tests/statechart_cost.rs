@@ -1,15 +1,17 @@
 //! What a step of a pure chart costs: no allocation, and work that does not grow with the size of the chart. Counted, not
 //! timed; in a binary of its own, because it counts the allocations of its threads.
 
-use davit::coordinator::{Core, Listener};
+use davit::coordinator::{Class, Coordinator, Core, Incoming, Listener};
 use davit::model::finding::Origin;
 use davit::model::names::{ConfigId, EventName, Ident};
 use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
 use davit::statechart::{Chart, EventId, Machine, Nobody, Raised, compile};
-use davit::time::Time;
+use davit::time::{Clock, Time};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 struct Counting;
 
@@ -102,6 +104,59 @@ fn a_step_of_a_pure_chart_allocates_nothing() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1]))) == 1, "the counter counts");
 }
 
+/// What its thread has allocated so far, after each step.
+struct Seen {
+    steps: Arc<AtomicU64>,
+    allocated: Arc<AtomicU64>,
+}
+
+impl Listener for Seen {
+    fn raised(&mut self, _: &Chart, _: &[Raised]) {
+        self.allocated.store(ALLOCATIONS.with(Cell::get), Ordering::SeqCst);
+        self.steps.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn a_coordinator_takes_events_of_every_class_without_allocating() {
+    let clock = Clock::real();
+    let (steps, allocated): (Arc<AtomicU64>, Arc<AtomicU64>) = Default::default();
+    let listener = Seen { steps: steps.clone(), allocated: allocated.clone() };
+    let mut root = state("root");
+    let mut leaf = state("on");
+    leaf.entry.push((Action::Raise(EventName::new("entered").unwrap()), Origin::NONE));
+    root.children.push(Node::State(leaf));
+    root.transitions.push(transition("initial", "on", ""));
+    root.transitions.push(transition("on", "on", "next"));
+    let (chart, _) = compile(&Statechart::new(root));
+    let coordinator = Coordinator::start("coordinator", Arc::new(chart.unwrap()), &clock, listener);
+    let next = EventName::new("next").unwrap();
+    let all = [Class::Urgent, Class::Answer, Class::Notice, Class::Report, Class::Outside];
+    let (mut sent, mut begun) = (1, None);
+    let sending = |class: Class| {
+        coordinator.hold(class).unwrap();
+        coordinator.deliver(Incoming::new(class, next)).unwrap();
+    };
+    let mut mine = 0;
+    for round in 0..1_000 {
+        let own = allocations(|| all.into_iter().for_each(sending));
+        sent += all.len() as u64;
+        let deadline = clock.now() + Duration::from_secs(60);
+        while steps.load(Ordering::SeqCst) < sent {
+            assert!(clock.now() < deadline, "{steps:?} of {sent}");
+            std::thread::yield_now();
+        }
+        // What a thread makes when it first waits or is woken is made once.
+        if round == 10 {
+            begun = Some(allocated.load(Ordering::SeqCst));
+        }
+        mine += if round > 10 { own } else { 0 };
+    }
+    assert_eq!(Some(allocated.load(Ordering::SeqCst)), begun, "the coordinator's thread");
+    assert_eq!(mine, 0, "who sends");
+    coordinator.stop(Time::NEVER).unwrap();
+}
+
 /// Transitions looked at for 1,000 events.
 fn work(chart: &Chart) -> u64 {
     let mut machine = Machine::new(chart);
@@ -122,6 +177,35 @@ fn what_a_step_costs_does_not_depend_on_the_size_of_the_chart() {
     assert!(small > 0);
     assert_eq!(work(&rings(400, 4)), small);
     assert_eq!(work(&rings(25_000, 4)), small, "100,000 leaves");
+}
+
+#[test]
+fn what_a_step_costs_does_not_depend_on_how_many_transitions_leave_its_state() {
+    // Through the general engine, as compiling asks it for every reaction.
+    let cost = |count: usize| {
+        let mut root = state("root");
+        root.children.extend([Node::State(state("a")), Node::State(state("b"))]);
+        root.transitions.push(transition("initial", "a", ""));
+        root.transitions.push(transition("b", "a", "back"));
+        root.transitions.extend((0..count).map(|n| transition("a", "b", &format!("e{n}"))));
+        let (chart, _) = compile(&Statechart::new(root));
+        let chart = chart.unwrap();
+        let mut machine = Machine::new(&chart);
+        machine.run(&chart, Time(0), &mut Nobody);
+        let event = |text: &str| chart.event(EventName::new(text).unwrap());
+        let before = machine.work();
+        for n in (0..count).step_by(count / 100) {
+            for name in [format!("e{n}"), "nobody_knows_this".to_owned(), "back".to_owned()] {
+                machine.send(event(&name));
+                machine.run(&chart, Time(0), &mut Nobody);
+            }
+        }
+        assert_eq!(machine.leaf(), chart.find("a").ok());
+        machine.work() - before
+    };
+    let few = cost(1_000);
+    assert!(few > 0);
+    assert_eq!(cost(100_000), few);
 }
 
 #[test]

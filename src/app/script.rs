@@ -11,9 +11,9 @@ mod values;
 
 use super::{Refused, StartError};
 use crate::functions::message_within;
-use crate::lang::LoadOptions;
+use crate::lang::{LoadOptions, Sources};
 use crate::limits;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{Finding, did_you_mean};
 use crate::model::{Ask, ConfigId, EventName, Ident};
 use crate::runtime::Libraries;
 use crate::session::tap::Hears;
@@ -54,14 +54,9 @@ pub struct ScriptEnd {
 /// Why a script failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ScriptFailure {
-    /// The file cannot be read.
-    #[error("cannot read {path}")]
-    Read {
-        /// The script.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// The file cannot be read, is no text, or is too large.
+    #[error("{}", .0.message)]
+    Unreadable(Box<Finding>),
     /// It does not parse, or it raised an error; the text names file and line.
     #[error("{message}")]
     Lua {
@@ -100,11 +95,9 @@ const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
 
 /// Runs the script at `path`.
 pub fn run(path: &Path, options: Options) -> ScriptEnd {
-    let text = match std::fs::read(path) {
+    let text = match Sources::Disk.read(path) {
         Ok(text) => text,
-        Err(source) => {
-            return ScriptEnd { failure: Some(ScriptFailure::Read { path: path.to_owned(), source }), ended: None };
-        }
+        Err(finding) => return ScriptEnd { failure: Some(ScriptFailure::Unreadable(finding)), ended: None },
     };
     let clock = options.clock.clone();
     let _participant = clock.enter();
@@ -119,7 +112,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         refused: None,
         ended: None,
     }));
-    let failure = execute(path, &text, &host).err();
+    let failure = execute(path, text.as_bytes(), &host).err();
     let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
     if let Some(session) = host.session.take() {
         host.ended = Some(session.take_down(false));
@@ -338,16 +331,12 @@ const LINE: u32 = 1;
 
 fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
     let session = session(host)?;
-    let known = session.events();
-    // Functions see every event, also one that no transition lists.
-    let heard = |e: &EventName| known.contains(e) || session.sees_all_events();
-    let event = EventName::new(name).ok().filter(heard).ok_or_else(|| {
-        let help = did_you_mean(name, "events", known.iter().map(EventName::as_str));
-        error(format!("the coordinator knows no event `{name}`: {help}"))
+    let event = session.named(name).map_err(|why| {
+        let help = did_you_mean(name, "events", session.events().iter().map(EventName::as_str));
+        error(format!("{why}: {help}"))
     })?;
     listen_anew(host, &session);
-    session.raise(event, "script");
-    Ok(())
+    session.offer(event, "script").map_err(|why| error(format!("`{name}` was not delivered: {why}")))
 }
 
 /// From now on only what comes is news.

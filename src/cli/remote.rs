@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::exit::Exit;
-use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE};
+use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED};
 use crate::session::client::{Client, ClientError};
 use serde_json::Value as Json;
 use std::time::Duration;
@@ -76,6 +76,12 @@ pub fn failure(error: ClientError) -> Failure {
             format!("the deployment `{name}` runs, but its socket {} is gone", path.display()),
             "Ctrl-C in its terminal shuts it down in order, and so does SIGINT to its process: look for it with `pgrep -af \
              davit`",
+        ),
+        ClientError::Untrusted(why) => Failure::no(
+            CLI_UNTRUSTED,
+            format!("not asked: {why}"),
+            "set XDG_RUNTIME_DIR to a directory of yours, as where the deployment was started; a deployment of another user is \
+             asked by that user",
         ),
         ClientError::Io { name, source } => Failure {
             exit: Exit::No,

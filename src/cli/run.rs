@@ -10,7 +10,7 @@ use super::{Answer, Context, Failure, Run};
 use crate::app::PLATFORMS;
 use crate::app::script::{self, Options, ScriptFailure};
 use crate::model::Ident;
-use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX, TEXT_NO_FILE};
+use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -84,11 +84,9 @@ impl Run for Args {
 
 fn tell(failure: ScriptFailure) -> Failure {
     match failure {
-        ScriptFailure::Read { path, source } => Failure::usage(
-            TEXT_NO_FILE,
-            format!("cannot read {}: {source}", path.display()),
-            "give the path of a script; examples/youbot_story.lua is one",
-        ),
+        ScriptFailure::Unreadable(finding) => {
+            Failure { exit: Exit::Usage, findings: vec![*finding], ..Failure::default() }
+        }
         ScriptFailure::Lua { message, syntax: true } => {
             Failure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")
         }

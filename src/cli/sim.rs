@@ -6,10 +6,11 @@ use super::output::Style;
 use super::sim_editor::edit;
 use super::{Answer, Context, Failure, Run};
 use crate::functions::Opener;
+use crate::limits::{SIM_BYTES, SIM_LINE};
 use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
 use crate::statechart::{Hook, Observation, Sim, compile};
 use serde_json::{Value as Json, json};
-use std::io::{BufRead, BufReader, IsTerminal, Read};
+use std::io::{self, BufRead, BufReader, IsTerminal, Read};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -103,12 +104,12 @@ impl Args {
     fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> Answer {
         let out = &context.out;
         let mut exit = Exit::Done;
-        let mut lines = BufReader::new(input).lines();
+        let mut lines = Lines { input: BufReader::new(input), left: SIM_BYTES };
         loop {
             let line = match lines.next() {
-                None => break,
-                Some(Ok(line)) => line,
-                Some(Err(error)) => {
+                Ok(None) => break,
+                Ok(Some(line)) => line,
+                Err(error) => {
                     return Err(Failure::usage(
                         CLI_EVENTS_UNREADABLE,
                         format!("the events cannot be read: {error}"),
@@ -135,5 +136,29 @@ impl Args {
             }
         }
         Ok(exit)
+    }
+}
+
+/// Lines of a text that may have no end.
+struct Lines {
+    input: BufReader<Box<dyn Read>>,
+    left: u64,
+}
+
+impl Lines {
+    fn next(&mut self) -> io::Result<Option<String>> {
+        let mut line = Vec::new();
+        let read = (&mut self.input).take(SIM_LINE as u64 + 1).read_until(b'\n', &mut line)?;
+        let Some(left) = self.left.checked_sub(read as u64) else {
+            return Err(io::Error::other(format!("more than {} MB of them", SIM_BYTES / 1024 / 1024)));
+        };
+        self.left = left;
+        if line.pop_if(|last| *last == b'\n').is_some() {
+            line.pop_if(|last| *last == b'\r');
+        } else if line.len() > SIM_LINE {
+            return Err(io::Error::other(format!("a line is longer than {SIM_LINE} bytes")));
+        }
+        let text = String::from_utf8(line).map_err(|_| io::Error::other("a line is not UTF-8"))?;
+        Ok((read > 0).then_some(text))
     }
 }

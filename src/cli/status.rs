@@ -81,10 +81,11 @@ fn print(out: &Output, status: &Json) {
         let word = out.paint(Style::Care, "dropped");
         out.line(format!("{word}      {inside} events that a coordinator sent to itself: too many at once"));
     }
-    let dropped = ["control", "report"].map(|lane| status["dropped"][lane].as_u64().unwrap_or_default());
-    if dropped != [0, 0] {
-        let all = format!("{} events ({} of them answers or an operator's)", dropped[0] + dropped[1], dropped[0]);
-        out.line(format!("{}      {all}: the coordinator does not keep up", out.paint(Style::Care, "dropped")));
+    for (kind, what) in [("report", "lost"), ("outside", "from outside, refused")] {
+        if let Some(count) = status["dropped"][kind].as_u64().filter(|count| *count > 0) {
+            let word = out.paint(Style::Care, "dropped");
+            out.line(format!("{word}      {count} events {what}: the coordinator does not keep up"));
+        }
     }
     let empty = Vec::new();
     let stack = status["stack"].as_array().unwrap_or(&empty);

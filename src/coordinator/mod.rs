@@ -13,5 +13,5 @@ mod inbox;
 mod thread;
 
 pub use self::core::{Core, Delivered, Listener, Tag, Trouble};
-pub use inbox::{Dropped, Incoming, Lane, Refused};
+pub use inbox::{Class, Dropped, Incoming, Put, Refused};
 pub use thread::{Coordinator, Waited};

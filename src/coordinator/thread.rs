@@ -1,7 +1,7 @@
 //! The coordinator's own thread.
 
 use super::core::{Core, Listener, Trouble};
-use super::inbox::{Dropped, Inbox, Incoming, Refused};
+use super::inbox::{Class, Dropped, Inbox, Incoming, Put, Refused};
 use super::{Delivered, Tag};
 use crate::limits;
 use crate::model::names::EventName;
@@ -81,11 +81,12 @@ impl Coordinator {
         listener: impl Listener + Send + 'static,
         open: impl FnOnce() -> Result<F, String> + Send + 'static,
     ) -> Self {
+        let inbox = Inbox::new(chart.events().iter().copied());
         let shared = Arc::new(Shared {
             clock: clock.clone(),
             chart,
             grown: OnceLock::new(),
-            inbox: Mutex::new(Inbox::new()),
+            inbox: Mutex::new(inbox),
             bell: clock.signal(),
             leaf: AtomicUsize::new(0),
             detached: AtomicBool::new(false),
@@ -112,17 +113,34 @@ impl Coordinator {
         self.shared.chart()
     }
 
-    /// Puts an event into the inbox. Never waits.
+    /// Takes room for one event of a class: for an answer when it is asked for, for an event from outside before anybody else
+    /// is told of it. The next event of that class that is delivered takes that room.
     ///
     /// # Errors
-    /// [`Refused`]: the lane is full (counted), or the coordinator has been detached.
-    pub fn deliver(&self, incoming: Incoming) -> Result<(), Refused> {
+    /// [`Refused`]: there is none (counted), or the coordinator has been detached.
+    pub fn hold(&self, class: Class) -> Result<(), Refused> {
         if self.is_detached() {
             return Err(Refused::Detached);
         }
-        lock(&self.shared.inbox).push(incoming)?;
+        lock(&self.shared.inbox).hold(class)
+    }
+
+    /// Gives room back that was taken and is not needed.
+    pub fn release(&self, class: Class) {
+        lock(&self.shared.inbox).release(class);
+    }
+
+    /// Puts an event into the inbox. Never waits.
+    ///
+    /// # Errors
+    /// [`Refused`]: there is no room (counted), or the coordinator has been detached.
+    pub fn deliver(&self, incoming: Incoming) -> Result<Put, Refused> {
+        if self.is_detached() {
+            return Err(Refused::Detached);
+        }
+        let put = lock(&self.shared.inbox).push(incoming)?;
         self.shared.bell.notify();
-        Ok(())
+        Ok(put)
     }
 
     /// The active leaf; none before the chart was entered. Takes no lock (but for a model that has added to its chart).
@@ -264,18 +282,17 @@ impl Shared {
         });
         self.lost.store(core.lost(), Ordering::Relaxed);
         let mut round = Round::default();
+        let mut tickets = Vec::with_capacity(limits::INBOX_JOINED + 1);
         while !self.detached.load(Ordering::SeqCst) {
             let now = self.clock.now();
             // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
-            let worked = self.react(now, || match self.next() {
+            let worked = self.react(now, || match self.next(&mut tickets) {
                 Some(incoming) => {
                     let delivered = core.deliver(incoming.event, incoming.tag, now, &mut listener);
                     if delivered != Delivered::Stale {
                         self.delivered.fetch_add(1, Ordering::Relaxed);
                     }
-                    if incoming.ticket != 0 {
-                        listener.taken_up(incoming.ticket, delivered);
-                    }
+                    tickets.iter().for_each(|ticket| listener.taken_up(*ticket, delivered));
                     true
                 }
                 None if core.next_deadline().is_some_and(|due| due <= now) => {
@@ -294,8 +311,8 @@ impl Shared {
         }
     }
 
-    fn next(&self) -> Option<Incoming> {
-        lock(&self.inbox).pop()
+    fn next(&self, tickets: &mut Vec<u64>) -> Option<Incoming> {
+        lock(&self.inbox).pop(tickets)
     }
 
     /// Whether there was something to react to.

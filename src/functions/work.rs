@@ -66,6 +66,9 @@ impl Drop for Counted {
 }
 
 /// The allocator. It neither unwinds nor calls Lua.
+///
+/// # Safety
+/// To be called by Lua as its allocator, with the data that [`PLAIN`] was found with.
 unsafe extern "C" fn counting(data: *mut c_void, at: *mut c_void, before: usize, now: usize) -> *mut c_void {
     let Some(plain) = PLAIN.get() else { return ptr::null_mut() };
     // Where nothing is there yet, `before` says what kind of thing it will be.

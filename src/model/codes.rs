@@ -73,7 +73,8 @@ codes! {
          itself.";
     TEXT_TOO_MANY_NODES = "text::too_many_values", "a text unfolds to too many values",
         "Aliases in YAML and loops in Lua can make millions of values out of a few lines. Their number is bounded, so \
-         that no text can exhaust the memory. Write less of them, or split the file.";
+         that no text can exhaust the memory; so are the attributes of one XML element and the namespaces of a document. Write \
+         less of them, or split the file.";
     TEXT_SEVERAL_DOCUMENTS = "text::several_documents", "a YAML file holds several documents",
         "A line `---` begins a new YAML document. Davit reads one document a file and does not guess which one is \
          meant. Put the others into files of their own.";
@@ -551,6 +552,10 @@ codes! {
     QUEUE_FULL = "run::queue_full", "the configurator's queue is full",
         "More requests are waiting than the configurator's bounded queue holds. The request was answered *failed* instead of \
          being dropped silently. A coordinator should wait for an answer before it asks for more.";
+    ANSWERS_FULL = "run::answers_full", "the coordinator has no room for another answer",
+        "Room for an answer is taken when a coordinator asks. This one has asked for so much without hearing the answers that there \
+         is none left, so the request was answered *failed* at once and nothing was done. A coordinator should wait for an answer \
+         before it asks for more.";
     STEP_FAILED = "run::step_failed", "a step failed",
         "The platform answered that a step did not happen: it was refused, or the component's own code failed or panicked. \
          What the request had done before was undone, unless the answer is *broken*. Mend what the message names and ask again.";
@@ -648,7 +653,8 @@ codes! {
          the files that the deployment lists under `configurations`. Correct the name; without names, the bring-up is planned.";
     CLI_EVENTS_UNREADABLE = "cli::events_unreadable", "the file of events cannot be read",
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
-         a directory, or is no text. Name another one; each line is a set of events, `run`, or `advance SECONDS`.";
+         a directory, is no text, or has no end that is in sight: a line has at most 1 MiB, and all of them 64 MiB. Name another \
+         one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
     CLI_WHICH_WAY = "cli::which_way", "it is not said how to recover",
@@ -690,6 +696,11 @@ codes! {
          or the directory was cleaned up (a logout does that to XDG_RUNTIME_DIR). It runs on, and no second deployment of \
          that name can start. It can be reached by signals only: Ctrl-C in its terminal, or SIGINT to its process (`pgrep -af \
          davit` shows the number), shuts it down in order.";
+    CLI_UNTRUSTED = "cli::untrusted", "a control socket is not the user's own",
+        "A command talks to a deployment only where the directory of the control sockets, the socket and the process that listens \
+         on it all belong to the user, others may not write to the directory, and neither is a symbolic link: who else put \
+         something there could answer in the deployment's name. A deployment turns away the processes of other users in the \
+         same way. Set XDG_RUNTIME_DIR to a directory of your own, for the deployment and for the commands.";
     CLI_REFUSED = "cli::refused", "the running deployment refused",
         "The running deployment understood the request and said no; the message is its own. An unknown event or \
          configuration is refused at once; a wait that ran out is told as such, and the request itself may still be \

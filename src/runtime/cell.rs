@@ -36,12 +36,16 @@ pub(crate) struct Cell {
     gate: AtomicU32,
     /// The release (or, event-driven, the moment) of the last update since the last start; `NEVER`: none yet.
     last: AtomicU64,
-    body: UnsafeCell<Option<Box<dyn Body>>>,
+    body: Behind,
 }
 
-// SAFETY: `body` is touched only through an `Inside`, and an `Inside` exists only for who has set `BUSY`.
-unsafe impl Sync for Cell {}
-unsafe impl Send for Cell {}
+/// What is behind the gate.
+struct Behind(UnsafeCell<Option<Box<dyn Body>>>);
+
+// SAFETY: it is touched only through an `Inside`, and at any time there is one `Inside` of a cell at most: only who has set `BUSY`
+// has one, and who sets it sees (acquire) what the one before did (release). So several threads may share it, though each
+// touches it alone, and what it holds goes from one to the next: `Body` is `Send`. All else of a cell is `Sync` by itself.
+unsafe impl Sync for Behind {}
 
 /// Why a gate did not open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +89,7 @@ impl Cell {
             beat,
             gate: AtomicU32::new(0),
             last: AtomicU64::new(Time::NEVER.0),
-            body: UnsafeCell::new(Some(body)),
+            body: Behind(UnsafeCell::new(Some(body))),
         }
     }
 
@@ -270,13 +274,13 @@ impl<'a> Inside<'a> {
 
     fn body(&mut self) -> Option<&mut Box<dyn Body>> {
         // SAFETY: `BUSY` is set by us, see `Cell`; `&mut self` makes it the only reference.
-        unsafe { (*self.cell.body.get()).as_mut() }
+        unsafe { (*self.cell.body.0.get()).as_mut() }
     }
 
     /// Takes the component out for good.
     pub(crate) fn take(&mut self) -> Option<Box<dyn Body>> {
         // SAFETY: as above.
-        unsafe { (*self.cell.body.get()).take() }
+        unsafe { (*self.cell.body.0.get()).take() }
     }
 
     /// One update at a release. Its fault, if it has one. `first`: seconds that count as passed before the first one.

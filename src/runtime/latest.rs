@@ -6,6 +6,7 @@
 //! has one such cell per property and per connection, so ours is as small as its values.)
 
 use std::cell::UnsafeCell;
+use std::marker::PhantomData;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -22,6 +23,8 @@ struct Slots<T> {
 // SAFETY: every slot is at any time owned by exactly one of writer, reader and middle. The numbers start as 0, 1, 2 and
 // only change by exchanging an owned number with the middle one, so they stay three different numbers. A side touches the
 // slot it owns only; the exchange is acquire-release, so what one side did to a slot happens before what the other does.
+// Values go from thread to thread, so they must be `Send`; that a reader lends its slot to several threads only where the value is
+// `Sync` is said by the reader.
 unsafe impl<T: Send> Sync for Slots<T> {}
 
 /// The side that writes.
@@ -30,17 +33,30 @@ pub struct Writer<T> {
     own: u8,
 }
 
-/// The side that reads.
+/// The side that reads. It may go to another thread with values that may; several threads may look at it at once only where
+/// they may look at the value at once:
+///
+/// ```
+/// fn shared<T: Sync>(_: &T) {}
+/// shared(&davit::runtime::latest::latest(0_u64).1);
+/// ```
+///
+/// ```compile_fail,E0277
+/// fn shared<T: Sync>(_: &T) {}
+/// shared(&davit::runtime::latest::latest(std::cell::Cell::new(0_u64)).1);
+/// ```
 pub struct Reader<T> {
     shared: Arc<Slots<T>>,
     own: u8,
+    /// It lends the value of its slot to whoever sees it, as if it were its own.
+    lends: PhantomData<T>,
 }
 
 /// A cell that holds `value`, seen.
 pub fn latest<T: Clone>(value: T) -> (Writer<T>, Reader<T>) {
     let slots = [UnsafeCell::new(value.clone()), UnsafeCell::new(value.clone()), UnsafeCell::new(value)];
     let shared = Arc::new(Slots { slots, middle: AtomicU8::new(1) });
-    (Writer { shared: shared.clone(), own: 0 }, Reader { shared, own: 2 })
+    (Writer { shared: shared.clone(), own: 0 }, Reader { shared, own: 2, lends: PhantomData })
 }
 
 impl<T> Writer<T> {

@@ -25,7 +25,9 @@ struct Boxes<L> {
     outbox: AtomicPtr<Node<L>>,
 }
 
-// SAFETY: the pointers are owned chains of boxes, handed over whole by acquire-release exchanges.
+// SAFETY: the pointers are owned chains of boxes, handed over whole by acquire-release exchanges; whoever takes one out owns it
+// alone. So links go from thread to thread, which `Send` allows, and are never shared. (Without these two the pointers alone
+// would let boxes of anything travel.)
 unsafe impl<L: Send> Sync for Boxes<L> {}
 unsafe impl<L: Send> Send for Boxes<L> {}
 
@@ -35,10 +37,12 @@ fn take<L>(slot: &AtomicPtr<Node<L>>) -> Option<Box<Node<L>>> {
     (!taken.is_null()).then(|| unsafe { Box::from_raw(taken) })
 }
 
-/// Puts a chain in an empty slot. Only one side fills a slot, and the other only empties it, so it is still empty.
+/// Puts a chain in an empty slot. Only one side fills a slot, and the other only empties it, so it is still empty. An exchange
+/// all the same, not a store: it is as cheap on a way that is taken only when something changes, and what it finds is seen.
 fn put<L>(slot: &AtomicPtr<Node<L>>, chain: Option<Box<Node<L>>>) {
     if let Some(chain) = chain {
-        slot.store(Box::into_raw(chain), Ordering::Release);
+        let before = slot.swap(Box::into_raw(chain), Ordering::AcqRel);
+        debug_assert!(before.is_null(), "filled by one side only");
     }
 }
 

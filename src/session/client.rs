@@ -1,7 +1,7 @@
 //! The other end of the control socket, as the command line uses it.
 
 use super::owner;
-use super::place;
+use super::place::{self, Unreached, Untrusted};
 use super::rpc::RpcError;
 use crate::limits;
 use crate::model::finding::did_you_mean;
@@ -37,6 +37,9 @@ pub enum ClientError {
         /// Where the socket was.
         path: PathBuf,
     },
+    /// The directory of the sockets, the socket, or who listens there is another user's.
+    #[error(transparent)]
+    Untrusted(#[from] Untrusted),
     /// The connection failed.
     #[error("the running deployment `{name}` does not answer")]
     Io {
@@ -70,8 +73,9 @@ impl Client {
     /// Connects to the deployment of that name, or to the only one running.
     ///
     /// # Errors
-    /// When there is none, or several and no name.
+    /// When there is none, or several and no name; or what is there is not the user's own.
     pub fn connect(name: Option<&str>) -> Result<Self, ClientError> {
+        place::is_there()?;
         let name = match name {
             Some(name) => name.to_owned(),
             None => {
@@ -85,8 +89,10 @@ impl Client {
         };
         let clock = Clock::real();
         loop {
-            if let Ok(stream) = UnixStream::connect(place::socket(&name)) {
-                return Ok(Self { name, reader: BufReader::new(stream), next: 1 });
+            match place::reach(&place::socket(&name)) {
+                Ok(stream) => return Ok(Self { name, reader: BufReader::new(stream), next: 1 }),
+                Err(Unreached::Untrusted(why)) => return Err(why.into()),
+                Err(Unreached::Io(_)) => {}
             }
             if !owner::is_owned(&name) {
                 let running = place::running();

@@ -1,7 +1,8 @@
 //! Who is let in at the control socket: places, those that are kept, and what is done when there is none.
 
 use super::connection::Connection;
-use super::rpc;
+use super::place;
+use super::rpc::{self, RpcError};
 use super::serving::{Shared, serve, too_many};
 use crate::time::lock;
 use serde_json::Value as Json;
@@ -86,7 +87,7 @@ impl Doors {
                 Err(_) => {
                     drop(spare.take());
                     if let Ok((stream, _)) = listener.accept() {
-                        refuse(number, stream, shared);
+                        refuse(number, stream, shared, too_many());
                     }
                     self.pause(shared);
                     spare = File::open("/dev/null").ok();
@@ -105,7 +106,11 @@ impl Doors {
     }
 
     fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>) {
-        let Some(place) = self.place(shared) else { return refuse(number, stream, shared) };
+        if !place::is_own(&stream) {
+            let why = "this socket is for the processes of its own user";
+            return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
+        }
+        let Some(place) = self.place(shared) else { return refuse(number, stream, shared, too_many()) };
         let Ok(connection) = Connection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
         self.enter(&connection);
         let (shared, own) = (shared.clone(), connection.clone());
@@ -121,9 +126,9 @@ impl Doors {
     }
 }
 
-fn refuse(number: u32, stream: UnixStream, shared: &Shared) {
+fn refuse(number: u32, stream: UnixStream, shared: &Shared, why: RpcError) {
     // A line of a new connection finds room: nobody waits here.
     if let Ok(connection) = Connection::new(number, stream, shared.bounds.write) {
-        let _ = connection.send(&rpc::answer(&Json::Null, Err(too_many())));
+        let _ = connection.send(&rpc::answer(&Json::Null, Err(why)));
     }
 }

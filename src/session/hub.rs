@@ -5,8 +5,9 @@
 
 use super::lanes::Lanes;
 use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
+use super::names::Unlisted;
 use super::tap::Hears;
-use crate::coordinator::Refused;
+use crate::coordinator::{Put, Refused};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
 use crate::time::{Clock, Signal, Time};
@@ -34,6 +35,8 @@ pub struct Hub {
     outside: Condvar,
     configurations: FxHashSet<ConfigId>,
     emits: FxHashSet<EventName>,
+    /// Names from outside that only functions may hear.
+    pub(super) unlisted: Unlisted,
 }
 
 struct State {
@@ -114,6 +117,7 @@ impl Hub {
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
+            unlisted: Unlisted::default(),
         }
     }
 
@@ -142,10 +146,10 @@ impl Hub {
         self.record(what, true);
     }
 
-    /// Counts an event that found its coordinator's inbox full. That is told at once, and what comes after it at most once
-    /// in [`limits::DROPS_TOLD`], with the next event that comes then.
-    pub fn taken(&self, taken: Result<(), Refused>) {
-        let full = taken == Err(Refused::Full);
+    /// Counts an event that was lost since its coordinator's inbox is full. That is told at once, and what comes after it at
+    /// most once in [`limits::DROPS_TOLD`], with the next event that comes then.
+    pub fn taken(&self, taken: Result<Put, Refused>) {
+        let full = matches!(taken, Err(Refused::Full) | Ok(Put::Displaced));
         if !full && !self.untold.load(Ordering::Relaxed) {
             return;
         }
@@ -293,6 +297,11 @@ impl Hub {
     /// A component is well again, or gone.
     pub fn clear_fault(&self, component: &str) {
         self.lock().faults.retain(|f| f.component != component);
+    }
+
+    /// The session's time.
+    pub fn now(&self) -> Time {
+        self.clock.now()
     }
 
     /// Counts what was noted: between two looks with the same count nothing happened.

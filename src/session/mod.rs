@@ -30,6 +30,7 @@ mod wiring;
 pub use hub::{Hub, Observer};
 pub use life::{Ended, NotUp};
 pub use log::{Happening, Phase, StatusView};
+pub use names::NotNamed;
 pub use recovery::{Difference, NO_FORWARD, Recovered, recovery};
 pub use wiring::{Session, Setup};
 

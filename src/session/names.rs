@@ -1,8 +1,50 @@
-//! Names that somebody asks a running deployment about, and that cannot be right.
+//! Names that somebody outside gives a running deployment: those that cannot be right, and those that are kept for ever.
 
 use super::Session;
 use crate::model::finding::did_you_mean;
+use crate::limits::{EVENTS_UNLISTED, UNLISTED_BYTES};
+use crate::model::names::NameError;
 use crate::model::{EventName, Verdict};
+use crate::time::lock;
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+/// Why a text from outside is no event here.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotNamed {
+    /// No transition lists it, and no function may see it.
+    #[error("the coordinator knows no event `{0}`")]
+    Unknown(String),
+    /// It is no name of an event.
+    #[error(transparent)]
+    Bad(#[from] NameError),
+    /// No transition lists it, and it is too long to be kept.
+    #[error("no transition lists this event, and its name is longer than {UNLISTED_BYTES} bytes")]
+    Long,
+    /// No transition lists it, and so many such names are kept already.
+    #[error("no transition lists `{0}`, and {EVENTS_UNLISTED} other such names were given: each is kept for ever, so there are no more")]
+    Many(String),
+}
+
+/// Names from outside that no transition lists, which functions may see all the same.
+#[derive(Debug, Default)]
+pub(super) struct Unlisted(Mutex<BTreeSet<String>>);
+
+impl Unlisted {
+    /// Keeps a name, if it is kept already or there is room for it.
+    fn keep(&self, name: &str) -> Result<EventName, NotNamed> {
+        if name.len() > UNLISTED_BYTES {
+            return Err(NotNamed::Long);
+        }
+        let mut kept = lock(&self.0);
+        if !kept.contains(name) && kept.len() >= EVENTS_UNLISTED {
+            return Err(NotNamed::Many(name.to_owned()));
+        }
+        let event = EventName::new(name)?;
+        kept.insert(name.to_owned());
+        Ok(event)
+    }
+}
 
 /// What ends a wait for an answer beside that answer itself: the others that the same request may be answered with.
 pub(super) fn instead(event: &str) -> Vec<String> {
@@ -17,6 +59,18 @@ pub(super) fn instead(event: &str) -> Vec<String> {
 }
 
 impl Session {
+    /// The event that a text from outside names. Asked before it becomes a name: names are kept for ever.
+    ///
+    /// # Errors
+    /// [`NotNamed`]: nobody here can hear it, or there are too many that only functions may hear.
+    pub fn named(&self, name: &str) -> Result<EventName, NotNamed> {
+        match self.events().into_iter().find(|known| known.as_str() == name) {
+            Some(known) => Ok(known),
+            None if self.sees_all_events() => self.hub().unlisted.keep(name),
+            None => Err(NotNamed::Unknown(name.to_owned())),
+        }
+    }
+
     /// Why an event will never be heard, if that is known: it is spelt like an answer, and nothing is answered so.
     pub fn never_heard(&self, event: &str) -> Option<String> {
         let is = |name: &EventName| name.as_str() == event;

@@ -7,7 +7,6 @@
 use super::place;
 use std::io;
 use std::os::linux::net::SocketAddrExt;
-use std::os::unix::fs::MetadataExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
 /// Bytes that an address may have.
@@ -55,7 +54,7 @@ pub fn owned() -> Vec<String> {
 }
 
 fn prefix() -> String {
-    let user = std::fs::metadata("/proc/self").map_or(0, |m| m.uid());
+    let user = place::user();
     let directory = place::directory();
     let directory = std::path::absolute(&directory).unwrap_or(directory);
     format!("davit/{user}/{:016x}/", number(directory.as_os_str().as_encoded_bytes()))

@@ -88,6 +88,11 @@ impl Part {
         }
     }
 
+    /// Whether some state of it may hear an event.
+    pub fn may_hear(&self, event: EventName) -> bool {
+        self.sees_all || self.chart.event(event) != EventId::OTHER
+    }
+
     /// Its active state that means that the bring-up failed.
     pub fn failed_state(&self) -> Option<&str> {
         self.failed.iter().find(|(id, _)| self.coordinator.is_active(*id)).map(|(_, name)| name.as_str())

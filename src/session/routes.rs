@@ -4,13 +4,15 @@
 use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
-use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Request, Requester, Scope};
-use crate::coordinator::{Coordinator, Delivered, Incoming, Listener, Tag, Trouble};
-use crate::model::{Ask, EventName, RequestId, Verdict};
+use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
+use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
+use crate::model::{Ask, Deployment, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
+use rustc_hash::FxHashSet;
 use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
 
 /// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
 /// neither keeps the other alive.
@@ -19,9 +21,24 @@ pub(super) struct Junction {
     /// With the names under which they ask.
     pub coordinators: Mutex<Vec<(Requester, Coordinator)>>,
     pub configurator: Mutex<Option<ConfiguratorHandle>>,
+    /// Events that go before all others, whoever raises them: those declared under `safety`, and those that begin and end
+    /// the deployment.
+    urgent: FxHashSet<EventName>,
 }
 
 impl Junction {
+    /// Of a deployment whose threads do not run yet.
+    pub fn new(deployment: &Deployment) -> Self {
+        let safety = deployment.safety.iter().map(|(event, _)| *event);
+        let urgent = safety.chain([deployment.deploy.event, deployment.shutdown.event]).collect();
+        Self { urgent, ..Self::default() }
+    }
+
+    /// An event of a class, unless it is one that goes before all others.
+    pub fn incoming(&self, class: Class, event: EventName) -> Incoming {
+        Incoming::new(if self.urgent.contains(&event) { Class::Urgent } else { class }, event)
+    }
+
     /// The coordinator that asks under that name.
     pub fn coordinator(&self, name: Requester) -> Option<Coordinator> {
         lock(&self.coordinators).iter().find(|(own, _)| *own == name).map(|(_, coordinator)| coordinator.clone())
@@ -56,7 +73,11 @@ impl Listener for ToConfigurator {
                     let id = self.hub.request(ask, &self.name.to_string());
                     let tag = (raised.owner.index() as u64, u64::from(raised.visit));
                     let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
-                    requests.requests.push(Request { scope, tag, ..Request::new(id, ask, self.name) });
+                    let request = Request { scope, tag, ..Request::new(id, ask, self.name) };
+                    match self.hold() {
+                        Err(Refused::Full) => self.refuse(request),
+                        _ => requests.requests.push(request),
+                    }
                 }
                 Meaning::Emitted(event) => {
                     self.hub.note(Happening::Emitted { event: event.to_string() });
@@ -70,7 +91,7 @@ impl Listener for ToConfigurator {
                     // There is no such ID: answered at once, as the table of requests says.
                     let event = EventName::new(&format!("{name}.failed")).expect("an event with a suffix is one");
                     self.hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned() });
-                    self.deliver(Incoming::answer(event, Tag::from(*raised)));
+                    self.deliver(Incoming::new(Class::Notice, event).tagged(Some(Tag::from(*raised))));
                 }
                 Meaning::Unknown(name) => self.hub.note(Happening::Forced {
                     note: format!("`{name}` was raised: no configuration, and not declared under `emits`"),
@@ -138,8 +159,26 @@ impl ToConfigurator {
         }
     }
 
-    /// What one coordinator emits is an event of the others that wait for it somewhere. It goes by the lane of reports, so
-    /// that two coordinators that answer each other for ever delay neither an operator nor an answer.
+    fn own(&self) -> Option<Coordinator> {
+        self.junction.upgrade().and_then(|junction| junction.coordinator(self.name))
+    }
+
+    /// Takes room for an answer.
+    fn hold(&self) -> Result<(), Refused> {
+        self.own().map_or(Err(Refused::Detached), |own| own.hold(Class::Answer))
+    }
+
+    /// Answers a request at once: there is no room for a later answer.
+    fn refuse(&self, request: Request) {
+        let Some(junction) = self.junction.upgrade() else { return };
+        let reason = Some(Arc::new(Reason::Unheard));
+        let verdict = request.ask.failed();
+        let answer = Answer { request, verdict, at: self.hub.now(), took: Duration::ZERO, reason };
+        give(&self.hub, &junction, &answer, Vec::new(), Class::Notice);
+    }
+
+    /// What one coordinator emits is an event of the others that wait for it somewhere. It is a report, so that two
+    /// coordinators that answer each other for ever delay neither an operator nor an answer.
     fn tell_others(&self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
         let others: Vec<Coordinator> = lock(&junction.coordinators)
@@ -148,13 +187,13 @@ impl ToConfigurator {
             .map(|(_, other)| other.clone())
             .collect();
         for other in others {
-            self.hub.taken(other.deliver(Incoming::report(event)));
+            self.hub.taken(other.deliver(junction.incoming(Class::Report, event)));
         }
     }
 
     fn deliver(&self, incoming: Incoming) {
-        if let Some(coordinator) = self.junction.upgrade().and_then(|j| j.coordinator(self.name)) {
-            self.hub.taken(coordinator.deliver(incoming));
+        if let Some(own) = self.own() {
+            self.hub.taken(own.deliver(incoming));
         }
     }
 }
@@ -175,7 +214,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             hub.note(Happening::Lost { event: event.to_string(), reasons });
             // In whatever state they are: it answers nothing that was asked there.
             for coordinator in junction.all() {
-                hub.taken(coordinator.deliver(Incoming::control(event)));
+                hub.taken(coordinator.deliver(Incoming::new(Class::Notice, event)));
             }
         }
         Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
@@ -188,6 +227,12 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
 
 /// An answer becomes an event for whoever asked.
 pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &Answer) {
+    // What nobody asked for answers nothing, and nobody held room for it.
+    let class = if answer.request.is_asked() { Class::Answer } else { Class::Notice };
+    give(hub, junction, answer, steps.take(answer.request.id), class);
+}
+
+fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, class: Class) {
     let event = answer.event();
     let reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
     hub.answered(Answered {
@@ -198,16 +243,16 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
         by: answer.request.requester.to_string(),
         took_us: answer.took.as_secs_f64() * 1e6,
         reasons,
-        steps: steps.take(answer.request.id),
+        steps,
     });
     if let Some(coordinator) = junction.coordinator(answer.request.requester) {
         let (owner, visit) = answer.request.tag;
         let owner = usize::try_from(owner).ok().and_then(|i| coordinator.chart().node(i));
-        let incoming = match (owner, u32::try_from(visit)) {
-            (Some(owner), Ok(visit)) if answer.request.is_asked() => Incoming::answer(event, Tag { owner, visit }),
-            _ => Incoming::control(event),
+        let tag = match (owner, u32::try_from(visit)) {
+            (Some(owner), Ok(visit)) if answer.request.is_asked() => Some(Tag { owner, visit }),
+            _ => None,
         };
-        hub.taken(coordinator.deliver(incoming));
+        hub.taken(coordinator.deliver(Incoming::new(class, event).tagged(tag)));
     }
     // Only now: who sees that all is answered also sees that the coordinator has something to react to.
     hub.settled(answer.request.id);
@@ -234,6 +279,6 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     };
     hub.report(Happening::Event { event: event.to_string(), from });
     for coordinator in junction.all() {
-        hub.taken(coordinator.deliver(Incoming::report(event)));
+        hub.taken(coordinator.deliver(junction.incoming(Class::Report, event)));
     }
 }

@@ -6,6 +6,7 @@ use super::names::instead;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
 use super::{Command, NO_FORWARD, Session, recovery};
+use crate::coordinator::Refused;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, EventName};
 use serde_json::{Value as Json, json};
@@ -165,13 +166,8 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
     let known = session.events();
     let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
     let mut answer = json!({ "accepted": true });
-    let listed = known.iter().any(|known| known.as_str() == name);
-    // Asked before it becomes a name: names are kept for ever.
-    if !listed && !session.sees_all_events() {
-        return Err(refused(format!("the coordinator knows no event `{name}`"), near()));
-    }
-    let event = EventName::new(&name).map_err(|error| refused(error.to_string(), near()))?;
-    if !listed {
+    let event = session.named(&name).map_err(|why| refused(why.to_string(), near()))?;
+    if !known.contains(&event) {
         answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
     }
     if let Some(why) = wait_for.as_ref().and_then(|name| session.never_heard(name)) {
@@ -179,23 +175,27 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
     }
     let since = session.hub().heard();
     if let Some(wait_for) = wait_for {
-        session.raise(event, "operator");
+        session.offer(event, "operator").map_err(no_room)?;
         let late = format!("`{wait_for}` was not heard in time");
         let mut ends = instead(&wait_for);
         ends.push(wait_for);
         let heard = wait(session, within, gone, || late, |hub| hub.first_heard(&ends, since))?;
         answer["heard"] = json!(heard);
     } else if waits {
-        let ticket = session.raise_watched(event, "operator");
+        let ticket = session.offer_watched(event, "operator").map_err(no_room)?;
         let late = || format!("`{name}` was not taken up in time; it may be yet");
         let taken = wait(session, within, gone, late, |hub| hub.was_heard(ticket));
         session.hub().forget(ticket);
         // What confirms a configuration need not move a coordinator.
         answer["taken"] = json!(taken? || session.confirms(event));
     } else {
-        session.raise(event, "operator");
+        session.offer(event, "operator").map_err(no_room)?;
     }
     Ok(answer)
+}
+
+fn no_room(why: Refused) -> RpcError {
+    refused(why.to_string(), "events come faster than it reacts: wait, and send it again".to_owned())
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {

@@ -13,7 +13,7 @@ use crate::configurator::{
     Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown,
     View,
 };
-use crate::coordinator::{Dropped, Incoming};
+use crate::coordinator::{Class, Dropped, Refused};
 use crate::functions::Opener;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
@@ -63,7 +63,7 @@ impl Session {
         let Setup { deployment, charts, functions, catalogue, platform, clock } = setup;
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
-        let junction = Arc::new(Junction::default());
+        let junction = Arc::new(Junction::new(&deployment));
         let steps = Arc::new(Steps::default());
         let evaluator =
             super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
@@ -165,30 +165,63 @@ impl Session {
         self.parts.iter().flat_map(of).collect()
     }
 
-    /// Gives an event to all coordinators, in the name of `from`.
+    /// Gives an event to all coordinators, in the name of `from`; where there is no room for it that is written down.
     pub fn raise(&self, event: EventName, from: &str) {
-        self.deliver(event, from, 0);
+        if let Err(refused) = self.offer(event, from) {
+            self.hub.note(Happening::Forced { note: format!("`{event}` was not delivered: {refused}") });
+        }
+    }
+
+    /// The same, for those who can be told that there is no room.
+    ///
+    /// # Errors
+    /// [`Refused::Full`]: a coordinator that may hear it does not keep up. Nobody was told of the event.
+    pub fn offer(&self, event: EventName, from: &str) -> Result<(), Refused> {
+        self.deliver(event, from, 0)
     }
 
     /// The same; [`Hub::was_heard`] says with the number that this answers what became of it, until it is
     /// [forgotten](Hub::forget).
-    pub fn raise_watched(&self, event: EventName, from: &str) -> u64 {
+    ///
+    /// # Errors
+    /// As [`Session::offer`].
+    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<u64, Refused> {
         let ticket = self.hub.ticket(self.parts.len());
-        self.deliver(event, from, ticket);
-        ticket
+        self.deliver(event, from, ticket).map(|()| ticket).inspect_err(|_| self.hub.forget(ticket))
     }
 
-    fn deliver(&self, event: EventName, from: &str, ticket: u64) {
-        self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
-        self.configurator.event(event);
+    fn deliver(&self, event: EventName, from: &str, ticket: u64) -> Result<(), Refused> {
+        let incoming = self.junction.incoming(Class::Outside, event).watched(ticket);
+        // All of them have room, or none hears of it.
+        let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts.len()), false);
         for part in &self.parts {
-            if part.coordinator.deliver(Incoming::watched(event, ticket)).is_err() {
-                self.hub.taken_up(ticket, false);
-                self.hub.note(Happening::Forced {
-                    note: format!("`{event}` was not delivered: the coordinator is full or gone"),
-                });
+            match part.coordinator.hold(incoming.class) {
+                Ok(()) => held.push(part),
+                Err(Refused::Full) if part.may_hear(event) => {
+                    held.iter().for_each(|part| part.coordinator.release(incoming.class));
+                    return Err(Refused::Full);
+                }
+                Err(Refused::Full) => {}
+                Err(Refused::Detached) => gone = true,
             }
         }
+        self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
+        self.configurator.event(event);
+        (held.len()..self.parts.len()).for_each(|_| self.hub.taken_up(ticket, false));
+        let mut unwatched = false;
+        for part in held {
+            match part.coordinator.deliver(incoming) {
+                Ok(_) => continue,
+                // It waits already, and too many want to know what becomes of it.
+                Err(Refused::Full) => unwatched = true,
+                Err(Refused::Detached) => gone = true,
+            }
+            self.hub.taken_up(ticket, false);
+        }
+        if gone {
+            self.hub.note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
+        }
+        if unwatched { Err(Refused::Full) } else { Ok(()) }
     }
 
     /// Makes a request in the name of an operator. `force`: also one that applies what is not listed, undoes a coordinator's

@@ -50,6 +50,8 @@ pub enum Reason {
     Unknown(ConfigId),
     /// The queue was full.
     Full,
+    /// Whoever asked has no room for another answer: it waits for too many, or does not come to hear them.
+    Unheard,
     /// There is no plan: every violation. Nothing was done.
     Refused(Findings),
     /// A step failed.
@@ -207,6 +209,8 @@ impl Reason {
                 .help(format!("add a configuration `{id}` to the deployment, or ask for one it has")),
             Self::Full => Finding::error(codes::QUEUE_FULL, self.to_string())
                 .help("wait for the answers to earlier requests before asking for more"),
+            Self::Unheard => Finding::error(codes::ANSWERS_FULL, self.to_string())
+                .help("wait for the answers to earlier requests before asking for more"),
             Self::Step { cause: Cause::Timeout, .. } => Finding::error(codes::STEP_TIMEOUT, self.to_string())
                 .help("look at what the component does there, or raise `limits.step_timeout_s`"),
             Self::Step { .. } => Finding::error(codes::STEP_FAILED, self.to_string())
@@ -258,6 +262,7 @@ impl fmt::Display for Reason {
         match self {
             Self::Unknown(id) => write!(f, "there is no configuration `{id}` in this deployment"),
             Self::Full => f.write_str("the configurator's queue is full"),
+            Self::Unheard => f.write_str("the coordinator has no room for another answer"),
             Self::Refused(findings) => {
                 for (i, finding) in findings.iter().filter(|finding| finding.is_error()).enumerate() {
                     write!(f, "{}{}", if i == 0 { "" } else { "; " }, finding.message)?;

@@ -1,6 +1,7 @@
 //! The compiled chart: flat tables, indexed by small numbers.
 
 use super::reactions::Reactions;
+use super::wide::Wide;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
 use crate::model::statechart::FunctionId;
@@ -228,6 +229,8 @@ pub struct Chart {
     pub(super) init: EventId,
     /// What is known beforehand of what events do.
     pub(super) reactions: Reactions,
+    /// The transitions of nodes that have many.
+    pub(super) wide: Wide,
 }
 
 /// Why a text names no state.

@@ -8,6 +8,7 @@ mod tables;
 use super::chart::{Chart, EventId, Kind, NONE, Op, RaiseSite};
 use super::reactions::Reactions;
 use super::resolve::Names;
+use super::wide::Wide;
 use super::{Machine, checks};
 use crate::limits;
 use crate::model::codes;
@@ -35,6 +36,7 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
     }
     chart.connector_edges =
         chart.nodes.iter().filter(|node| node.kind == Kind::Connector).map(|node| node.out.len).sum();
+    chart.wide = Wide::of(&chart);
     mark_settling(&mut chart);
     chart.reactions = Reactions::of(&chart);
     checks::doubts(&chart, &mut builder.findings);
@@ -63,6 +65,8 @@ struct Builder<'m> {
     written: Vec<(u32, usize, &'m Transition)>,
     edges: Vec<Edge<'m>>,
     events: Vec<EventName>,
+    /// Where each was listed first.
+    event_origins: Vec<Origin>,
     event_ids: FxHashMap<EventName, EventId>,
     ops: Vec<Op>,
     raises: Vec<RaiseSite>,
@@ -191,7 +195,8 @@ impl<'m> Builder<'m> {
     }
 
     fn lookup(&self) -> Names<'_> {
-        Names { children: &self.children, names: &self.names, parents: &self.parents }
+        let suggests = self.findings.len() < limits::FINDINGS_SHOWN;
+        Names { children: &self.children, names: &self.names, parents: &self.parents, suggests }
     }
 
     fn resolve_all(&mut self) {

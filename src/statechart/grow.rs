@@ -6,6 +6,7 @@
 
 use super::chart::{Chart, EdgeId, EdgeRow, EventId, Kind, NONE, NodeId, NodeRow, Op, Span};
 use super::reactions::Reactions;
+use super::wide::Wide;
 use crate::limits;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
@@ -234,6 +235,7 @@ impl Chart {
     fn forget(&mut self) {
         self.pure = false;
         self.reactions = Reactions::default();
+        self.wide = Wide::default();
         self.nodes.iter_mut().for_each(|row| row.settles = false);
     }
 

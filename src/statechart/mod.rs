@@ -24,6 +24,7 @@ mod search;
 mod sim;
 mod timers;
 mod trace;
+mod wide;
 
 pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
 pub use compile::compile;

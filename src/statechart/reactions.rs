@@ -197,7 +197,7 @@ impl Reactions {
         let mut machine = Machine::new(chart);
         let mut events = Vec::new();
         let mut notes = Notes::default();
-        let mut firsts = 0;
+        let (mut firsts, mut cost) = (0, 0);
         for leaf in chart.nodes().filter(|node| chart.kind(*node) == Kind::Leaf) {
             events.clear();
             let mut at = Some(leaf);
@@ -210,11 +210,16 @@ impl Reactions {
                     return reactions;
                 }
             }
+            cost += events.len() as u64;
             events.sort_unstable();
             events.dedup();
             let start = reactions.rows.len();
             let mut first = None;
             for event in &events {
+                // Also where nothing comes of it that can be written down.
+                if cost + machine.work() > limits::CHART_WORK {
+                    break;
+                }
                 machine.place(chart, leaf, Time::default());
                 notes.clear();
                 machine.send(*event);
@@ -234,7 +239,7 @@ impl Reactions {
             }
             firsts += usize::from(first.is_some());
             let size = firsts + reactions.rows.len() + reactions.around.len() + reactions.raised.len();
-            if size > limits::CHART_REACTIONS {
+            if size > limits::CHART_REACTIONS || cost + machine.work() > limits::CHART_WORK {
                 return reactions;
             }
         }

@@ -16,6 +16,8 @@ pub(super) struct Names<'a> {
     pub children: &'a FxHashMap<(u32, Ident), u32>,
     pub names: &'a [Ident],
     pub parents: &'a [u32],
+    /// It is said what may have been meant; nobody reads that of thousands.
+    pub suggests: bool,
 }
 
 /// Why a reference means nothing.
@@ -70,6 +72,9 @@ impl Names<'_> {
         } else {
             format!("`{text}` leads nowhere: there is no `{name}` in `{here}`")
         };
+        if !self.suggests {
+            return Unresolved { message, help: "name a state or connector that is there".to_owned() };
+        }
         // Elsewhere in the chart there may be a node of exactly that name: then the way to it was what went wrong.
         let elsewhere = (0..self.names.len()).map(|i| u32::try_from(i).unwrap_or(NONE)).find(|node| {
             *node != 0 && self.names[*node as usize].as_str() == name && self.parents[*node as usize] != state

@@ -18,6 +18,7 @@ use super::EdgeId;
 use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
 use super::hook::{Hook, View};
 use super::queue::Queue;
+use super::wide::candidates;
 use crate::limits;
 
 /// One way on from a node: a transition and, if it ends at a connector, the ways on from there.
@@ -75,7 +76,7 @@ impl Search {
         if self.lost {
             return Straight::None;
         }
-        for edge in chart.nodes[node as usize].out.ids() {
+        for edge in candidates(chart, node, events) {
             self.work += 1;
             let row = &chart.edges[edge as usize];
             let listed = row.events.of(&chart.triggers);
@@ -144,7 +145,7 @@ impl Search {
             return NONE;
         }
         let (mut first, mut last) = (NONE, NONE);
-        for edge in row.out.ids() {
+        for edge in candidates(chart, node, around.events) {
             self.work += 1;
             let edge_row = &chart.edges[edge as usize];
             if !enabled(chart, edge, edge_row, around, hook) {

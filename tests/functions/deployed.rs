@@ -65,7 +65,7 @@ pub fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
 }
 
 /// The same; `look` sees the session before it is taken down.
-fn watched(coordinator: &str, seconds: u64, look: impl FnOnce(&davit::session::Session)) -> Vec<String> {
+fn watched(coordinator: &str, seconds: u64, look: impl FnOnce(&Arc<davit::session::Session>)) -> Vec<String> {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", coordinator)];
     let folder = folder(&files);
     let libraries = davit::runtime::Libraries::new();
@@ -223,4 +223,25 @@ fn without_trust_the_deployment_is_refused() {
     assert!(loaded.deployment.is_none());
     let codes: Vec<_> = loaded.findings.iter().map(|f| f.code).collect();
     assert!(codes.contains(&davit::model::codes::CHART_FUNCTION), "{:?}", loaded.findings);
+}
+
+/// Functions see events that no transition lists. Each name is kept for ever, so there is an end of them, whoever gives them.
+#[test]
+fn names_from_outside_that_only_functions_may_see_are_bounded() {
+    use davit::limits::{EVENTS_UNLISTED, UNLISTED_BYTES};
+    use davit::session::NotNamed;
+    use davit::session::serving::Service;
+    let said = watched(COORDINATOR, 1, |session| {
+        for number in 0..EVENTS_UNLISTED {
+            session.named(&format!("e_unlisted_{number}")).expect("there is room");
+        }
+        assert!(matches!(session.named("e_one_more"), Err(NotNamed::Many(_))));
+        assert_eq!(session.named(&"e".repeat(UNLISTED_BYTES + 1)), Err(NotNamed::Long));
+        // What was given before, and what is listed, is heard as before.
+        assert!(session.named("e_unlisted_7").is_ok() && session.named("e_start").is_ok());
+        let service = davit::session::service::SessionService::new(Arc::downgrade(session));
+        let told = service.call(2, "event", &serde_json::json!({ "event": "e_one_more" })).unwrap_err();
+        assert!(told.message.contains("each is kept for ever"), "{told:?}");
+    });
+    assert!(!said.is_empty());
 }

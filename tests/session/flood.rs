@@ -165,7 +165,7 @@ fn a_chattering_monitor_delays_nothing_and_is_not_remembered_instead_of_all_else
         assert!(flooded.session.in_state("other"));
         // The coordinator keeps up: nothing is lost.
         let status = flooded.session.status();
-        assert_eq!((status.dropped.control, status.dropped.report), (0, 0));
+        assert_eq!((status.dropped.outside, status.dropped.report), (0, 0));
         // What was asked and answered is still known, the chatter is its newest part, and the whole is bounded.
         let log = flooded.session.hub().log(usize::MAX);
         assert!(log.len() <= limits::LOG_ENTRIES, "{}", log.len());
@@ -201,7 +201,7 @@ fn what_the_inbox_cannot_hold_is_counted_and_told_and_an_operator_goes_first() {
         let raised = flooded.count(|what| is_event(what, "e_burst"));
         assert_eq!(raised, 6000);
         let status = flooded.session.status();
-        assert_eq!(status.dropped.control, 0);
+        assert_eq!(status.dropped.outside, 0);
         let dropped = usize::try_from(status.dropped.report).unwrap();
         // A few of the monitor's came as well.
         assert!((1000..=6010 - limits::INBOX_REPORT).contains(&dropped), "{dropped}");

@@ -2,6 +2,7 @@
 
 mod beside;
 mod bringup;
+mod classes;
 mod doors;
 mod flood;
 mod hangs;

@@ -1,7 +1,7 @@
 //! The coordinator on its own thread, in simulated time: what it hears, raises, forgets, and when it falls silent.
 
 use crate::support::*;
-use davit::coordinator::{Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag, Trouble, Waited};
+use davit::coordinator::{Class, Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag, Trouble, Waited};
 use davit::limits;
 use davit::model::names::EventName;
 use davit::statechart::{Chart, Hook, NodeId, Raised};
@@ -187,7 +187,7 @@ fn it_runs_on_its_own_thread_and_is_woken_by_events_and_by_time() {
     let log = Log::default();
     let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
     assert_eq!(coordinator.wait_for_state(off, Time::NEVER), Waited::Reached);
-    coordinator.deliver(Incoming::control(event("e_on"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Outside, event("e_on"))).unwrap();
     assert_eq!(coordinator.wait_for_state(on, Time::NEVER), Waited::Reached);
     assert_eq!(coordinator.active(), ["root", "root.on"]);
     assert!(coordinator.is_active(on) && coordinator.is_active(NodeId::ROOT) && !coordinator.is_active(off));
@@ -224,7 +224,7 @@ fn waiting_sees_a_state_that_is_passed_in_one_run() {
         (join, seen)
     };
     clock.sleep(Duration::from_millis(1));
-    coordinator.deliver(Incoming::report(event("e"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Report, event("e"))).unwrap();
     waiter.0.join(Time::NEVER).unwrap();
     assert_eq!(waiter.1.take(), ["Reached"]);
     assert_eq!(coordinator.leaf(), chart.find("d").ok());
@@ -241,9 +241,9 @@ fn detached_it_raises_nothing_more() {
     let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
     coordinator.wait_for_state(a, Time::NEVER);
     log.take();
-    coordinator.deliver(Incoming::control(event("e"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Outside, event("e"))).unwrap();
     coordinator.detach();
-    assert_eq!(coordinator.deliver(Incoming::control(event("e"))), Err(Refused::Detached));
+    assert_eq!(coordinator.deliver(Incoming::new(Class::Outside, event("e"))), Err(Refused::Detached));
     clock.sleep(Duration::from_secs(1));
     assert!(log.take().is_empty(), "the event was in the inbox, and nobody commands any more");
     assert_eq!(coordinator.active(), ["root", "root.a"], "the last state stays readable");
@@ -270,7 +270,7 @@ fn who_waits_is_told_when_it_ends() {
 }
 
 #[test]
-fn a_flood_of_reports_does_not_displace_an_answer() {
+fn a_flood_of_reports_does_not_displace_what_is_urgent() {
     let clock = Clock::simulated();
     let _guard = clock.enter();
     let chart = Arc::new(compiled(vec![
@@ -286,13 +286,13 @@ fn a_flood_of_reports_does_not_displace_an_answer() {
     coordinator.wait_for_state(run, Time::NEVER);
     // This thread holds the token of the simulated clock: all of this waits in the inbox before anything is looked at.
     for _ in 0..limits::INBOX_REPORT + 100 {
-        let _ = coordinator.deliver(Incoming::report(event("chatter")));
+        let _ = coordinator.deliver(Incoming::new(Class::Report, event("chatter")));
     }
-    coordinator.deliver(Incoming::control(event("e_stop"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Urgent, event("e_stop"))).unwrap();
     clock.sleep(Duration::from_secs(1));
     assert_eq!(log.take()[0], "halted<root.halt#1", "before any of the reports");
     assert_eq!(coordinator.dropped().report, 100);
-    assert_eq!(coordinator.dropped().control, 0);
+    assert_eq!(coordinator.dropped().outside, 0);
     assert_eq!(coordinator.delivered(), limits::INBOX_REPORT as u64 + 1);
     coordinator.stop(Time::NEVER).unwrap();
 }
@@ -315,8 +315,8 @@ fn a_listener_may_end_it_from_inside() {
     let coordinator = Coordinator::start("coordinator", chart.clone(), &clock, Once(slot.clone(), log.clone()));
     *slot.lock().unwrap() = Some(coordinator.clone());
     coordinator.wait_for_state(chart.find("a").unwrap(), Time::NEVER);
-    coordinator.deliver(Incoming::control(event("e"))).unwrap();
-    let _ = coordinator.deliver(Incoming::control(event("e")));
+    coordinator.deliver(Incoming::new(Class::Outside, event("e"))).unwrap();
+    let _ = coordinator.deliver(Incoming::new(Class::Outside, event("e")));
     clock.sleep(Duration::from_secs(1));
     coordinator.stop(Time::NEVER).unwrap();
     assert_eq!(log.take(), ["1 names"]);
@@ -349,7 +349,7 @@ fn when_it_rests_it_is_seen_to_rest() {
     own.set(coordinator.clone()).unwrap();
     clock.sleep(Duration::from_millis(1));
     seen.lock().unwrap().clear();
-    coordinator.deliver(Incoming::control(event("e_unknown"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Outside, event("e_unknown"))).unwrap();
     clock.sleep(Duration::from_millis(1));
     assert_eq!(*seen.lock().unwrap(), [false, true]);
     coordinator.stop(Time::NEVER).unwrap();
@@ -371,7 +371,7 @@ fn it_is_detached_though_a_function_of_its_model_hangs() {
     let (log, own) = (Log::default(), clock.clone());
     let coordinator =
         Coordinator::start_with("coordinator", Arc::new(copying()), &clock, log.clone(), move || Ok(Slow(own)));
-    coordinator.deliver(Incoming::control(event("e_aligned"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Outside, event("e_aligned"))).unwrap();
     clock.sleep(Duration::from_millis(1));
     let asked = clock.now();
     assert!(!coordinator.is_settled() && !coordinator.hangs());

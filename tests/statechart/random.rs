@@ -119,6 +119,14 @@ fn transitions(choices: &mut Choices<'_>, state: &mut State, fqn: &str, all: &[(
         let list = events(choices, all);
         add(choices, state, src, &target, list);
     }
+    // So many from one node that those of an event are looked up.
+    if fqn == "root" && choices.below(8) == 1 {
+        let (source, target) = (choices.of(&nodes).to_owned(), choices.of(&nodes).to_owned());
+        for number in 0..2 * davit::limits::CHART_WIDE {
+            let trigger = Trigger::parse(&format!("e_pad{number}")).unwrap();
+            state.transitions.push(Transition::new(&source, &target, [trigger]));
+        }
+    }
     for child in &mut state.children {
         if let Node::State(inner) = child {
             let name = format!("{fqn}.{}", inner.name);

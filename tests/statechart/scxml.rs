@@ -329,3 +329,19 @@ fn hostile_documents_are_refused() {
     let wide = read(&document(&format!("<state id=\"a\"/>{wide}")));
     assert_eq!(wide.root.children.len(), 20_001);
 }
+
+#[test]
+fn what_costs_more_than_its_length_is_bounded() {
+    let many = |n: usize, one: &dyn Fn(usize) -> String| (0..n).map(one).collect::<Vec<_>>().join(" ");
+    let a = |inside: &str| document(&format!("<state id=\"a\" {inside}/>"));
+    for document in [
+        a(&many(200_000, &|n| format!("x{n}=\"1\""))),
+        a(&many(davit::limits::XML_ATTRIBUTES, &|n| format!("y{n}=\"a = b\""))),
+        document(&(0..davit::limits::XML_NAMESPACES).map(|n| format!("<log xmlns:n{n}=\"u{n}\"/>")).collect::<String>()),
+    ] {
+        let told = findings(&document);
+        assert!(matches!(&told[..], [one] if one.starts_with("text::too_many_values")), "{told:?}");
+    }
+    let fits = a(&many(davit::limits::XML_ATTRIBUTES - 1, &|n| format!("y{n}=\"a = b\"")));
+    assert!(findings(&fits).iter().all(|told| !told.contains("too_many_values")));
+}

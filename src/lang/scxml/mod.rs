@@ -15,20 +15,34 @@ use crate::limits;
 use crate::model::statechart::{Connector, INITIAL, Node, ROOT, State, Statechart, Transition};
 use crate::model::{Code, ConfigId, Finding, Ident, Origin, codes};
 use meaning::Names;
-use places::{Places, too_deep};
+use places::{Places, TooMuch, too_much};
 use roxmltree::{Document, Node as Element, ParsingOptions};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
 
 /// Reads an SCXML document.
 pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
     let text = cx.sources.file(reading.file).text.clone();
-    if let Some(offset) = too_deep(&text) {
+    if let Some((what, offset)) = too_much(&text) {
         let origin = Places::new(reading, &text).place(cx, offset, 1);
-        let message = format!("elements are nested more than {} deep", limits::XML_DEPTH);
-        cx.refuse(
-            Finding::error(codes::TEXT_TOO_DEEP, message).at(origin).help("a statechart has a handful of levels"),
-        );
+        let (code, message, help) = match what {
+            TooMuch::Deep => (
+                codes::TEXT_TOO_DEEP,
+                format!("elements are nested more than {} deep", limits::XML_DEPTH),
+                "a statechart has a handful of levels",
+            ),
+            TooMuch::Attributes => (
+                codes::TEXT_TOO_MANY_NODES,
+                format!("an element has more than {} attributes", limits::XML_ATTRIBUTES),
+                "an element of a statechart has a handful of them",
+            ),
+            TooMuch::Namespaces => (
+                codes::TEXT_TOO_MANY_NODES,
+                format!("more than {} namespaces are declared", limits::XML_NAMESPACES),
+                "declare each once, at the outermost element",
+            ),
+        };
+        cx.refuse(Finding::error(code, message).at(origin).help(help));
         return None;
     }
     let options = ParsingOptions {
@@ -222,12 +236,11 @@ impl<'t> Reader<'_, 't> {
                 );
             }
         }
+        let transitions = element.children().filter(|c| c.has_tag_name((SCXML, "transition")));
+        let heard: FxHashSet<&str> =
+            transitions.filter_map(|c| c.attribute("event")).flat_map(str::split_whitespace).collect();
         for event in delayed.keys() {
-            let heard = element.children().any(|c| {
-                c.has_tag_name((SCXML, "transition"))
-                    && c.attribute("event").is_some_and(|e| e.split_whitespace().any(|e| e == event.as_str()))
-            });
-            if !heard {
+            if !heard.contains(event.as_str()) {
                 let message = format!("`{event}` is sent later, and no transition of this state waits for it");
                 self.report(
                     element,

@@ -4,11 +4,24 @@ use crate::lang::tree::{Cx, Reading};
 use crate::limits;
 use crate::model::Origin;
 
-/// Where nesting goes past the bound, if it does. Counted before parsing, roughly: what stands in comments counts as well.
-pub fn too_deep(text: &str) -> Option<usize> {
+/// What of a document costs the parser more than its length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TooMuch {
+    /// Elements inside each other.
+    Deep,
+    /// Attributes of one element.
+    Attributes,
+    /// Declarations of namespaces.
+    Namespaces,
+}
+
+/// What goes past its bound, and where. Counted before parsing, roughly: what stands in comments counts as well.
+pub fn too_much(text: &str) -> Option<(TooMuch, usize)> {
     let bytes = text.as_bytes();
     let (mut depth, mut at, mut quote) = (0_usize, 0, None);
     let mut opened = false;
+    // Where the word begins that stands before a `=`.
+    let (mut attributes, mut namespaces, mut word) = (0, 0, 0);
     while at < bytes.len() {
         let byte = bytes[at];
         match (quote, byte) {
@@ -21,11 +34,23 @@ pub fn too_deep(text: &str) -> Option<usize> {
                 _ => {
                     depth += 1;
                     opened = true;
+                    attributes = 0;
                     if depth > limits::XML_DEPTH {
-                        return Some(at);
+                        return Some((TooMuch::Deep, at));
                     }
                 }
             },
+            (None, b'=') if opened => {
+                attributes += 1;
+                namespaces += usize::from(bytes[word..at].starts_with(b"xmlns"));
+                if attributes > limits::XML_ATTRIBUTES {
+                    return Some((TooMuch::Attributes, at));
+                }
+                if namespaces > limits::XML_NAMESPACES {
+                    return Some((TooMuch::Namespaces, at));
+                }
+            }
+            (None, b) if opened && b.is_ascii_whitespace() => word = at + 1,
             (None, b'>') if opened => {
                 if at > 0 && bytes[at - 1] == b'/' {
                     depth -= 1;

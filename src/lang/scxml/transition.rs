@@ -3,10 +3,12 @@
 use super::content::NO_COUNTERPART;
 use super::{Reader, is_state, own};
 use crate::lang::print::scxml::SCXML;
+use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::statechart::{INITIAL, ROOT, Since, Transition, Trigger};
 use crate::model::{EventName, codes};
 use roxmltree::Node as Element;
+use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 
 impl<'t> Reader<'_, 't> {
@@ -33,7 +35,11 @@ impl<'t> Reader<'_, 't> {
             Some(target) if target == ROOT => Some(format!("{ROOT}.{INITIAL}")),
             Some(target) => Some(target.clone()),
             None => {
-                let help = did_you_mean(first, "states", self.ids.keys().map(String::as_str));
+                // Nobody reads what thousands may have meant.
+                let help = match self.cx.findings.len() < limits::FINDINGS_SHOWN {
+                    true => did_you_mean(first, "states", self.ids.keys().map(String::as_str)),
+                    false => "name a state that is there".to_owned(),
+                };
                 self.report(element, codes::TEXT_BAD_VALUE, format!("there is no state `{first}`"), &help);
                 None
             }
@@ -84,13 +90,14 @@ impl<'t> Reader<'_, 't> {
         out.tgt = Some((target, origin));
         let events = own(element, "event").or_else(|| element.attribute("event")).unwrap_or_default();
         let exact = own(element, "event").is_some();
+        let mut known = FxHashSet::default();
         for event in events.split_whitespace().filter(|event| *event != "*") {
             if exact || self.ours || delays.contains_key(event) {
-                self.trigger(element, event, exact, delays, &mut out);
+                self.trigger(element, event, exact, delays, &mut known, &mut out);
                 continue;
             }
             for meant in self.descriptor(element, event) {
-                self.trigger(element, &meant, exact, delays, &mut out);
+                self.trigger(element, &meant, exact, delays, &mut known, &mut out);
             }
         }
         if events.split_whitespace().any(|event| event == "*") {
@@ -125,6 +132,7 @@ impl<'t> Reader<'_, 't> {
         event: &str,
         exact: bool,
         delays: &BTreeMap<String, f64>,
+        known: &mut FxHashSet<String>,
         out: &mut Transition,
     ) {
         if let Some(seconds) = delays.get(event).filter(|_| !exact) {
@@ -142,7 +150,7 @@ impl<'t> Reader<'_, 't> {
             return;
         }
         match Trigger::parse(event) {
-            Ok(trigger) if !self.ours && out.events.iter().any(|(known, _)| *known == trigger) => {}
+            Ok(trigger) if !self.ours && !known.insert(trigger.to_string()) => {}
             Ok(trigger) => out.events.push((trigger, out.origin)),
             Err(error) => self.report(element, codes::TEXT_BAD_NAME, error.to_string(), "write the name of an event"),
         }

@@ -7,6 +7,7 @@ use crate::model::names::EventName;
 use crate::model::statechart::{Action, FunctionId, ROOT, Since, Trigger};
 use crate::statechart::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When};
 use crate::statechart::reactions::Reactions;
+use crate::statechart::wide::Wide;
 use crate::statechart::{EdgeId, NodeId, order};
 use rustc_hash::FxHashMap;
 
@@ -39,6 +40,7 @@ impl Builder<'_> {
             pure,
             init: self.event("e_init_fsm").unwrap_or(EventId::INIT),
             reactions: Reactions::default(),
+            wide: Wide::default(),
         };
         for (node, out) in outgoing.iter_mut().enumerate() {
             order::sort(out, |index| self.edges[*index].pn);
@@ -68,11 +70,12 @@ impl Builder<'_> {
         self.event_ids.get(&EventName::new(text).ok()?).copied()
     }
 
-    fn intern(&mut self, name: EventName) -> EventId {
+    fn intern(&mut self, name: EventName, origin: Origin) -> EventId {
         let next = EventId(len(&self.events));
-        let events = &mut self.events;
+        let (events, origins) = (&mut self.events, &mut self.event_origins);
         *self.event_ids.entry(name).or_insert_with(|| {
             events.push(name);
+            origins.push(origin);
             next
         })
     }
@@ -97,7 +100,7 @@ impl Builder<'_> {
             let (transition, src) = (self.edges[index].written, self.edges[index].src);
             for (trigger, origin) in &transition.events {
                 let Some(name) = self.name_of(trigger, src) else { continue };
-                let event = self.intern(name);
+                let event = self.intern(name, *origin);
                 let Trigger::Timed(timed) = trigger else { continue };
                 if self.kinds[src as usize] == Kind::Connector {
                     self.findings.push(
@@ -260,9 +263,10 @@ impl Builder<'_> {
                 Some(_) => "is a connector",
                 None => "is no state of this coordinator",
             };
-            let origin = self.origin_of(*name);
+            let origin = self.event_origins[index];
+            // What is not shown needs no list of all states.
             let leaves: Vec<String> = (0..len(&self.names))
-                .filter(|n| self.kinds[*n as usize] == Kind::Leaf)
+                .filter(|n| self.lookup().suggests && self.kinds[*n as usize] == Kind::Leaf)
                 .map(|n| self.lookup().fqn(n))
                 .collect();
             self.findings.push(
@@ -282,10 +286,5 @@ impl Builder<'_> {
         let mut pieces = path.split('.');
         (pieces.next() == Some(ROOT)).then_some(())?;
         pieces.try_fold(0, |at, piece| self.lookup().child(at, piece))
-    }
-
-    fn origin_of(&self, name: EventName) -> Origin {
-        let mut all = self.edges.iter().flat_map(|edge| edge.written.events.iter().map(move |event| (edge.src, event)));
-        all.find(|(src, (trigger, _))| self.name_of(trigger, *src) == Some(name)).map_or(Origin::NONE, |(_, (_, o))| *o)
     }
 }
