@@ -35,6 +35,9 @@ pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
 /// How often it looks.
 pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 
+/// How often a script that waits looks whether it is to end.
+pub const SIGNAL_LOOK: Duration = Duration::from_millis(100);
+
 /// How often whoever waits for an answer looks whether the client is still there.
 pub const SOCKET_LOOK: Duration = Duration::from_millis(100);
 
@@ -383,6 +386,9 @@ pub const CHECK_CIRCLE: usize = 128;
 /// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes
 /// round for ever.
 pub const CHECK_DRIVEN: usize = 10_000;
+
+/// How soon a safety event that nobody leads after acts again by itself: a component may raise it in each update.
+pub const SAFETY_AGAIN: Duration = Duration::from_secs(1);
 
 /// How often what is there is taken away by force, where something is left of it: once more for what failed by chance, and
 /// once for what that uncovers.

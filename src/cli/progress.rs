@@ -9,7 +9,7 @@ use super::output::{Output, Style};
 use crate::limits;
 use crate::session::log::Entry;
 use crate::session::tap::{Hears, News, Tap};
-use crate::session::{Happening, Phase};
+use crate::session::{Happening, Phase, Stage};
 use crate::time::Clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
@@ -196,6 +196,15 @@ impl Screen {
                 reasons.iter().for_each(|reason| self.line(format!("                 {reason}")));
             }
             Happening::Recovered { .. } => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
+            Happening::Stopping { why: None, .. } => {}
+            Happening::Stopping { stage, why: Some(why) } => {
+                let what = match stage {
+                    Stage::Led => "the coordinator leads down",
+                    Stage::TakenBack => "without its coordinator",
+                    Stage::Forced => "by force",
+                };
+                self.line(format!("{time}  {}  {what}: {why}", out.paint(Style::Care, "stopping")));
+            }
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");

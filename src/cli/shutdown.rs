@@ -9,11 +9,15 @@ use serde_json::{Value as Json, json};
 use std::time::Duration;
 
 /// Drive a running deployment to its *down* state; nothing is left.
+///
+/// The coordinator leads down; where it does not, what is in force is taken back, then everything is removed by force. Asked
+/// again, the coordinator is told again; with `--force` the rest is done by force at once. Exit status: 0 its coordinator has led
+/// down; 1 it is not down yet, or nobody answers; 4 shut down without its coordinator, by force, or incompletely.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     name: Option<String>,
-    /// Without its coordinator: the safe configurations, then everything is taken down.
+    /// Without its coordinator: what is safe, what brings it to rest, then everything is removed.
     #[arg(long)]
     force: bool,
     /// How long to wait at most, in seconds.
@@ -52,6 +56,7 @@ impl Args {
             let phase = text(&answer["phase"]);
             out.line(format!("{name}: {}", out.paint(super::status::state_style(phase), phase)));
         }
-        Ok(if answer["left"].as_array().is_some_and(|l: &Vec<Json>| !l.is_empty()) { Exit::Broken } else { Exit::Done })
+        let left = answer["left"].as_array().is_some_and(|left: &Vec<Json>| !left.is_empty());
+        Ok(if left || answer["stage"] != "led" { Exit::Forced } else { Exit::Done })
     }
 }

@@ -13,6 +13,7 @@ use super::running::{Purpose, Running};
 use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
+use super::taking_back::Began;
 use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
@@ -90,6 +91,10 @@ pub(super) struct Engine {
     pub stopping: bool,
     /// Everything is being taken down.
     pub taking_down: bool,
+    /// When stopping began, and what was in force then.
+    pub began: Option<Began>,
+    /// What takes its time has been broken off, since force is wanted.
+    pub hurried: bool,
 }
 
 impl Engine {
@@ -119,6 +124,8 @@ impl Engine {
             snapshot: None,
             stopping: false,
             taking_down: false,
+            began: None,
+            hurried: false,
         }
     }
 
@@ -176,7 +183,7 @@ impl Engine {
             let (observed, idle) = self.observing.until();
             let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
             match self.inbox.recv_or_idle(until, idle) {
-                Ok(Mail::Request(request)) if self.is_idle() => self.comes_alone(request),
+                Ok(Mail::Request(request)) if self.is_idle() && self.began.is_none() => self.comes_alone(request),
                 received => self.received(received),
             }
         }
@@ -234,6 +241,8 @@ impl Engine {
                     Command::View { system, reply } => {
                         let _ = reply.try_send(self.view(system));
                     }
+                    Command::Stopping => self.stopping_begins(),
+                    Command::Hurry => {}
                     // Stands in its coordinator's queue like a request.
                     Command::Down(requester) => {
                         let ask = Ask::Undo;
@@ -248,6 +257,7 @@ impl Engine {
 
     /// A batch comes: what it overtakes, gives up or cancels is answered, the rest waits its turn.
     pub fn arrive(&mut self, batch: Batch) {
+        let Some(batch) = self.without_refused(batch) else { return };
         let configurations = self.given.configurations.clone();
         let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
         let arrival = self.desk.arrive(batch, safe, &self.given.claims);

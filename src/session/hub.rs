@@ -3,6 +3,7 @@
 //!
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
+use super::halt::Halt;
 use super::lanes::Lanes;
 use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
 use super::tap::Hears;
@@ -34,6 +35,7 @@ pub struct Hub {
     outside: Condvar,
     configurations: FxHashSet<ConfigId>,
     emits: FxHashSet<EventName>,
+    halt: Halt,
 }
 
 struct State {
@@ -114,7 +116,28 @@ impl Hub {
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
+            halt: Halt::default(),
         }
+    }
+
+    /// With the events that make it safe, and what is applied then, when no coordinator hears them any more.
+    #[must_use]
+    pub fn with_safety(self, events: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
+        Self { halt: Halt::new(events, safe), ..self }
+    }
+
+    pub(super) fn now(&self) -> Time {
+        self.clock.now()
+    }
+
+    /// How far stopping is.
+    pub(super) fn halt(&self) -> &Halt {
+        &self.halt
+    }
+
+    /// Whether stopping has begun.
+    pub fn is_stopping(&self) -> bool {
+        self.halt.has_begun()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
