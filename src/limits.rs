@@ -35,6 +35,15 @@ pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
 /// How often it looks.
 pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 
+/// How soon an event that a component goes on raising while it is being stopped is told again.
+pub const REPORTED_AGAIN: Duration = Duration::from_secs(5);
+
+/// Different events of components that are kept while a deployment is being stopped.
+pub const REPORTED: usize = 64;
+
+/// How often `davit shutdown` tells what it waits for.
+pub const SHUTDOWN_TOLD: Duration = Duration::from_secs(1);
+
 /// How often a script that waits looks whether it is to end.
 pub const SIGNAL_LOOK: Duration = Duration::from_millis(100);
 

@@ -1,11 +1,17 @@
 //! `davit shutdown`
 
 use super::exit::Exit;
-use super::output::Style;
+use super::output::{Output, Style};
 use super::remote::{ASK, connect, failure};
 use super::status::text;
 use super::{Answer, Context, Run};
+use crate::limits;
+use crate::session::StoppingView;
+use crate::session::client::Client;
+use crate::time::Clock;
 use serde_json::{Value as Json, json};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Drive a running deployment to its *down* state; nothing is left.
@@ -41,7 +47,13 @@ impl Args {
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
         let limit = Duration::from_secs_f64(self.within) + ASK;
-        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure)?;
+        let done = Arc::new(AtomicBool::new(false));
+        if !self.json {
+            tell_waiting(context.out, name.clone(), done.clone());
+        }
+        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure);
+        done.store(true, Ordering::Relaxed);
+        let answer = answer?;
         // So that the same name can be deployed at once.
         client.wait_until_free();
         if self.json {
@@ -53,10 +65,46 @@ impl Args {
             for note in answer["left"].as_array().into_iter().flatten() {
                 out.line(format!("{}    {}", out.paint(Style::Bad, "left"), text(note)));
             }
+            let reported: Vec<&str> = answer["reported"].as_array().into_iter().flatten().map(text).collect();
+            if !reported.is_empty() {
+                out.line(format!("{}  {}", out.paint(Style::Dim, "reported"), reported.join(", ")));
+            }
             let phase = text(&answer["phase"]);
             out.line(format!("{name}: {}", out.paint(super::status::state_style(phase), phase)));
         }
         let left = answer["left"].as_array().is_some_and(|left: &Vec<Json>| !left.is_empty());
         Ok(if left || answer["stage"] != "led" { Exit::Forced } else { Exit::Done })
     }
+}
+
+/// Tells now and then what the shutdown waits for, until it is done.
+fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
+    let tell = move || {
+        let (clock, mut told) = (Clock::real(), String::new());
+        let mut client = Client::connect(Some(&name)).ok()?;
+        loop {
+            clock.sleep(limits::SHUTDOWN_TOLD);
+            let status = client.call("status", &json!({}), ASK).ok()?;
+            let stopping: StoppingView = serde_json::from_value(status["stopping"].clone()).ok()?;
+            let what = match (stopping.held, stopping.waits_for.is_empty()) {
+                (true, _) => "a safe configuration holds what is left: `davit shutdown --force` lets go".to_owned(),
+                (false, true) => format!("{} in {}", stopping.stage.words(), place(&status)),
+                (false, false) => stopping.waits_for.join(", "),
+            };
+            if done.load(Ordering::Relaxed) {
+                return Some(());
+            }
+            if what != told {
+                out.line(format!("{}  {what}", out.paint(Style::Dim, "waits for")));
+                told = what;
+            }
+        }
+    };
+    // Without it the shutdown waits in silence.
+    let _ = std::thread::Builder::new().name("davit-waits".to_owned()).spawn(tell);
+}
+
+/// The innermost active state.
+fn place(status: &Json) -> &str {
+    status["coordinator"].as_array().and_then(|states| states.last()).map_or("no state", text)
 }

@@ -152,7 +152,9 @@ impl Engine {
                 down.troubles.push(Reason::Moves(moving.step.clone()));
                 continue;
             }
-            let machine = Transaction::new(planned, self.effort(Time::NEVER));
+            // What brings it to rest may take the time that it gives itself.
+            let patience = configuration.timeout.unwrap_or_default().max(self.given.limits.step_timeout);
+            let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
             let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
             let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
             if !troubles.is_empty() {

@@ -5,11 +5,11 @@ use crate::limits;
 use crate::model::{ConfigId, EventName};
 use crate::time::{Time, lock};
 use rustc_hash::FxHashSet;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
 
 /// What stopping is at: part of what `status --json` prints.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoppingView {
     /// The stage.
     pub stage: Stage,
@@ -37,10 +37,10 @@ struct State {
     held: bool,
     /// No coordinator leads any more.
     alone: bool,
-    /// A safety event came since it began.
-    emergency: bool,
     /// When one acted by itself last.
     acted: Option<Time>,
+    /// What components reported since it began, each event once.
+    reported: Vec<String>,
 }
 
 impl Halt {
@@ -67,11 +67,6 @@ impl Halt {
         lock(&self.state).held = held;
     }
 
-    /// Whether a safety event came since stopping began.
-    pub fn is_emergency(&self) -> bool {
-        lock(&self.state).emergency
-    }
-
     /// Whether a coordinator still leads down.
     pub fn is_led(&self) -> bool {
         let state = lock(&self.state);
@@ -85,12 +80,27 @@ impl Halt {
             return &[];
         }
         let mut state = lock(&self.state);
-        state.emergency |= state.began;
         if !state.alone || state.acted.is_some_and(|acted| now < acted + limits::SAFETY_AGAIN) {
             return &[];
         }
         state.acted = Some(now);
         &self.safe
+    }
+
+    /// A component raised an event.
+    pub fn report(&self, event: EventName) {
+        let mut state = lock(&self.state);
+        if state.began
+            && state.reported.len() < limits::REPORTED
+            && !state.reported.iter().any(|known| known == event.as_str())
+        {
+            state.reported.push(event.to_string());
+        }
+    }
+
+    /// What components reported since stopping began.
+    pub fn reported(&self) -> Vec<String> {
+        lock(&self.state).reported.clone()
     }
 
     pub fn view(&self, waits_for: Vec<String>) -> Option<StoppingView> {

@@ -18,6 +18,8 @@ pub struct Ended {
     pub forced: Vec<String>,
     /// What is left, one line each.
     pub left: Vec<String>,
+    /// Events that components raised while it was being stopped, each once.
+    pub reported: Vec<String>,
 }
 
 impl Ended {
@@ -117,7 +119,7 @@ impl Session {
         }
         let phase = if left.is_empty() { Phase::Down } else { Phase::Broken };
         self.hub().set_phase(phase);
-        Ended { phase, stage, forced, left }
+        Ended { phase, stage, forced, left, reported: self.hub().halt().reported() }
     }
 }
 

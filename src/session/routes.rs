@@ -233,6 +233,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         }
     };
     hub.report(Happening::Event { event: event.to_string(), from });
+    hub.halt().report(event);
     if let Some(configurator) = &configurator {
         make_safe(hub, configurator, event);
     }

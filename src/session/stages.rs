@@ -1,9 +1,9 @@
 //! Which stage of stopping comes next (design §6). Pure: what happened in, what to do out.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The stages in which a deployment is stopped, whatever asked for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
     /// The shutdown event was raised, and the coordinator leads down.
@@ -15,12 +15,12 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Its name in views.
-    pub fn as_str(self) -> &'static str {
+    /// How the deployment is stopped in it, for a sentence.
+    pub fn words(self) -> &'static str {
         match self {
-            Self::Led => "led",
-            Self::TakenBack => "taken_back",
-            Self::Forced => "forced",
+            Self::Led => "by its coordinator",
+            Self::TakenBack => "without its coordinator",
+            Self::Forced => "by force",
         }
     }
 }
@@ -85,7 +85,11 @@ mod tests {
             assert_eq!(next(Stage::TakenBack, &Came::Hurried, held), Next::Stage(Stage::Forced));
         }
         assert_eq!(next(Stage::TakenBack, &left(), false), Next::Stage(Stage::Forced));
-        assert_eq!(next(Stage::TakenBack, &left(), true), Next::Held, "what is held still is let go by nobody but people");
+        assert_eq!(
+            next(Stage::TakenBack, &left(), true),
+            Next::Held,
+            "what is held still is let go by nobody but people"
+        );
         assert_eq!(
             [first(false, true), first(false, false), first(true, true)],
             [Stage::Led, Stage::TakenBack, Stage::Forced]

@@ -18,6 +18,8 @@ struct Told {
     notes: Vec<String>,
     /// It is one that did not come up.
     coming_up: bool,
+    /// When stopping began.
+    began: Time,
 }
 
 impl Session {
@@ -29,9 +31,12 @@ impl Session {
     }
 
     /// Whether an event from outside is heard also while it is being stopped: those of safety, and the one that shuts down.
+    /// Where nobody has said which are those of safety, it may be any.
     pub fn stays_open(&self, event: &str) -> bool {
         let deployment = self.deployment();
-        deployment.shutdown.event.as_str() == event || deployment.safety.iter().any(|(safety, _)| safety.as_str() == event)
+        deployment.safety.is_empty()
+            || deployment.shutdown.event.as_str() == event
+            || deployment.safety.iter().any(|(safety, _)| safety.as_str() == event)
     }
 
     /// Nobody is there who could ask for force: nothing waits for that.
@@ -45,7 +50,7 @@ impl Session {
         hub.halt().begin();
         self.configurator().stopping();
         hub.set_phase(Phase::ShuttingDown);
-        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up };
+        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up, began: self.clock().now() };
         let mut stage = first(force, self.leads());
         let mut why = match stage {
             Stage::Led => None,
@@ -55,7 +60,7 @@ impl Session {
         loop {
             self.begin_stage(stage, why.take(), &mut told);
             let (came, held) = match stage {
-                Stage::Led => (self.lead_down(told.coming_up), false),
+                Stage::Led => (self.lead_down(&told), false),
                 Stage::TakenBack => self.take_all_back(&mut told),
                 Stage::Forced => (self.force_all(&mut told), false),
             };
@@ -87,12 +92,7 @@ impl Session {
     fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Told) {
         let hub = self.hub();
         if let Some(why) = &why {
-            let what = match stage {
-                Stage::Led => "the coordinator leads down",
-                Stage::TakenBack => "the coordinator is left out, what is in force is taken back",
-                Stage::Forced => "shutdown was forced",
-            };
-            told.notes.push(format!("{what}: {why}"));
+            told.notes.push(format!("stopped {}: {why}", stage.words()));
         }
         told.stage = stage;
         if stage != Stage::Led {
@@ -120,7 +120,7 @@ impl Session {
     }
 
     /// The first stage.
-    fn lead_down(&self, coming_up: bool) -> Came {
+    fn lead_down(&self, told: &Told) -> Came {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
         let goal = self.deployment().down_states();
@@ -139,13 +139,13 @@ impl Session {
             if !self.leads() {
                 break Came::Left("a coordinator has ended".to_owned());
             }
-            if coming_up && hub.was_heard(ticket) == Some(false) && self.is_still() {
+            if told.coming_up && hub.was_heard(ticket) == Some(false) && self.is_still() {
                 break Came::Left(format!("{}, which does not hear `{}`", hub.whereabouts(), take_down.event));
             }
             let now = self.clock().now();
             if now >= deadline {
                 // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when.
-                if !(hub.halt().is_emergency() && self.is_safe() && self.attended.load(Ordering::Relaxed)) {
+                if !(self.made_safe_since(told.began) && self.attended.load(Ordering::Relaxed)) {
                     break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
                 }
                 deadline = now + take_down.within;
@@ -172,7 +172,7 @@ impl Session {
         notes.extend(down.kept.iter().map(|id| format!("`{id}` not undone")));
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
-        let held = down.held || down.still && self.hub().halt().is_emergency();
+        let held = down.still;
         if self.is_hurried() {
             return (Came::Hurried, held);
         }
@@ -226,10 +226,10 @@ impl Session {
         told.notes.extend(notes);
     }
 
-    /// Whether a safe configuration is in force.
-    fn is_safe(&self) -> bool {
+    /// Whether a safe configuration is in force that came since then.
+    fn made_safe_since(&self, began: Time) -> bool {
         let safe = |id: ConfigId| self.deployment().configurations.iter().any(|c| c.id == id && c.safe);
-        self.frames().iter().any(|frame| safe(frame.configuration))
+        self.frames().iter().any(|frame| frame.at >= began && safe(frame.configuration))
     }
 }
 

@@ -9,4 +9,5 @@ mod life;
 mod settled;
 mod socket;
 mod stands;
+mod stopping;
 mod tap;
