@@ -23,6 +23,7 @@ mod recovery;
 mod several;
 mod simulated;
 mod stalled;
+mod stopping;
 mod together;
 mod unasked;
 mod unheard;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 const HAND: &str = "free 0.5; align 1.5; sway 600 0.06 0 0 0.15";
 
 /// What asks for the end. A signal and `davit shutdown` leave the same command; twice is by force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Stop {
     Once,
     /// Asked for again so much later.
@@ -23,8 +23,9 @@ struct Came {
     place: String,
     ended: Ended,
     took: f64,
-    /// How far the tool sank from where it was when force began, in m.
+    /// Whether the drives went off while they held the arm up.
     dropped: bool,
+    /// How fast the tool was when they did, in m/s.
     fastest: f64,
 }
 
@@ -68,9 +69,8 @@ fn stopped(name: &str, at: f64, stop: Stop) -> Came {
     };
     let took = live.now() - began - at;
     let rows = live.rows();
-    // At rest when it is over: the last tenth of a second that was seen.
-    let end = rows.last().map_or(0.0, |row| row.t);
-    let fastest = rows.iter().filter(|row| row.t > end - 0.1).map(|row| row.speed.norm()).fold(0.0, f64::max);
+    // How fast the tool still was when the drives went off.
+    let fastest = rows.last().map_or(0.0, |row| row.speed.norm());
     let came = Came {
         at,
         place: place.lock().unwrap().clone(),
@@ -86,11 +86,12 @@ fn stopped(name: &str, at: f64, stop: Stop) -> Came {
 
 fn line(came: &Came) -> String {
     format!(
-        "{:6.2} s  {:<40} {:?} in {:.2} s{}{}",
+        "{:6.2} s  {:<40} {:?} in {:.2} s, {:.3} m/s{}{}",
         came.at,
         came.place,
         came.ended.stage,
         came.took,
+        came.fastest,
         if came.dropped { ", DROPPED" } else { "" },
         if came.ended.is_clean() { "" } else { ", LEFT" },
     )
@@ -136,6 +137,29 @@ fn force_at_any_time_lowers_the_arm() {
             assert!(came.ended.stage == Stage::Forced || came.took < later + 0.1, "{}", line(&came));
         }
     }
+}
+
+/// The table of docs/youbot.md: `DAVIT_STOPS_EVERY=2 cargo test --test youbot -- --ignored --nocapture stops::table`.
+#[test]
+#[ignore = "prints the table of docs/youbot.md"]
+fn table() {
+    let mut rows = String::new();
+    let mut wrong = Vec::new();
+    for at in instants(step(2.0), 12.0) {
+        let ways = [Stop::Once, Stop::AfterEstop, Stop::Twice(0.0), Stop::Twice(1.0)];
+        let all: Vec<Came> = ways.iter().map(|way| stopped("youbot_arm", at, *way)).collect();
+        let cell = |came: &Came| {
+            let how = if came.ended.is_orderly() { "" } else { " (by force)" };
+            format!("{:.1} s{how}{}", came.took, if came.dropped { " **dropped**" } else { "" })
+        };
+        wrong.extend(all.iter().filter(|came| came.dropped || !came.ended.is_clean()).map(line));
+        let place = all[0].place.trim_start_matches("root.");
+        let cells: Vec<String> = all.iter().map(cell).collect();
+        rows += &format!("| {at:.2} s | `{place}` | {} |\n", cells.join(" | "));
+    }
+    println!("| asked after | in | a signal | 0.5 s after `e_estop` | two signals at once | the second 1 s later |");
+    println!("|---|---|---|---|---|---|\n{rows}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// The long run asks for every 20 ms: `DAVIT_STOPS_EVERY=0.02`.
