@@ -189,7 +189,7 @@ codes! {
     DEPLOY_UNKNOWN_CONFIGURATION = "deploy::unknown_configuration", "the deployment names a configuration that there is not",
         "`operator` lists what an operator may do while the deployment is up: configurations by their names, properties and \
          in-ports as `Component.member`. `shutdown.rest` lists the configurations that bring the system to rest when it is \
-         taken down by force. A name that no configuration has would be missed when it is needed. Correct it, or remove it.";
+         taken down by force (the third stage of stopping, docs/operating.md). A name that no configuration has would be missed when it is needed. Correct it, or remove it.";
     DEPLOY_NO_JOURNAL = "deploy::no_journal", "there is no journal whose durability could be set",
         "`durability` is to say how safely a journal is kept, and no journal is written yet: whatever the key said, a crash \
          would lose the same. A promise that is not kept is worse than none, so the key is refused. Leave it out.";

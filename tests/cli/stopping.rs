@@ -10,19 +10,17 @@ fn waiting(demo: &Demo) {
     let at = "trans { src = \"operational\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
     let instead = "waiting = state {},\n  trans { src = \"operational\", tgt = \"waiting\", events = { \"e_shutdown\" } },\n  \
         trans { src = \"waiting\", tgt = \"leaving\", events = { \"e_empty\" } },";
-    assert_eq!(demo.replace("coordinator.lua", at, instead), 1);
+    demo.replace("coordinator.lua", at, instead);
 }
 
-/// Its configuration `start_all` takes long.
+/// The last call of its bring-up takes long.
 fn slow(demo: &Demo) {
-    let faults = "faults:\n  - { step: \"start source\", how: slow, takes_s: 600 }\n";
-    demo.write("deployment.yaml", &format!("{}{faults}", demo.read("deployment.yaml")));
-    demo.replace(
-        "deployment.yaml",
-        "up: operational, failed: [failed], within_s: 5",
-        "up: operational, failed: [failed], within_s: 900",
-    );
-    demo.replace("configurations.lua", "start_all = Configuration {", "start_all = Configuration { timeout = 900.0,");
+    let faults = "faults:\n  - { step: \"operation_call source.reset\", how: slow, takes_s: 600 }\n";
+    let deployment =
+        demo.read("deployment.yaml").replace("failed: [failed], within_s: 5", "failed: [failed], within_s: 900");
+    demo.write("deployment.yaml", &format!("{deployment}{faults}"));
+    let call = "slow = Configuration { group = \"speed\", timeout = 900.0, operation_call(\"source.reset\", 0.1),";
+    demo.replace("configurations.lua", "slow = Configuration { group = \"speed\",", call);
 }
 
 fn deploy(demo: &Demo, out: &str) -> Foreground {
@@ -49,7 +47,7 @@ fn a_signal_while_it_comes_up_is_led_down() {
     let demo = Demo::new();
     slow(&demo);
     let deployed = deploy(&demo, "out");
-    demo.until_phase("deploying");
+    until("the call", || demo.read("out").contains("slow_mode").then_some(()));
     deployed.signal(libc::SIGTERM);
     let ended = deployed.end();
     let out = demo.read("out");
