@@ -2,7 +2,7 @@
 
 use super::request::{Reason, Request, Residual};
 use crate::model::{ComponentName, ConfigId, RequestId, Snapshot, Step};
-use crate::stack::Requester;
+use crate::stack::{FrameId, Requester};
 use crate::time::{Sender, Time};
 use serde::Serialize;
 use std::sync::Arc;
@@ -58,6 +58,15 @@ pub struct View {
     pub partial: Vec<Residual>,
     /// Components whose call has not returned.
     pub quarantined: Vec<ComponentName>,
+}
+
+/// What was in force when stopping began.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Began {
+    /// The number that the next frame got.
+    pub next: FrameId,
+    /// When.
+    pub at: Time,
 }
 
 /// What a stage of stopping came to.

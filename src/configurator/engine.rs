@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{Busy, Command, View};
+use super::control::{Began, Busy, Command, View};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -13,7 +13,6 @@ use super::running::{Purpose, Running};
 use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
-use super::taking_back::Began;
 use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};

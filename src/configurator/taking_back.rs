@@ -4,7 +4,7 @@
 //! included: but those that came since stopping began, those of safe configurations, and what these block. What was put to
 //! rest since is not raised again: where one of them moved hardware nothing is popped at all.
 
-use super::control::TakenDown;
+use super::control::{Began, TakenDown};
 use super::engine::Engine;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -15,14 +15,6 @@ use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Transaction};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-
-/// What was in force when stopping began.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Began {
-    /// The number that the next frame got.
-    next: FrameId,
-    at: Time,
-}
 
 impl Engine {
     /// From now on operators are refused, also those that wait.
