@@ -139,13 +139,37 @@ fn force_at_any_time_lowers_the_arm() {
     }
 }
 
-/// The table of docs/youbot.md: `DAVIT_STOPS_EVERY=2 cargo test --test youbot -- --ignored --nocapture stops::table`.
+/// Stopped in an emergency while it parks, it stays where it is: for longer than any stage has, and until somebody asks again.
+#[test]
+fn an_emergency_while_it_parks_waits_for_people() {
+    let live = Live::with_hand("youbot_arm", HAND);
+    live.bring_up();
+    let parks = 1.0;
+    somebody(&live, parks, |session| session.raise(davit::model::EventName::new("e_estop").unwrap(), "test"));
+    somebody(&live, parks + 21.0, |session| {
+        let status = session.status();
+        assert_eq!(status.stopping.map(|view| view.stage), Some(Stage::Led));
+        assert_eq!(status.coordinator.last().map(String::as_str), Some("root.lowering.waiting"));
+        ask(session, false);
+    });
+    let began = live.now();
+    let ended = live.session.take_down(false);
+    let rows = live.rows();
+    let place = |at: f64| rows.iter().find(|row| row.t >= began + at).expect("the probe lives").tool;
+    let moved = (place(parks + 0.3) - place(parks + 20.9)).norm();
+    assert!(moved < 0.005, "it moved {moved} m after the emergency");
+    assert!(live.now() - began > parks + 21.0 && ended.is_orderly(), "{ended:?}\n{}", live.story(began));
+    assert_eq!(live.first("e_arm_dropped", 0.0), None);
+    live.clock.shutdown();
+}
+
+/// The table of docs/youbot.md: `DAVIT_STOPS_EVERY=3 cargo test --test youbot -- --ignored --nocapture --exact stops::table`.
 #[test]
 #[ignore = "prints the table of docs/youbot.md"]
 fn table() {
     let mut rows = String::new();
     let mut wrong = Vec::new();
-    for at in instants(step(2.0), 12.0) {
+    for at in instants(step(3.0), 12.0) {
         let ways = [Stop::Once, Stop::AfterEstop, Stop::Twice(0.0), Stop::Twice(1.0)];
         let all: Vec<Came> = ways.iter().map(|way| stopped("youbot_arm", at, *way)).collect();
         let cell = |came: &Came| {
