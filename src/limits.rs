@@ -35,6 +35,18 @@ pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
 /// How often it looks.
 pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 
+/// How soon an event that a component goes on raising while it is being stopped is told again.
+pub const REPORTED_AGAIN: Duration = Duration::from_secs(5);
+
+/// Different events of components that are kept while a deployment is being stopped.
+pub const REPORTED: usize = 64;
+
+/// How often `davit shutdown` tells what it waits for.
+pub const SHUTDOWN_TOLD: Duration = Duration::from_secs(1);
+
+/// How often a script that waits looks whether it is to end.
+pub const SIGNAL_LOOK: Duration = Duration::from_millis(100);
+
 /// How often whoever waits for an answer looks whether the client is still there.
 pub const SOCKET_LOOK: Duration = Duration::from_millis(100);
 
@@ -427,6 +439,9 @@ pub const CHECK_CIRCLE: usize = 128;
 /// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes
 /// round for ever.
 pub const CHECK_DRIVEN: usize = 10_000;
+
+/// How soon a safety event that nobody leads after acts again by itself: a component may raise it in each update.
+pub const SAFETY_AGAIN: Duration = Duration::from_secs(1);
 
 /// How often what is there is taken away by force, where something is left of it: once more for what failed by chance, and
 /// once for what that uncovers.

@@ -4,6 +4,7 @@
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
 mod faults;
+mod interrupt;
 mod looks;
 mod options;
 mod sandbox;
@@ -19,6 +20,7 @@ use crate::runtime::Libraries;
 use crate::session::tap::Hears;
 use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Session, recovery};
 use crate::time::{Clock, Time};
+pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -40,6 +42,8 @@ pub struct Options {
     pub observer: Option<Arc<dyn Hears>>,
     /// Where `say` goes.
     pub say: Box<dyn Fn(&str)>,
+    /// By what somebody outside stops it.
+    pub interrupt: Interrupt,
 }
 
 /// How a script ended.
@@ -198,9 +202,8 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     });
     function!("recover", String, |h, _lua, how| recover(h, &how));
     function!("wait", f64, |h, _lua, seconds| {
-        let (clock, until) = (clock(h), deadline(h, seconds)?);
-        clock.sleep_until(until);
-        Ok(())
+        let (clock, until, interrupt) = (clock(h), deadline(h, seconds)?, interrupt(h));
+        interrupt.sleep(&clock, until)
     });
     function!("wait_state", (String, f64), |h, _lua, (state, seconds)| wait_state(h, &state, seconds));
     function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| wait_answer(h, &event, seconds));
@@ -260,7 +263,12 @@ fn clock(host: &Shared) -> Clock {
     host.borrow().options.clock.clone()
 }
 
+fn interrupt(host: &Shared) -> Interrupt {
+    host.borrow().options.interrupt.clone()
+}
+
 fn session(host: &Shared) -> mlua::Result<Arc<Session>> {
+    interrupt(host).check()?;
     host.borrow().session.clone().ok_or_else(|| error("nothing is deployed: call deploy(\"FILE\") first"))
 }
 
@@ -272,6 +280,7 @@ fn deadline(host: &Shared, seconds: f64) -> mlua::Result<Time> {
 }
 
 fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
+    interrupt(host).check()?;
     if host.borrow().session.is_some() {
         return Err(error("a deployment is already up: call shutdown() before the next deploy"));
     }
@@ -302,6 +311,11 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {
         session.hub().attach(observer.clone());
+    }
+    interrupt(host).up(&session);
+    // There is no robot to be held, and nobody who is waited for.
+    if clock.is_simulated() {
+        session.unattended();
     }
     // A replay raises the events itself.
     match if replay { Ok(()) } else { session.bring_up() } {
@@ -390,7 +404,9 @@ fn wait_until<T>(
     what: impl Fn(&Hub) -> String,
 ) -> mlua::Result<T> {
     let (session, clock, deadline) = (session(host)?, clock(host), deadline(host, seconds)?);
+    let interrupt = interrupt(host);
     loop {
+        interrupt.check()?;
         if let Some(found) = look(&session) {
             return Ok(found);
         }

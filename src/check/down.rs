@@ -31,7 +31,7 @@ impl Graph<'_, '_> {
         let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
             .at(self.product.deployment.key_origin("shutdown.down"))
             .path("shutdown.down")
-            .help("let every way down undo or destroy what was applied on the way up; else shutdown is forced");
+            .help("let every way down undo or destroy what was applied on the way up; else what is left is taken away without its coordinator");
         let trace = self.trace(at);
         found.push((finding, trace));
     }

@@ -13,15 +13,18 @@ use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, F
 use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
-use crate::session::{Command, Ended, NotUp, Session};
+use crate::session::{Command, Ended, NotUp, Session, Stage};
 use crate::time::Clock;
 use std::sync::Arc;
 
 /// Bring a deployment up and stay in the foreground; Ctrl-C shuts it down in order.
 ///
-/// Everything is checked first. While it comes up, Ctrl-C rolls back; once up, it shuts down through the coordinator. A
-/// second Ctrl-C ends at once and asks the components nothing more. A bring-up that fails is rolled back and exits 1; with
-/// a component left over whose call never returned, 3.
+/// Everything is checked first. Ctrl-C (SIGTERM, SIGHUP, SIGQUIT) stops it, also while it comes up: the coordinator leads down;
+/// where it does not, what is in force is taken back, then everything is removed by force. A second Ctrl-C begins with force;
+/// a third ends at once and asks the components nothing more. A bring-up that fails is stopped in the same way.
+///
+/// Exit status: 0 shut down by its coordinator; 1 refused, or it did not come up; 4 shut down without its coordinator, by force,
+/// or incompletely.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -106,7 +109,7 @@ fn foreground(
     let exit = match session.bring_up() {
         Err(not_up) => {
             progress.finish();
-            tell_not_up(&context.out, progress, name.as_str(), &not_up)
+            tell_not_up(&context.out, progress, name.as_str(), &not_up, in_background)
         }
         Ok(()) => {
             tell_up(&context.out, progress, &session, in_background);
@@ -117,7 +120,7 @@ fn foreground(
             let ended = session.take_down(force);
             progress.finish();
             tell_ended(&context.out, progress, name.as_str(), &ended);
-            if ended.is_clean() { Exit::Done } else { Exit::Broken }
+            Exit::of_stop(&ended, Exit::Done)
         }
     };
     drop(watch);
@@ -158,29 +161,32 @@ fn watch(
     progress: &Progress,
     in_background: bool,
 ) -> Result<Watch, Failure> {
-    let first = {
+    let stop = {
         let (session, progress) = (Arc::downgrade(session), progress.clone());
-        move || {
+        move |force| {
             if let Some(session) = session.upgrade() {
-                session.command(Command::Shutdown { force: false });
+                session.command(Command::Shutdown { force });
             }
-            progress.line("taking it down; Ctrl-C again ends at once and asks the components nothing more");
+            progress.line(super::signals::told(force));
         }
     };
-    let second = {
+    let leave = {
         let (leave, progress) = (socket.leave(), progress.clone());
         move || {
             leave();
             progress.finish();
         }
     };
-    Watch::start(in_background, first, second).map_err(|error| {
-        Failure::usage(
-            CLI_SYSTEM,
-            format!("signals cannot be watched: {error}"),
-            "try again; the system is short of threads",
-        )
-    })
+    Watch::start(in_background, stop, leave).map_err(unwatched)
+}
+
+/// Signals cannot be watched.
+pub(super) fn unwatched(error: std::io::Error) -> Failure {
+    Failure::usage(
+        CLI_SYSTEM,
+        format!("signals cannot be watched: {error}"),
+        "try again; the system is short of threads",
+    )
 }
 
 /// The system has no thread left.
@@ -207,22 +213,31 @@ fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: 
     progress.line(out.paint(Style::Dim, way));
 }
 
-fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp) -> Exit {
+fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in_background: bool) -> Exit {
     progress.line(format!("{} {}: {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "not up"), not_up.why));
     for reason in &not_up.reasons {
         progress.line(format!("  {reason}"));
     }
     tell_ended(out, progress, name, &not_up.ended);
-    if not_up.ended.is_clean() { Exit::No } else { Exit::Broken }
+    // Who stopped it knows why it is not up; who waits for it in another terminal does not.
+    let well = if not_up.interrupted && !in_background { Exit::Done } else { Exit::No };
+    Exit::of_stop(&not_up.ended, well)
 }
 
 fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
     for note in &ended.left {
         progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
     }
-    if ended.is_clean() {
-        progress.line(format!("{} {}, nothing is left", out.paint(Style::Bold, name), out.paint(Style::Good, "down")));
+    let name = out.paint(Style::Bold, name);
+    if ended.is_orderly() {
+        progress.line(format!("{name} {}, nothing is left", out.paint(Style::Good, "down")));
+    } else if ended.is_clean() {
+        let how = match ended.stage {
+            Stage::Forced => "by force",
+            _ => "without its coordinator",
+        };
+        progress.line(format!("{name} {} {how}, nothing is left", out.paint(Style::Care, "down")));
     } else {
-        progress.line(format!("{} {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "broken")));
+        progress.line(format!("{name} {}", out.paint(Style::Bad, "broken")));
     }
 }

@@ -45,9 +45,9 @@ pub fn run(context: &Context) -> Answer {
         .spawn()
         .map_err(|e| failed("the process in the background cannot be started", &e))?;
     let stdout = child.stdout.take().expect("piped above");
-    // While it comes up, Ctrl-C here is passed on: it rolls back, as in the foreground.
+    // While it comes up, Ctrl-C here is passed on: it is stopped, as in the foreground.
     let pid = child.id();
-    let _watch = super::signals::Watch::start(true, move || interrupt(pid, "INT"), move || interrupt(pid, "INT")).ok();
+    let _watch = super::signals::Watch::start(true, move |_| interrupt(pid, "INT"), move || interrupt(pid, "INT")).ok();
     for line in BufReader::new(stdout).lines() {
         match line {
             Ok(line) if line == UP => {
@@ -62,6 +62,7 @@ pub fn run(context: &Context) -> Answer {
         Some(0) => Exit::Done,
         Some(1) => Exit::No,
         Some(2) => Exit::Usage,
+        Some(4) => Exit::Forced,
         _ => Exit::Broken,
     })
 }

@@ -1,5 +1,6 @@
 //! Exit codes of every command (design §13).
 
+use crate::session::Ended;
 use std::process::ExitCode;
 
 /// How a command ended, for the shell.
@@ -14,6 +15,8 @@ pub enum Exit {
     Usage,
     /// The system is broken: it is neither as before nor as wanted.
     Broken,
+    /// It was shut down otherwise than in order: without the coordinator, by force, or incompletely.
+    Forced,
 }
 
 impl Exit {
@@ -26,6 +29,14 @@ impl Exit {
     /// [`Exit::Broken`]
     pub const BROKEN: u8 = 3;
 
+    /// [`Exit::Forced`]
+    pub const FORCED: u8 = 4;
+
+    /// How a command ends whose deployment was stopped so, and that would have ended with `well` had that gone in order.
+    pub fn of_stop(ended: &Ended, well: Self) -> Self {
+        if ended.is_orderly() { well } else { Self::Forced }
+    }
+
     /// The number.
     pub fn code(self) -> u8 {
         match self {
@@ -33,6 +44,7 @@ impl Exit {
             Self::No => Self::NO,
             Self::Usage => Self::USAGE,
             Self::Broken => Self::BROKEN,
+            Self::Forced => Self::FORCED,
         }
     }
 }

@@ -6,6 +6,7 @@ use super::remote::{ASK, ask, connect, failure};
 use super::status::text;
 use super::{Answer, Context, Failure, Run, output};
 use crate::model::codes::CLI_NO_ANSWER;
+use crate::session::Stage;
 use crate::session::owner;
 use serde_json::{Value as Json, json};
 
@@ -178,6 +179,11 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             let number = entry["steps"].as_array().map_or(0, Vec::len);
             let line = format!("{}  {}", out.paint(Style::Good, "recovered"), count(number, "step"));
             line + &if steps { below(out, entry) } else { String::new() }
+        }
+        "stopping" => {
+            let stage = serde_json::from_value::<Stage>(entry["stage"].clone()).map_or("", Stage::words);
+            let why = entry["why"].as_str().map_or_else(String::new, |why| format!(": {why}"));
+            format!("stopping   {stage}{why}")
         }
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
         other => format!("{other} {entry}"),

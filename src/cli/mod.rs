@@ -51,7 +51,8 @@ use std::process::ExitCode;
 ///
 /// Exit status: 0 done; 1 the answer is no (findings, failed and rolled back); 2 usage or unreadable input; 3 broken:
 /// `davit status` names what is left, `davit undo ID` of the very configuration that broke it goes back, and so does `davit
-/// recover --back`; `davit recover --accept` takes what is there as the state.
+/// recover --back`; `davit recover --accept` takes what is there as the state; 4 a deployment was shut down without its
+/// coordinator, by force, or incompletely.
 #[derive(Debug, Parser)]
 #[command(name = "davit", version, max_term_width = 100)]
 struct Cli {

@@ -13,6 +13,7 @@ use crate::session::{Happening, Phase};
 use crate::time::Clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::sync::Arc;
 
@@ -97,6 +98,9 @@ impl Progress {
     }
 }
 
+/// Who raises events and is no component.
+const COMMANDERS: [&str; 4] = ["deployment", "operator", "script", "configurator"];
+
 /// The end of the tap that writes.
 struct Screen {
     out: Output,
@@ -105,6 +109,10 @@ struct Screen {
     json: bool,
     /// When what was told last happened.
     at: f64,
+    /// It is being stopped: what components report is told too.
+    stopping: bool,
+    /// What they reported, and when that was told last: one that goes on reporting is told now and then.
+    reported: BTreeMap<String, f64>,
 }
 
 impl Screen {
@@ -115,7 +123,7 @@ impl Screen {
             ProgressBar::hidden()
         };
         bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
-        Self { out, bar, quiet: false, json, at: 0.0 }
+        Self { out, bar, quiet: false, json, at: 0.0, stopping: false, reported: BTreeMap::new() }
     }
 
     fn line(&self, line: impl std::fmt::Display) {
@@ -152,7 +160,7 @@ impl Screen {
         }
     }
 
-    fn tell(&self, entry: &Entry) {
+    fn tell(&mut self, entry: &Entry) {
         if self.json {
             self.out.json_line(entry);
             return;
@@ -196,6 +204,11 @@ impl Screen {
                 reasons.iter().for_each(|reason| self.line(format!("                 {reason}")));
             }
             Happening::Recovered { .. } => self.line(format!("{time}  {}", out.paint(Style::Good, "recovered"))),
+            Happening::Stopping { why: None, .. } => {}
+            Happening::Stopping { stage, why: Some(why) } => {
+                let word = out.paint(Style::Care, "stopping");
+                self.line(format!("{time}  {word}  {}: {why}", stage.words()));
+            }
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");
@@ -214,7 +227,16 @@ impl Screen {
                 let style = if *by == "info" { Style::Dim } else { Style::Care };
                 self.line(format!("{time}  {}  {text}", out.paint(style, by)));
             }
-            Happening::Said { .. } | Happening::Phase { .. } | Happening::Event { .. } | Happening::Stale { .. } => {}
+            Happening::Phase { phase } => self.stopping |= *phase == Phase::ShuttingDown,
+            Happening::Event { event, from } if self.stopping && !COMMANDERS.contains(&from.as_str()) => {
+                let before = self.reported.insert(event.clone(), entry.at);
+                if before.is_some_and(|before| entry.at < before + limits::REPORTED_AGAIN.as_secs_f64()) {
+                    self.reported.insert(event.clone(), before.unwrap_or(entry.at));
+                } else {
+                    self.line(format!("{time}  {}  {event} from {from}", out.paint(Style::Care, "..")));
+                }
+            }
+            Happening::Said { .. } | Happening::Event { .. } | Happening::Stale { .. } => {}
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use super::Failure;
 use super::exit::Exit;
-use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED};
+use crate::model::codes::{
+    CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED,
+};
 use crate::session::client::{Client, ClientError};
 use serde_json::Value as Json;
 use std::time::Duration;

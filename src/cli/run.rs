@@ -6,9 +6,10 @@ use super::input::Parameters;
 use super::last_words;
 use super::output::Style;
 use super::progress::Progress;
+use super::signals::{self, Watch};
 use super::{Answer, Context, Failure, Run};
 use crate::app::PLATFORMS;
-use crate::app::script::{self, Options, ScriptFailure};
+use crate::app::script::{self, Interrupt, Options, ScriptFailure};
 use crate::model::Ident;
 use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX};
 use serde_json::json;
@@ -16,8 +17,12 @@ use std::path::PathBuf;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
 ///
-/// Whatever the script does or fails to do, the deployment it brought up is taken down before the command ends. The
-/// functions a script may call are described in docs/scripts.md.
+/// Whatever the script does or fails to do, the deployment it brought up is shut down before the command ends, in the stages of
+/// `davit shutdown`; so it is at Ctrl-C, which ends the script. The functions a script may call are described in
+/// docs/scripts.md.
+///
+/// Exit status: 0 it ran to its end; 1 it failed or was interrupted; 2 it cannot be read; 4 what it brought up was shut down
+/// without its coordinator, by force, or incompletely.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The script.
@@ -51,6 +56,15 @@ impl Run for Args {
                 false => progress.say(out.paint(Style::Bold, text)),
             })
         };
+        let interrupt = Interrupt::default();
+        let watch = {
+            let (interrupt, stopped, left) = (interrupt.clone(), progress.clone(), progress.clone());
+            let stop = move |force| {
+                interrupt.stop(force);
+                stopped.line(signals::told(force));
+            };
+            Watch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
+        };
         let end = script::run(
             &self.script,
             Options {
@@ -60,24 +74,22 @@ impl Run for Args {
                 platform: self.platform.map(|name| Ident::new(&name).expect("the name of a platform is one")),
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
+                interrupt,
             },
         );
         clock.shutdown();
         progress.finish();
-        let left = end.ended.as_ref().is_some_and(|ended| !ended.is_clean());
         if let Some(ended) = &end.ended {
             for note in &ended.left {
                 progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
             }
         }
         last_words::unread(progress.end());
-        let Some(failure) = end.failure else {
-            return Ok(if left { Exit::Broken } else { Exit::Done });
-        };
+        drop(watch);
+        let stopped = |well| end.ended.as_ref().map_or(well, |ended| Exit::of_stop(ended, well));
+        let Some(failure) = end.failure else { return Ok(stopped(Exit::Done)) };
         let mut failure = tell(failure);
-        if left {
-            failure.exit = Exit::Broken;
-        }
+        failure.exit = stopped(failure.exit);
         Err(failure)
     }
 }

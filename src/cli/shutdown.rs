@@ -1,19 +1,29 @@
 //! `davit shutdown`
 
 use super::exit::Exit;
-use super::output::Style;
+use super::output::{Output, Style};
 use super::remote::{ASK, connect, failure};
 use super::status::text;
 use super::{Answer, Context, Run};
+use crate::limits;
+use crate::session::StoppingView;
+use crate::session::client::Client;
+use crate::time::Clock;
 use serde_json::{Value as Json, json};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Drive a running deployment to its *down* state; nothing is left.
+///
+/// The coordinator leads down; where it does not, what is in force is taken back, then everything is removed by force. Asked
+/// again, the coordinator is told again; with `--force` the rest is done by force at once. Exit status: 0 its coordinator has led
+/// down; 1 it is not down yet, or nobody answers; 4 shut down without its coordinator, by force, or incompletely.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     name: Option<String>,
-    /// Without its coordinator: the safe configurations, then everything is taken down.
+    /// Without its coordinator: what is safe, what brings it to rest, then everything is removed.
     #[arg(long)]
     force: bool,
     /// How long to wait at most, in seconds.
@@ -37,7 +47,13 @@ impl Args {
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
         let limit = Duration::from_secs_f64(self.within) + ASK;
-        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure)?;
+        let done = Arc::new(AtomicBool::new(false));
+        if !self.json {
+            tell_waiting(context.out, name.clone(), done.clone());
+        }
+        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure);
+        done.store(true, Ordering::Relaxed);
+        let answer = answer?;
         // So that the same name can be deployed at once.
         client.wait_until_free();
         if self.json {
@@ -49,9 +65,46 @@ impl Args {
             for note in answer["left"].as_array().into_iter().flatten() {
                 out.line(format!("{}    {}", out.paint(Style::Bad, "left"), text(note)));
             }
+            let reported: Vec<&str> = answer["reported"].as_array().into_iter().flatten().map(text).collect();
+            if !reported.is_empty() {
+                out.line(format!("{}  {}", out.paint(Style::Dim, "reported"), reported.join(", ")));
+            }
             let phase = text(&answer["phase"]);
             out.line(format!("{name}: {}", out.paint(super::status::state_style(phase), phase)));
         }
-        Ok(if answer["left"].as_array().is_some_and(|l: &Vec<Json>| !l.is_empty()) { Exit::Broken } else { Exit::Done })
+        let left = answer["left"].as_array().is_some_and(|left: &Vec<Json>| !left.is_empty());
+        Ok(if left || answer["stage"] != "led" { Exit::Forced } else { Exit::Done })
     }
+}
+
+/// Tells now and then what the shutdown waits for, until it is done.
+fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
+    let tell = move || {
+        let (clock, mut told) = (Clock::real(), String::new());
+        let mut client = Client::connect(Some(&name)).ok()?;
+        loop {
+            clock.sleep(limits::SHUTDOWN_TOLD);
+            let status = client.call("status", &json!({}), ASK).ok()?;
+            let stopping: StoppingView = serde_json::from_value(status["stopping"].clone()).ok()?;
+            let what = match (stopping.held, stopping.waits_for.is_empty()) {
+                (true, _) => "a safe configuration holds what is left: `davit shutdown --force` lets go".to_owned(),
+                (false, true) => format!("{} in {}", stopping.stage.words(), place(&status)),
+                (false, false) => stopping.waits_for.join(", "),
+            };
+            if done.load(Ordering::Relaxed) {
+                return Some(());
+            }
+            if what != told {
+                out.line(format!("{}  {what}", out.paint(Style::Dim, "waits for")));
+                told = what;
+            }
+        }
+    };
+    // Without it the shutdown waits in silence.
+    let _ = std::thread::Builder::new().name("davit-waits".to_owned()).spawn(tell);
+}
+
+/// The innermost active state.
+fn place(status: &Json) -> &str {
+    status["coordinator"].as_array().and_then(|states| states.last()).map_or("no state", text)
 }

@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::output::{Output, Style, Table};
 use super::remote::{ASK, ask};
 use super::{Answer, Context, Run};
+use crate::session::StoppingView;
 use serde_json::{Value as Json, json};
 
 /// Show a running deployment: its phase, the coordinator's states, components, faults.
@@ -72,6 +73,14 @@ fn print(out: &Output, status: &Json) {
                 out.line(format!("coordinator  {name}: {}{slow}", out.paint(Style::Name, active)));
             }
         }
+    }
+    if let Ok(stopping) = serde_json::from_value::<StoppingView>(status["stopping"].clone()) {
+        let held = if stopping.held {
+            ": a safe configuration holds what is left, `davit shutdown --force` lets go"
+        } else {
+            ""
+        };
+        out.line(format!("stopping     {}{held}", stopping.stage.words()));
     }
     if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();

@@ -230,6 +230,7 @@ impl Engine {
     pub(super) fn complete(&mut self, number: u64) -> Running {
         loop {
             self.serve_safe();
+            self.heed_hurry();
             let did = self.advance_all();
             if let Some(at) = self.running.iter().position(|running| running.number == number && running.over) {
                 return self.running.remove(at);

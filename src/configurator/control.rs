@@ -2,7 +2,7 @@
 
 use super::request::{Reason, Request, Residual};
 use crate::model::{ComponentName, ConfigId, RequestId, Snapshot, Step};
-use crate::stack::Requester;
+use crate::stack::{FrameId, Requester};
 use crate::time::{Sender, Time};
 use serde::Serialize;
 use std::sync::Arc;
@@ -60,11 +60,25 @@ pub struct View {
     pub quarantined: Vec<ComponentName>,
 }
 
-/// How a teardown ended.
+/// What was in force when stopping began.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Began {
+    /// The number that the next frame got.
+    pub next: FrameId,
+    /// When.
+    pub at: Time,
+}
+
+/// What a stage of stopping came to.
 #[derive(Debug, Clone, Default)]
+#[allow(clippy::struct_excessive_bools)]
 pub struct TakenDown {
     /// Configurations whose frames were popped, in that order.
     pub popped: Vec<ConfigId>,
+    /// Those whose frames were to be popped and stay.
+    pub kept: Vec<ConfigId>,
+    /// No frame was popped, since this one has moved hardware since stopping began.
+    pub put_to_rest: Option<ConfigId>,
     /// Safe configurations that were applied first, in that order.
     pub safe: Vec<ConfigId>,
     /// Configurations that were applied then, for the system to come to rest.
@@ -83,9 +97,18 @@ pub struct TakenDown {
     pub observed: bool,
     /// Whether it was done before its deadline.
     pub in_time: bool,
+    /// A safe configuration is in force that was before stopping began.
+    pub held: bool,
+    /// A safe configuration is in force.
+    pub still: bool,
 }
 
 impl TakenDown {
+    /// Whether nothing had to be done.
+    pub fn is_idle(&self) -> bool {
+        self.popped.is_empty() && self.kept.is_empty() && self.forced.is_empty() && self.troubles.is_empty()
+    }
+
     /// Whether nothing is left.
     pub fn is_clean(&self) -> bool {
         self.left.is_empty() && self.quarantined.is_empty()
@@ -130,11 +153,18 @@ pub(super) enum Command {
         direction: Recovery,
         reply: Sender<Result<(), Arc<Residual>>>,
     },
-    TakeDown {
-        forced: bool,
+    /// Stopping begins: operators' requests are refused from now on.
+    Stopping,
+    TakeBack {
         deadline: Time,
         reply: Sender<TakenDown>,
     },
+    Force {
+        deadline: Time,
+        reply: Sender<TakenDown>,
+    },
+    /// Somebody wants force: looked for by what takes its time.
+    Hurry,
     /// A coordinator has come to its *down* state.
     Down(Requester),
     DiscardStack,
@@ -144,7 +174,7 @@ pub(super) enum Command {
 impl Command {
     /// Whether what is under way gives way to it.
     pub fn is_urgent(&self) -> bool {
-        matches!(self, Self::TakeDown { .. } | Self::Stop)
+        matches!(self, Self::TakeBack { .. } | Self::Force { .. } | Self::Stop)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{Busy, Command, View};
+use super::control::{Began, Busy, Command, View};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -90,6 +90,10 @@ pub(super) struct Engine {
     pub stopping: bool,
     /// Everything is being taken down.
     pub taking_down: bool,
+    /// When stopping began, and what was in force then.
+    pub began: Option<Began>,
+    /// What takes its time has been broken off, since force is wanted.
+    pub hurried: bool,
 }
 
 impl Engine {
@@ -119,6 +123,8 @@ impl Engine {
             snapshot: None,
             stopping: false,
             taking_down: false,
+            began: None,
+            hurried: false,
         }
     }
 
@@ -176,7 +182,7 @@ impl Engine {
             let (observed, idle) = self.observing.until();
             let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
             match self.inbox.recv_or_idle(until, idle) {
-                Ok(Mail::Request(request)) if self.is_idle() => self.comes_alone(request),
+                Ok(Mail::Request(request)) if self.is_idle() && self.began.is_none() => self.comes_alone(request),
                 received => self.received(received),
             }
         }
@@ -234,6 +240,8 @@ impl Engine {
                     Command::View { system, reply } => {
                         let _ = reply.try_send(self.view(system));
                     }
+                    Command::Stopping => self.stopping_begins(),
+                    Command::Hurry => {}
                     // Stands in its coordinator's queue like a request.
                     Command::Down(requester) => {
                         let ask = Ask::Undo;
@@ -248,6 +256,7 @@ impl Engine {
 
     /// A batch comes: what it overtakes, gives up or cancels is answered, the rest waits its turn.
     pub fn arrive(&mut self, batch: Batch) {
+        let Some(batch) = self.without_refused(batch) else { return };
         let configurations = self.given.configurations.clone();
         let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
         let arrival = self.desk.arrive(batch, safe, &self.given.claims);

@@ -179,21 +179,29 @@ impl ConfiguratorHandle {
         self.ask(deadline, |reply| Command::Recover { direction, reply })
     }
 
-    /// Pops every frame, newest first, and removes what could not be popped: what a failed bring-up does. What is under
-    /// way gives way. The answer comes out of the receiver.
-    pub fn unwind(&self, deadline: Time) -> Receiver<TakenDown> {
-        self.take_down(false, deadline)
+    /// Stopping begins: what is in force now is known apart from what comes since, and operators' requests are refused.
+    pub fn stopping(&self) {
+        self.inner.post.command(Command::Stopping);
     }
 
-    /// Applies the `safe` configurations, then removes everything: what a late or incomplete shutdown does.
-    pub fn force_down(&self, deadline: Time) -> Receiver<TakenDown> {
-        self.take_down(true, deadline)
-    }
-
-    fn take_down(&self, forced: bool, deadline: Time) -> Receiver<TakenDown> {
+    /// The second stage of stopping: what is under way is given up, and frames are popped, newest first, as far as that goes.
+    /// The answer comes out of the receiver.
+    pub fn take_back(&self, deadline: Time) -> Receiver<TakenDown> {
         let (reply, answer) = self.inner.clock.channel(1);
-        self.inner.post.command(Command::TakeDown { forced, deadline, reply });
+        self.inner.post.command(Command::TakeBack { deadline, reply });
         answer
+    }
+
+    /// The third stage: applies the `safe` configurations and what brings the system to rest, then removes everything.
+    pub fn force_down(&self, deadline: Time) -> Receiver<TakenDown> {
+        let (reply, answer) = self.inner.clock.channel(1);
+        self.inner.post.command(Command::Force { deadline, reply });
+        answer
+    }
+
+    /// The third stage is wanted: what takes its time breaks off.
+    pub fn hurry(&self) {
+        self.inner.post.hurry();
     }
 
     /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators

@@ -47,6 +47,8 @@ pub(super) struct Counts {
     pub safe: AtomicUsize,
     /// A [`Mail::Truths`] is on its way.
     pub truths: AtomicBool,
+    /// Somebody wants force.
+    pub hurried: AtomicBool,
     reports: AtomicUsize,
     commands: AtomicUsize,
     /// Reports did not fit: the platform must be looked at as a whole.
@@ -136,6 +138,12 @@ impl Post {
     pub fn command(&self, command: super::control::Command) -> bool {
         reserve(&self.counts.commands, 1, limits::CONFIGURATOR_COMMANDS)
             && self.sender.try_send(Mail::Command(command)).is_ok()
+    }
+
+    /// Says that force is wanted. That is known also when there is no room to wake whoever waits: then there is much to take in.
+    pub fn hurry(&self) {
+        self.counts.hurried.store(true, Ordering::Release);
+        self.command(super::control::Command::Hurry);
     }
 
     /// Puts a worker's reply in: there is room for every call that is out. When the configurator has ended, nobody

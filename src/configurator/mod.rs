@@ -13,7 +13,7 @@
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform; `hands`: an immediate step. [`conditions`], `stands`: what only the values of components tell, and what is
 //!   watched while it is in force. `safe`, `safety`: what goes first. `fast`, `switches`: plans that are carried out again.
-//!   `teardown`: to nothing. `recovery`: the way out of what is broken. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
+//!   `taking_back`, `teardown`: the second and the third stage of stopping, to nothing. `recovery`: the way out of what is broken. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
 //!   wait to be confirmed. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
@@ -41,6 +41,7 @@ mod safety;
 mod stands;
 mod suspects;
 mod switches;
+mod taking_back;
 mod teardown;
 
 pub use crate::stack::answer::WAY_OUT;

@@ -1,4 +1,4 @@
-//! Taking everything down.
+//! The third stage of stopping: by force, to nothing (design §6).
 
 use super::control::{Command, TakenDown};
 use super::engine::{Engine, Force};
@@ -7,10 +7,10 @@ use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlannedStep, Stage};
-use crate::stack::{Broken, Effort, Op, Part, Planned, Requester, Residual, Why, effort, transaction};
+use crate::stack::{Broken, Effort, Part, Planned, Requester, Residual, Why, effort};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
-use crate::transaction::{Input, PartEnd, Spec, Transaction};
+use crate::transaction::{Input, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,11 +29,15 @@ impl Engine {
                 let outcome = self.recover(direction);
                 let _ = reply.try_send(outcome);
             }
-            Command::TakeDown { forced, deadline, reply } => {
-                let down = self.take_down(forced, deadline);
+            Command::TakeBack { deadline, reply } => {
+                let down = self.take_all_back(deadline);
                 let _ = reply.try_send(down);
             }
-            Command::Down(_) => {}
+            Command::Force { deadline, reply } => {
+                let down = self.force(deadline);
+                let _ = reply.try_send(down);
+            }
+            Command::Down(_) | Command::Stopping | Command::Hurry => {}
             Command::DiscardStack => {
                 self.world.stack.discard();
                 self.confirmations.clear();
@@ -43,30 +47,31 @@ impl Engine {
         }
     }
 
-    fn take_down(&mut self, forced: bool, deadline: Time) -> TakenDown {
+    /// The third stage: no claim, residual or quarantine is in its way.
+    fn force(&mut self, deadline: Time) -> TakenDown {
         let mut down = TakenDown::default();
         self.taking_down = true;
+        // What was to give way to this does so now.
+        self.hurried = true;
         self.glance();
         self.confirmations.clear();
         self.forget_standings();
-        if forced {
-            // Not after what is out has come in: now.
-            self.break_off();
-            let Force { safe, rest } = self.given.force.clone();
-            // What a safe configuration holds still is not moved any more.
-            let held = self.world.stack.frames().iter().any(|frame| frame.safe);
-            self.apply_all(&safe, true, &mut down);
-            if !held {
-                self.apply_all(&rest, false, &mut down);
-                down.rest = rest;
-            }
-            down.safe = safe;
+        // Not after what is out has come in: now.
+        self.break_off();
+        let Force { safe, rest } = self.given.force.clone();
+        // What a safe configuration held still before stopping began is not moved any more.
+        let held = match self.began {
+            Some(_) => self.is_held(),
+            None => self.world.stack.safe().next().is_some(),
+        };
+        self.apply_all(&safe, true, &mut down);
+        if !held {
+            self.apply_all(&rest, false, &mut down);
+            down.rest = rest;
         }
-        self.end_running(forced);
+        down.safe = safe;
+        self.end_running();
         self.refuse_waiting();
-        if !forced && self.world.broken.is_empty() {
-            self.pop_all(&mut down, deadline);
-        }
         self.remove_all(&mut down, deadline);
         self.world.stack.discard();
         self.world.broken.clear();
@@ -96,51 +101,18 @@ impl Engine {
         down
     }
 
-    /// Everything that still waits is answered: nothing of it will be done.
-    fn refuse_waiting(&mut self) {
-        self.glance();
-        let safe: Vec<Request> = self.safety.waiting.drain(..).collect();
-        let waiting = self.desk.cancel_waiting(|_| true);
-        for request in waiting.into_iter().chain(safe) {
-            if request.why == Why::Asked {
-                self.owe(request);
-                self.answer(request, request.ask.failed(), Some(Reason::TakenDown));
-            }
-        }
-    }
-
     /// What is under way is broken off: calls that are out are told so.
-    fn break_off(&mut self) {
+    pub(super) fn break_off(&mut self) {
         for at in 0..self.running.len() {
-            if !self.running[at].is_safe() {
+            if !self.running[at].is_safe() && !self.running[at].over {
                 self.running[at].machine.on(Input::TakenDown, &mut self.world.system);
                 self.advance(at);
             }
         }
     }
 
-    /// Waits until nothing is under way any more; given up, what was done is taken back.
-    fn end_running(&mut self, forced: bool) {
-        if !forced {
-            for running in &mut self.running {
-                running.machine.on(Input::Stop, &mut self.world.system);
-            }
-        }
-        loop {
-            let did = self.advance_all();
-            // Nothing of a batch goes on with what had not begun.
-            self.refuse_rest();
-            if self.running.is_empty() {
-                return;
-            }
-            if !did {
-                self.pump(self.running_until());
-            }
-        }
-    }
-
     /// Requests of batches under way that have not begun are answered.
-    fn refuse_rest(&mut self) {
+    pub(super) fn refuse_rest(&mut self) {
         let begun: Vec<u32> = self
             .running
             .iter()
@@ -171,7 +143,18 @@ impl Engine {
             let at = self.given.clock.now();
             let Effort { planned, troubles, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
-            let machine = Transaction::new(planned, self.effort(Time::NEVER));
+            // A safe configuration that somebody asked for keeps everything still.
+            if !safe
+                && self.world.stack.safe().next().is_some()
+                && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
+            {
+                down.partly.push(*id);
+                down.troubles.push(Reason::Moves(moving.step.clone()));
+                continue;
+            }
+            // What brings it to rest may take the time that it gives itself.
+            let patience = configuration.timeout.unwrap_or_default().max(self.given.limits.step_timeout);
+            let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
             let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
             let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
             if !troubles.is_empty() {
@@ -251,44 +234,8 @@ impl Engine {
         let done = self.carry_out(machine);
         down.forced.extend(done.done_so_far().map(|(planned, _)| planned.step.clone()));
         down.troubles.extend(troubles_of(done));
-        match self.look() {
-            Some(seen) => {
-                down.observed = true;
-                let _ = self.adopt(&seen);
-                down.left = seen;
-            }
-            None => {
-                down.observed = false;
-                down.left = self.world.system.snapshot();
-            }
-        }
-        self.note_quarantine();
+        self.see_left(down);
         down.quarantined.clone_from(&self.world.quarantined);
-    }
-
-    /// Pops frame after frame, newest first, as long as that goes.
-    fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
-        while self.given.clock.now() < deadline {
-            let Some(top) = self.world.stack.top().cloned() else { return };
-            let planned =
-                match transaction(&self.world.system, &self.world.stack, &[Op::Undo(top.id)], &self.given.context) {
-                    Ok(planned) => planned,
-                    Err(refusal) => return down.troubles.push(Reason::Refused(refusal.findings)),
-                };
-            let edits = planned.parts[0].edits.clone();
-            let spec = Spec { asked_back: true, ..self.spec(&planned, true) };
-            let end = self.carry_out(Transaction::new(planned, spec)).end();
-            match end.parts.into_iter().next() {
-                Some(PartEnd::Done) | None => {
-                    self.world.stack.apply([&edits], &[]);
-                    self.changed();
-                    down.popped.push(top.configuration);
-                }
-                Some(PartEnd::Failed(reason)) => return down.troubles.push(reason),
-                Some(PartEnd::Broken(part)) => return down.troubles.push(Reason::Broken(part.residual)),
-                Some(PartEnd::Cancelled | PartEnd::Anew) => return,
-            }
-        }
     }
 }
 

@@ -181,16 +181,16 @@ codes! {
          could go on.";
     DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down",
         "From the state that means up, the coordinator was driven with the shutdown event and every request answered \
-         `ok`, and did not reach `shutdown.down`. The shutdown would have to be forced. Look at the trace for the place \
+         `ok`, and did not reach `shutdown.down`. It would have to be stopped without its coordinator. Look at the trace for the place \
          where it stops.";
     DEPLOY_LEFTOVERS = "deploy::leftovers", "the shutdown leaves components behind",
         "The coordinator reaches the state that means down, but components that the bring-up created are still there. \
-         Shutdown would have to be forced, without the order that the coordinator knows. Let the coordinator undo what it \
+         They would be taken away without the order that the coordinator knows (exit status 4). Let the coordinator undo what it \
          applied, or apply a configuration that destroys what is left; the finding names it.";
     DEPLOY_UNKNOWN_CONFIGURATION = "deploy::unknown_configuration", "the deployment names a configuration that there is not",
         "`operator` lists what an operator may do while the deployment is up: configurations by their names, properties and \
          in-ports as `Component.member`. `shutdown.rest` lists the configurations that bring the system to rest when it is \
-         taken down by force. A name that no configuration has would be missed when it is needed. Correct it, or remove it.";
+         taken down by force (the third stage of stopping, docs/operating.md). A name that no configuration has would be missed when it is needed. Correct it, or remove it.";
     DEPLOY_NO_JOURNAL = "deploy::no_journal", "there is no journal whose durability could be set",
         "`durability` is to say how safely a journal is kept, and no journal is written yet: whatever the key said, a crash \
          would lose the same. A promise that is not kept is worse than none, so the key is refused. Leave it out.";
@@ -514,18 +514,18 @@ codes! {
          state around all in which the configuration may wait for its confirmation, or wait for the event before going on.";
     COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
         "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
-         neither from inside nor from outside. Only a forced shutdown gets the system out. Where the state waits for answers, \
+         neither from inside nor from outside. Only a stop without its coordinator gets the system out. Where the state waits for answers, \
          they belong to requests that were not made on this way: ask on the entry of the state, so that it is asked for on \
          every way there. Else add a transition, at least on the shutdown event.";
     COORD_NO_WAY_DOWN = "coord::no_way_down", "the state that means down cannot be reached from here",
         "`check` followed every order of events from the state shown, and none leads to `shutdown.down`, even if every \
-         request succeeds from there on. A shutdown would have to be forced. Add the transitions that lead down from there. The event that begins the shutdown \
+         request succeeds from there on. It would have to be stopped without its coordinator (exit status 4). Add the transitions that lead down from there. The event that begins the shutdown \
          is raised once: where nobody hears it in some state, or where a state on the way down waits for it again, what is \
          there is taken down without the coordinator. Hear it in a state around all of those, or let an answer or a time lead \
          on.";
     COORD_LEFTOVERS = "coord::leftovers", "a way down leaves components behind",
-        "On the way shown the coordinator reaches the state that means down with components still there. The shutdown \
-         would be forced, without the order that the coordinator knows. Let every way down undo or destroy what was \
+        "On the way shown the coordinator reaches the state that means down with components still there. They \
+         would be taken away without the order that the coordinator knows. Let every way down undo or destroy what was \
          applied on the way up.";
     COORD_SHARED = "coord::shared", "two coordinators touch the same component",
         "The configurations of one coordinator touch a component that those of another touch. At run time one of them may be \

@@ -3,6 +3,7 @@
 //!
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
+use super::halt::Halt;
 use super::lanes::Lanes;
 use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
 use super::names::Unlisted;
@@ -37,6 +38,7 @@ pub struct Hub {
     emits: FxHashSet<EventName>,
     /// Names from outside that only functions may hear.
     pub(super) unlisted: Unlisted,
+    halt: Halt,
 }
 
 struct State {
@@ -118,7 +120,24 @@ impl Hub {
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
             unlisted: Unlisted::default(),
+            halt: Halt::default(),
         }
+    }
+
+    /// With the events that make it safe, and what is applied then, when no coordinator hears them any more.
+    #[must_use]
+    pub fn with_safety(self, events: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
+        Self { halt: Halt::new(events, safe), ..self }
+    }
+
+    /// How far stopping is.
+    pub(super) fn halt(&self) -> &Halt {
+        &self.halt
+    }
+
+    /// Whether stopping has begun.
+    pub fn is_stopping(&self) -> bool {
+        self.halt.has_begun()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

@@ -1,6 +1,7 @@
-//! The life of a deployment: brought up, served, taken down (design §6, "Bringing up and taking down").
+//! The life of a deployment: brought up, served, down (design §6). How it is stopped: [`stopping`](super::stopping).
 
-use super::log::{Happening, Phase};
+use super::log::Phase;
+use super::stages::Stage;
 use super::{Command, Session};
 use crate::model::Snapshot;
 use crate::time::Time;
@@ -11,10 +12,14 @@ use serde::Serialize;
 pub struct Ended {
     /// `down`, or `broken` when something is left.
     pub phase: Phase,
-    /// What had to be forced, one line each.
+    /// The last stage that it took.
+    pub stage: Stage,
+    /// What went otherwise than in order: taken back without the coordinator, forced, one line each.
     pub forced: Vec<String>,
     /// What is left, one line each.
     pub left: Vec<String>,
+    /// Events that components raised while it was being stopped, each once.
+    pub reported: Vec<String>,
 }
 
 impl Ended {
@@ -22,9 +27,14 @@ impl Ended {
     pub fn is_clean(&self) -> bool {
         self.left.is_empty()
     }
+
+    /// Whether the coordinator has led down, and nothing is left.
+    pub fn is_orderly(&self) -> bool {
+        self.is_clean() && self.stage == Stage::Led
+    }
 }
 
-/// Why a deployment did not come up; what was done of it is undone, as far as `ended` says.
+/// Why a deployment did not come up; it was stopped, as `ended` says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotUp {
     /// One sentence.
@@ -43,7 +53,7 @@ impl Session {
     ///
     /// # Errors
     /// [`NotUp`] when a state listed under `deploy.failed` became active, when it took too long, or when a command to
-    /// shut down came; then everything has been rolled back.
+    /// shut down came; then it has been stopped.
     pub fn bring_up(&self) -> Result<(), NotUp> {
         let hub = self.hub();
         let bring_up = &self.deployment().deploy;
@@ -51,8 +61,10 @@ impl Session {
         let began = hub.heard();
         hub.set_phase(Phase::Deploying);
         self.raise(bring_up.event, "deployment");
+        let mut force = false;
         let why = loop {
-            if let Some(Command::Shutdown { .. }) = self.pending_command() {
+            if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
+                force = by_force;
                 break (format!("interrupted while deploying `{}`", self.deployment().name), true);
             }
             if let Some(state) = self.failed_state() {
@@ -82,7 +94,7 @@ impl Session {
             hub.changed.wait(self.next_look(deadline));
         };
         let reasons = self.failures_since(began);
-        let ended = self.roll_back();
+        let ended = self.stop(force, true);
         Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })
     }
 
@@ -98,66 +110,7 @@ impl Session {
         }
     }
 
-    /// Takes the deployment down: through its coordinator, and by force if that takes too long, leaves something, or if
-    /// `force` is asked for. Discards the stack.
-    pub fn take_down(&self, force: bool) -> Ended {
-        let hub = self.hub();
-        let take_down = &self.deployment().shutdown;
-        let goal = self.deployment().down_states();
-        hub.set_phase(Phase::ShuttingDown);
-        let mut why = None;
-        if force {
-            why = Some("as asked for".to_owned());
-        } else {
-            let deadline = self.clock().now() + take_down.within;
-            self.raise(take_down.event, "deployment");
-            loop {
-                if self.is_down() {
-                    break;
-                }
-                // Asked for again, this time by force: no use in waiting.
-                if let Some(Command::Shutdown { force: true }) = self.pending_command() {
-                    why = Some("as asked for".to_owned());
-                    break;
-                }
-                if self.clock().now() >= deadline {
-                    why = Some(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
-                    break;
-                }
-                self.tell_slow();
-                hub.changed.wait(self.next_look(deadline));
-            }
-        }
-        if why.is_none() && !self.is_empty() {
-            why = Some(format!("`{goal}` was reached with components left"));
-        }
-        let ended = match why {
-            None => self.finish(Vec::new()),
-            Some(why) => {
-                let note = format!("shutdown was forced: {why}");
-                hub.note(Happening::Forced { note: note.clone() });
-                self.detach_coordinator();
-                let mut forced = vec![note];
-                forced.extend(self.force_down());
-                self.finish(forced)
-            }
-        };
-        self.set_ended(&ended);
-        ended
-    }
-
-    /// A bring-up that failed: the coordinator is detached, so that there are never two commanders; every frame is
-    /// popped, and what could not be popped is removed.
-    fn roll_back(&self) -> Ended {
-        self.hub().set_phase(Phase::ShuttingDown);
-        self.detach_coordinator();
-        let forced = self.unwind();
-        let ended = self.finish(forced);
-        self.set_ended(&ended);
-        ended
-    }
-
-    fn finish(&self, forced: Vec<String>) -> Ended {
+    pub(super) fn finish(&self, stage: Stage, forced: Vec<String>) -> Ended {
         self.detach_coordinator();
         let left = self.left_over();
         // With something left the configurator stays, as long as the session: when a call returns late, it cleans up.
@@ -166,7 +119,7 @@ impl Session {
         }
         let phase = if left.is_empty() { Phase::Down } else { Phase::Broken };
         self.hub().set_phase(phase);
-        Ended { phase, forced, left }
+        Ended { phase, stage, forced, left, reported: self.hub().halt().reported() }
     }
 }
 

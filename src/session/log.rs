@@ -1,7 +1,9 @@
 //! What happened, in memory: a bounded number of entries, oldest dropped first.
 
+use super::halt::StoppingView;
 use super::lanes::Lanes;
 use super::recovery::Difference;
+use super::stages::Stage;
 use crate::configurator::{StepEnd, StepName};
 use crate::coordinator::Dropped;
 use crate::limits;
@@ -88,6 +90,14 @@ pub enum Happening {
     Recovered {
         /// The steps that nobody's request stands for and that were carried out since the last time.
         steps: Vec<StepTime>,
+    },
+    /// A stage of stopping begins.
+    Stopping {
+        /// Which.
+        stage: Stage,
+        /// Why it comes to this one; none: it is the first, as it should be.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        why: Option<String>,
     },
     /// Something had to be forced, or was left over.
     Forced {
@@ -279,6 +289,9 @@ pub struct StatusView {
     pub faults: Vec<Fault>,
     /// Requests that are not answered yet.
     pub outstanding: Vec<String>,
+    /// What stopping is at, once it has begun.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stopping: Option<StoppingView>,
     /// Events that found a coordinator's inbox, or its own queue, full, since the session began.
     pub dropped: Dropped,
     /// For how many seconds coordinators have been in one function, by name; those that have been for longer than

@@ -7,6 +7,7 @@
 pub mod client;
 mod connection;
 mod doors;
+mod halt;
 pub mod hub;
 mod lanes;
 mod life;
@@ -21,17 +22,21 @@ pub mod rpc;
 pub mod service;
 pub mod serving;
 pub mod socket;
+mod stages;
 mod stands;
 mod steps;
+mod stopping;
 mod subscribers;
 pub mod tap;
 mod wiring;
 
+pub use halt::StoppingView;
 pub use hub::{Hub, Observer};
 pub use life::{Ended, NotUp};
 pub use log::{Happening, Phase, StatusView};
 pub use names::NotNamed;
 pub use recovery::{Difference, NO_FORWARD, Recovered, recovery};
+pub use stages::Stage;
 pub use wiring::{Session, Setup};
 
 /// What may be asked of whoever drives a session.

@@ -1,8 +1,8 @@
 //! Names that somebody outside gives a running deployment: those that cannot be right, and those that are kept for ever.
 
 use super::Session;
-use crate::model::finding::did_you_mean;
 use crate::limits::{EVENTS_UNLISTED, UNLISTED_BYTES};
+use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
 use crate::model::{EventName, Verdict};
 use crate::time::lock;
@@ -22,7 +22,9 @@ pub enum NotNamed {
     #[error("no transition lists this event, and its name is longer than {UNLISTED_BYTES} bytes")]
     Long,
     /// No transition lists it, and so many such names are kept already.
-    #[error("no transition lists `{0}`, and {EVENTS_UNLISTED} other such names were given: each is kept for ever, so there are no more")]
+    #[error(
+        "no transition lists `{0}`, and {EVENTS_UNLISTED} other such names were given: each is kept for ever, so there are no more"
+    )]
     Many(String),
 }
 

@@ -15,9 +15,7 @@ pub const LONGEST: usize = 107;
 pub fn directory() -> PathBuf {
     match std::env::var_os("XDG_RUNTIME_DIR").filter(|d| !d.is_empty()) {
         Some(runtime) => PathBuf::from(runtime).join("davit"),
-        None => {
-            std::env::temp_dir().join(format!("davit-{}", user()))
-        }
+        None => std::env::temp_dir().join(format!("davit-{}", user())),
     }
 }
 

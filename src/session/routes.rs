@@ -261,7 +261,7 @@ fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, c
 /// What the platform reports becomes an event; a fault is told as `COMPONENT.faulted`.
 pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent) {
     let configurator = lock(&junction.configurator).clone();
-    if let Some(configurator) = configurator {
+    if let Some(configurator) = &configurator {
         configurator.platform_event(event);
     }
     let (event, from) = match event {
@@ -278,7 +278,21 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         }
     };
     hub.report(Happening::Event { event: event.to_string(), from });
+    hub.halt().report(event);
+    if let Some(configurator) = &configurator {
+        make_safe(hub, configurator, event);
+    }
     for coordinator in junction.all() {
         hub.taken(coordinator.deliver(junction.incoming(Class::Report, event)));
+    }
+}
+
+/// A safety event that no coordinator hears any more acts by itself: everything safe is applied.
+pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName) {
+    for id in hub.halt().heed(event, hub.now()) {
+        let ask = Ask::Apply(*id);
+        let request = Request::new(hub.request(ask, "a safety event"), ask, Requester::Operator);
+        // A full queue has answered it already.
+        let _ = configurator.submit(Batch::one(request));
     }
 }

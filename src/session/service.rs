@@ -106,6 +106,7 @@ impl Service for SessionService {
     fn call_while(&self, line: u32, method: &str, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
         known(method, params)?;
         let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
+        refused_while_stopping(&session, method, params)?;
         match method {
             "status" => Ok(view(&session.status())),
             "stack" => Ok(view(&session.status().stack)),
@@ -146,6 +147,30 @@ impl Service for SessionService {
             _ => Err(RpcError::new(METHOD_NOT_FOUND, format!("`{method}` is the socket's own"))),
         }
     }
+}
+
+/// From the first moment of stopping on nothing changes any more what its stages do: but safety events, the shutdown event
+/// and `recover` stay open to the end.
+fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Result<(), RpcError> {
+    let what = match method {
+        _ if !session.hub().is_stopping() => return Ok(()),
+        "apply" | "undo" | "commit" => format!("`{method}`"),
+        "event" => match params.get("event").and_then(Json::as_str) {
+            Some(event) if session.stays_open(event) => return Ok(()),
+            Some(event) => format!("`{event}`"),
+            None => return Ok(()),
+        },
+        _ => return Ok(()),
+    };
+    let deployment = session.deployment();
+    Err(RpcError {
+        code: GOING_DOWN,
+        message: format!("`{}` is being stopped: {what} is refused", deployment.name),
+        data: json!({ "help": format!(
+            "safety events, `{}` and `recover` stay open; `davit status` shows what it waits for",
+            deployment.shutdown.event
+        ) }),
+    })
 }
 
 fn configuration(session: &Session, name: &str) -> Result<ConfigId, RpcError> {

@@ -6,22 +6,21 @@ use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
 use super::recovery::Difference;
-use super::routes::{Junction, on_answer, on_platform, on_progress};
+use super::routes::{Junction, make_safe, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use super::steps::Steps;
 use crate::configurator::{
-    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, TakenDown,
-    View,
+    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, View,
 };
 use crate::coordinator::{Class, Dropped, Refused};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::{Clock, Time, lock};
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// What a session is made of.
@@ -54,6 +53,8 @@ pub struct Session {
     junction: Arc<Junction>,
     evaluator: Option<Arc<Evaluator>>,
     commands: Mutex<Vec<Command>>,
+    /// Somebody is there who may ask for force.
+    pub(super) attended: AtomicBool,
     ended: Mutex<Option<Ended>>,
 }
 
@@ -62,7 +63,9 @@ impl Session {
     pub fn start(setup: Setup) -> Arc<Self> {
         let Setup { deployment, charts, functions, catalogue, platform, clock } = setup;
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
-        let hub = Arc::new(Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits));
+        let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
+        let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
+        let hub = Arc::new(hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe));
         let junction = Arc::new(Junction::new(&deployment));
         let steps = Arc::new(Steps::default());
         let evaluator =
@@ -104,6 +107,7 @@ impl Session {
             junction,
             evaluator,
             commands: Mutex::new(Vec::new()),
+            attended: AtomicBool::new(true),
             ended: Mutex::new(None),
         })
     }
@@ -207,6 +211,7 @@ impl Session {
         }
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator.event(event);
+        make_safe(&self.hub, &self.configurator, event);
         (held.len()..self.parts.len()).for_each(|_| self.hub.taken_up(ticket, false));
         let mut unwatched = false;
         for part in held {
@@ -251,10 +256,42 @@ impl Session {
         found.peek().is_some() && found.all(|(part, ids)| ids.iter().any(|id| part.coordinator.is_active(*id)))
     }
 
-    /// Leaves a command for whoever drives the session.
+    /// Leaves a command for whoever drives the session. Where it is being stopped already, to shut down raises the event
+    /// again, and force is the next stage.
     pub fn command(&self, command: Command) {
-        lock(&self.commands).push(command);
+        let Command::Shutdown { force } = command;
+        if self.hub.is_stopping() && !force {
+            if self.hub.halt().is_led() {
+                self.raise(self.deployment.shutdown.event, "operator");
+            }
+            return;
+        }
+        {
+            let mut commands = lock(&self.commands);
+            if !commands.contains(&command) {
+                commands.push(command);
+            }
+        }
+        if force {
+            self.configurator.hurry();
+        }
         self.hub.changed.notify();
+    }
+
+    pub(super) fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// The frames in force, oldest first.
+    pub(super) fn frames(&self) -> Vec<crate::configurator::FrameView> {
+        self.view(false).map(|view| view.stack.clone()).unwrap_or_default()
+    }
+
+    /// Whether nothing is asked for, and no coordinator has anything to react to.
+    pub(super) fn is_still(&self) -> bool {
+        let before = self.hub.epoch();
+        let settled = || self.parts.iter().all(|part| part.coordinator.is_settled());
+        self.hub.all_answered() && settled() && self.hub.epoch() == before
     }
 
     pub(super) fn pending_command(&self) -> Option<Command> {
@@ -301,6 +338,7 @@ impl Session {
             residual,
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
+            stopping: self.hub.halt().view(self.hub.outstanding()),
             slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
@@ -393,31 +431,6 @@ impl Session {
         self.parts.iter().for_each(|part| part.coordinator.detach());
     }
 
-    /// Pops everything; answers what had to be forced, one line each.
-    pub(super) fn unwind(&self) -> Vec<String> {
-        let deadline = self.clock.now() + self.deployment.shutdown.within;
-        self.taken_down(self.configurator.unwind(deadline).recv_deadline(deadline + limits::VIEW).ok())
-    }
-
-    pub(super) fn force_down(&self) -> Vec<String> {
-        let deadline = self.clock.now() + self.deployment.shutdown.within;
-        self.taken_down(self.configurator.force_down(deadline).recv_deadline(deadline + limits::VIEW).ok())
-    }
-
-    fn taken_down(&self, taken: Option<TakenDown>) -> Vec<String> {
-        let Some(taken) = taken else { return vec!["the configurator did not answer".to_owned()] };
-        let applied = taken.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
-        let applied = applied.chain(taken.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
-        let done = |id: &ConfigId| if taken.partly.contains(id) { "applied as far as it went" } else { "applied" };
-        let mut notes: Vec<String> = applied.map(|(what, id)| format!("{what} {}", done(id))).collect();
-        notes.extend(forced(&taken.forced));
-        notes.extend(taken.troubles.iter().map(ToString::to_string));
-        for note in &notes {
-            self.hub.note(Happening::Forced { note: note.clone() });
-        }
-        notes
-    }
-
     /// What is left, as the platform sees it; as the configurator knows it where the platform does not answer.
     pub(super) fn left_over(&self) -> Vec<String> {
         let deadline = self.clock.now() + limits::VIEW;
@@ -473,21 +486,6 @@ impl FrameView {
             unseen: frame.unseen,
         }
     }
-}
-
-/// Steps that had to be forced: each, or how many of each kind where there are too many to read.
-fn forced(steps: &[Step]) -> Vec<String> {
-    if steps.len() <= limits::FORCED_SHOWN {
-        return steps.iter().map(ToString::to_string).collect();
-    }
-    let mut counts: Vec<(&str, usize)> = Vec::new();
-    for step in steps {
-        match counts.iter_mut().find(|(verb, _)| *verb == step.verb()) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((step.verb(), 1)),
-        }
-    }
-    counts.into_iter().map(|(verb, count)| format!("{count} × {verb}")).collect()
 }
 
 /// For those who hold a session only to look at it.

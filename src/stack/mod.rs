@@ -36,7 +36,7 @@ pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
-pub use share::{HandOver, is_kept, shares};
+pub use share::{HandOver, components, is_kept, shares};
 pub use work::{Op, Part, Planned, places, transaction};
 pub use world::{Broken, Seen, World};
 

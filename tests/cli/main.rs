@@ -26,6 +26,7 @@ mod resting;
 mod several;
 mod simulated;
 mod stalled;
+mod stopping;
 mod together;
 mod unasked;
 mod unheard;

@@ -114,6 +114,6 @@ fn who_goes_round_for_ever_does_not_stop_simulated_time() {
     demo.replace("deployment.yaml", "up: operational, failed: [failed], within_s: 5", "up: on, within_s: 0.2");
     demo.write("script.lua", "deploy('deployment.yaml')");
     let ran = demo.run(&["run", "script.lua", "--clock", "simulated"]);
-    assert_eq!(ran.code, 1, "{}", ran.err);
+    assert_eq!(ran.code, 4, "nor does it come down by itself: {}", ran.err);
     assert!(ran.err.contains("not up after 0.2 s"), "{}", ran.err);
 }

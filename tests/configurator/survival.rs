@@ -226,7 +226,7 @@ fn a_fault_is_in_the_picture() {
     assert_eq!(rig.ask("undo"), ["undo.done"]);
     assert_eq!(rig.see().components[&name("B")].state, RunState::Stopped);
     let deadline = rig.clock.now() + Duration::from_secs(30);
-    let told = rig.handle.unwind(deadline).recv_deadline(deadline).expect("it is told how it ended");
+    let told = rig.handle.take_back(deadline).recv_deadline(deadline).expect("it is told how it ended");
     assert!(told.is_clean() && told.forced.is_empty(), "{told:?}");
     rig.each_answered_once();
 }
@@ -318,7 +318,7 @@ fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
     // When the second frame is popped.
     arm.store(true, Ordering::SeqCst);
     let deadline = rig.clock.now() + Duration::from_secs(30);
-    let told = rig.handle.unwind(deadline).recv_deadline(deadline);
+    let told = rig.handle.take_back(deadline).recv_deadline(deadline);
     assert!(told.is_err(), "nobody is left to tell it: {told:?}");
     assert_eq!(rig.ask("fresh"), ["fresh.ok"]);
     assert!(rig.see().components.contains_key(&name("D")));

@@ -1,6 +1,6 @@
 //! The story of a deployment in simulated time, on both platforms.
 
-use davit::app::script::{self, Options};
+use davit::app::script::{self, Interrupt, Options};
 use davit::app::{self, Checked};
 use davit::lang::LoadOptions;
 use davit::libraries;
@@ -122,6 +122,7 @@ fn runs(story: &str) {
             load: LoadOptions::default(),
             platform: None,
             observer: None,
+            interrupt: Interrupt::default(),
             say: Box::new(move |text| heard.lock().unwrap().push(text.to_owned())),
         },
     );
@@ -146,6 +147,7 @@ fn run_text(text: &str) -> (Option<String>, Option<bool>) {
             load: LoadOptions::default(),
             platform: None,
             observer: None,
+            interrupt: Interrupt::default(),
             say: Box::new(|_| {}),
         },
     );

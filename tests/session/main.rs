@@ -10,4 +10,5 @@ mod life;
 mod settled;
 mod socket;
 mod stands;
+mod stopping;
 mod tap;

@@ -337,7 +337,9 @@ fn what_costs_more_than_its_length_is_bounded() {
     for document in [
         a(&many(200_000, &|n| format!("x{n}=\"1\""))),
         a(&many(davit::limits::XML_ATTRIBUTES, &|n| format!("y{n}=\"a = b\""))),
-        document(&(0..davit::limits::XML_NAMESPACES).map(|n| format!("<log xmlns:n{n}=\"u{n}\"/>")).collect::<String>()),
+        document(
+            &(0..davit::limits::XML_NAMESPACES).map(|n| format!("<log xmlns:n{n}=\"u{n}\"/>")).collect::<String>(),
+        ),
     ] {
         let told = findings(&document);
         assert!(matches!(&told[..], [one] if one.starts_with("text::too_many_values")), "{told:?}");

@@ -9,6 +9,7 @@ mod golden;
 mod live;
 mod motion;
 mod robot;
+mod stops;
 mod two;
 
 #[global_allocator]

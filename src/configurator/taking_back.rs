@@ -1,0 +1,239 @@
+//! The second stage of stopping: nobody leads any more, and what is in force is taken back (design §6).
+//!
+//! What is under way is given up as by a rollback that nobody asked for. Frames are popped, newest first, compensations
+//! included: but those that came since stopping began, those of safe configurations, and what these block. What was put to
+//! rest since is not raised again: where one of them moved hardware nothing is popped at all.
+
+use super::control::{Began, TakenDown};
+use super::engine::Engine;
+use super::repair::By;
+use super::request::{Reason, Request};
+use crate::model::{Ask, ConfigId, RequestId};
+use crate::stack::{Batch, Frame, FrameId, Inverse, Op, Planned, Requester, Why, transaction};
+use crate::system::step;
+use crate::time::Time;
+use crate::transaction::{Input, PartEnd, Transaction};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+impl Engine {
+    /// From now on operators are refused, also those that wait.
+    pub(super) fn stopping_begins(&mut self) {
+        if self.began.is_some() {
+            return;
+        }
+        self.began = Some(Began { next: self.world.stack.next(), at: self.given.clock.now() });
+        let operators = |request: &Request| request.why == Why::Asked && request.requester == Requester::Operator;
+        for request in self.desk.cancel_waiting(operators) {
+            self.refuse(request);
+        }
+        self.changed();
+    }
+
+    /// A batch without what is refused since everything is being stopped; none: nothing of it is left. What is safe is
+    /// never refused.
+    pub(super) fn without_refused(&mut self, mut batch: Batch) -> Option<Batch> {
+        if self.began.is_some() {
+            let safe = |id: ConfigId| self.given.configurations.get(&id).is_some_and(|c| c.safe);
+            let refused = |request: &Request| {
+                let safe = matches!(request.ask, Ask::Apply(id) if safe(id));
+                request.why == Why::Asked && request.requester == Requester::Operator && !safe
+            };
+            let out: Vec<Request> = batch.requests.iter().copied().filter(refused).collect();
+            batch.requests.retain(|request| !out.contains(request));
+            out.into_iter().for_each(|request| self.refuse(request));
+        }
+        (!batch.requests.is_empty()).then_some(batch)
+    }
+
+    fn refuse(&mut self, request: Request) {
+        self.owe(request);
+        self.answer(request, request.ask.failed(), Some(Reason::TakenDown));
+    }
+
+    /// The second stage.
+    pub(super) fn take_all_back(&mut self, deadline: Time) -> TakenDown {
+        let mut down = TakenDown::default();
+        self.taking_down = true;
+        self.glance();
+        self.confirmations.clear();
+        self.forget_standings();
+        for running in self.running.iter_mut().filter(|running| !running.is_safe()) {
+            running.machine.on(Input::Stop, &mut self.world.system);
+        }
+        self.end_running();
+        self.refuse_waiting();
+        match self.put_to_rest() {
+            None => self.pop_all(&mut down, deadline),
+            Some(by) => {
+                let frames = self.world.stack.frames().iter().filter(|frame| !frame.safe);
+                down.kept = frames.map(|frame| frame.configuration).collect();
+                down.put_to_rest = Some(by);
+            }
+        }
+        self.see_left(&mut down);
+        down.quarantined.clone_from(&self.world.quarantined);
+        down.held = self.is_held();
+        down.still = self.world.stack.safe().next().is_some();
+        down.in_time = self.given.clock.now() <= deadline;
+        self.taking_down = false;
+        self.changed();
+        down
+    }
+
+    /// Whether a safe configuration was in force before stopping began, and nobody let it go.
+    pub(super) fn is_held(&self) -> bool {
+        let before = |frame: &Arc<Frame>| frame.safe && !self.came_since(frame);
+        self.world.stack.frames().iter().any(before)
+    }
+
+    /// Whether a frame is of what began since stopping did.
+    fn came_since(&self, frame: &Frame) -> bool {
+        // What began before and ended since counts as before.
+        self.began.is_some_and(|began| frame.id >= began.next && frame.at >= began.at)
+    }
+
+    /// What moved hardware since stopping began.
+    fn put_to_rest(&self) -> Option<ConfigId> {
+        let moved = |frame: &&Arc<Frame>| match &frame.inverse {
+            Inverse::Steps(steps) => steps.iter().any(|planned| planned.moves),
+            Inverse::List(items) => items.iter().any(|item| step::moves(&item.step, &self.world.system)),
+        };
+        let frames = self.world.stack.frames().iter();
+        frames.rev().filter(|frame| self.came_since(frame)).find(moved).map(|frame| frame.configuration)
+    }
+
+    /// Pops frame after frame, newest first; what cannot be popped stays, with what it blocks.
+    fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
+        let from = self.world.stack.next();
+        let mut kept: BTreeSet<FrameId> = BTreeSet::new();
+        while self.given.clock.now() < deadline && !self.is_hurried() {
+            self.after_safe();
+            let stays = |frame: &Frame| frame.safe || frame.id >= from || kept.contains(&frame.id);
+            let next = self.world.stack.frames().iter().rev().find(|frame| !stays(frame) && !self.came_since(frame));
+            let Some(frame) = next.cloned() else { break };
+            match self.pop(&frame, deadline) {
+                Ok(()) => down.popped.push(frame.configuration),
+                Err(reason) => {
+                    kept.insert(frame.id);
+                    down.kept.push(frame.configuration);
+                    down.troubles.push(reason);
+                }
+            }
+        }
+    }
+
+    /// Pops a frame: what is left of something broken together with what mends that.
+    fn pop(&mut self, frame: &Arc<Frame>, deadline: Time) -> Result<(), Reason> {
+        let of = |engine: &Self| engine.world.broken.iter().position(|broken| broken.frame == Some(frame.id));
+        if of(self).is_some() {
+            if let Some(at) = of(self)
+                && self.read_broken(at)
+                && let Some(at) = of(self)
+                && let Some(planned) = self.world.straight(at, frame.id, &self.given.context)
+            {
+                let residual = self.world.broken[at].residual.clone();
+                self.pop_as(frame, planned, deadline)?;
+                self.forget_broken(&residual);
+                return Ok(());
+            }
+            if let Some(at) = of(self) {
+                self.repair(at, By::Recovery).map_err(Reason::Broken)?;
+            }
+            if self.world.stack.frame(frame.id).is_none() {
+                return Ok(());
+            }
+        }
+        let mut components = crate::stack::components(&frame.footprint).into_iter();
+        if let Some(broken) = self.world.broken_at(&mut components) {
+            return Err(Reason::StillBroken(broken.residual.clone()));
+        }
+        let ops = [Op::Undo(frame.id)];
+        let planned = transaction(&self.world.system, &self.world.stack, &ops, &self.given.context)
+            .map_err(|refusal| Reason::Refused(refusal.findings))?;
+        self.pop_as(frame, planned, deadline)
+    }
+
+    fn pop_as(&mut self, frame: &Frame, planned: Planned, deadline: Time) -> Result<(), Reason> {
+        // A safe configuration keeps everything still.
+        if self.world.stack.safe().next().is_some()
+            && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
+        {
+            return Err(Reason::Moves(moving.step.clone()));
+        }
+        let edits = planned.parts[0].edits.clone();
+        let mut spec = self.spec(&planned, false);
+        spec.until = spec.until.min(deadline);
+        let since = self.world.stack.next();
+        match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
+            Some(PartEnd::Done) | None => {
+                self.world.stack.apply([&edits], &[]);
+                self.changed();
+                Ok(())
+            }
+            Some(PartEnd::Failed(reason)) => Err(reason),
+            Some(PartEnd::Broken(part)) => {
+                let residual = part.residual.clone();
+                let ask = Ask::UndoOf(frame.configuration);
+                self.left_broken(&Request::new(RequestId(0), ask, frame.requester), *part, since);
+                Err(Reason::Broken(residual))
+            }
+            Some(PartEnd::Cancelled | PartEnd::Anew) => Err(Reason::TakenDown),
+        }
+    }
+
+    /// Everything that still waits is answered: nothing of it will be done.
+    pub(super) fn refuse_waiting(&mut self) {
+        self.glance();
+        for request in self.desk.cancel_waiting(|_| true) {
+            if request.why == Why::Asked {
+                self.refuse(request);
+            }
+        }
+    }
+
+    /// Waits until nothing is under way any more.
+    pub(super) fn end_running(&mut self) {
+        loop {
+            self.serve_safe();
+            let did = self.advance_all();
+            // Nothing of a batch goes on with what had not begun.
+            self.refuse_rest();
+            if self.running.is_empty() {
+                return;
+            }
+            self.heed_hurry();
+            if !did {
+                self.pump(self.running_until());
+            }
+        }
+    }
+
+    /// Whether force is wanted.
+    pub(super) fn is_hurried(&self) -> bool {
+        self.counts.hurried.load(std::sync::atomic::Ordering::Acquire)
+    }
+
+    /// Force is wanted: what is under way is broken off, once.
+    pub(super) fn heed_hurry(&mut self) {
+        if self.is_hurried() && !std::mem::replace(&mut self.hurried, true) {
+            self.break_off();
+        }
+    }
+
+    /// What is there, as the platform shows it.
+    pub(super) fn see_left(&mut self, down: &mut TakenDown) {
+        match self.look() {
+            Some(seen) => {
+                down.observed = true;
+                let _ = self.adopt(&seen);
+                down.left = seen;
+            }
+            None => {
+                down.observed = false;
+                down.left = self.world.system.snapshot();
+            }
+        }
+        self.note_quarantine();
+    }
+}

@@ -1,0 +1,253 @@
+//! Stopping, stage by stage (design §6): what [`stages`](super::stages) decides is carried out.
+
+use super::life::Ended;
+use super::log::{Happening, Phase};
+use super::stages::{Came, Next, Stage, first, next};
+use super::{Command, Session};
+use crate::configurator::TakenDown;
+use crate::limits;
+use crate::model::{ConfigId, Step};
+use crate::time::{Receiver, Time};
+use std::sync::atomic::Ordering;
+
+/// What stopping has come to so far.
+struct Told {
+    /// The last stage that had something to do.
+    stage: Stage,
+    /// What went otherwise than in order, one line each.
+    notes: Vec<String>,
+    /// It is one that did not come up.
+    coming_up: bool,
+    /// When stopping began.
+    began: Time,
+}
+
+impl Session {
+    /// Takes the deployment down in its stages: the coordinator leads down; what is in force is taken back; force.
+    /// With `force` the last of them at once. Where a safe configuration holds what is left, it waits for somebody to ask for
+    /// force, unless the session is [unattended](Self::unattended).
+    pub fn take_down(&self, force: bool) -> Ended {
+        self.stop(force, false)
+    }
+
+    /// Whether an event from outside is heard also while it is being stopped: those of safety, and the one that shuts down.
+    /// Where nobody has said which are those of safety, it may be any.
+    pub fn stays_open(&self, event: &str) -> bool {
+        let deployment = self.deployment();
+        deployment.safety.is_empty()
+            || deployment.shutdown.event.as_str() == event
+            || deployment.safety.iter().any(|(safety, _)| safety.as_str() == event)
+    }
+
+    /// Nobody is there who could ask for force: nothing waits for that.
+    pub fn unattended(&self) {
+        self.attended.store(false, Ordering::Relaxed);
+    }
+
+    /// The same also of a deployment that is being brought up: an event that nobody hears there leads nowhere.
+    pub(super) fn stop(&self, force: bool, coming_up: bool) -> Ended {
+        let hub = self.hub();
+        hub.halt().begin();
+        self.configurator().stopping();
+        hub.set_phase(Phase::ShuttingDown);
+        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up, began: self.clock().now() };
+        let mut stage = first(force, self.leads());
+        let mut why = match stage {
+            Stage::Led => None,
+            Stage::TakenBack => Some("there is no coordinator that leads down".to_owned()),
+            Stage::Forced => Some("as asked for".to_owned()),
+        };
+        loop {
+            self.begin_stage(stage, why.take(), &mut told);
+            let (came, held) = match stage {
+                Stage::Led => (self.lead_down(&told), false),
+                Stage::TakenBack => self.take_all_back(&mut told),
+                Stage::Forced => (self.force_all(&mut told), false),
+            };
+            let came_to = next(stage, &came, held && self.attended.load(Ordering::Relaxed));
+            why = match came {
+                Came::Left(why) => Some(why),
+                Came::Hurried => Some("as asked for".to_owned()),
+                Came::Empty => None,
+            };
+            match came_to {
+                Next::Over => break,
+                Next::Stage(next) => stage = next,
+                Next::Held => {
+                    let note = "a safe configuration is in force: what is left stays as it is until a second signal or `--force`";
+                    hub.note(Happening::Forced { note: note.to_owned() });
+                    hub.halt().hold(true);
+                    self.wait_for_force();
+                    hub.halt().hold(false);
+                    stage = Stage::Forced;
+                    why = Some("as asked for".to_owned());
+                }
+            }
+        }
+        let ended = self.finish(told.stage, told.notes);
+        self.set_ended(&ended);
+        ended
+    }
+
+    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Told) {
+        let hub = self.hub();
+        if let Some(why) = &why {
+            told.notes.push(format!("stopped {}: {why}", stage.words()));
+        }
+        told.stage = stage;
+        if stage != Stage::Led {
+            // Never two commanders.
+            self.detach_coordinator();
+        }
+        hub.halt().stage(stage);
+        hub.note(Happening::Stopping { stage, why });
+    }
+
+    /// Whether every coordinator is there.
+    fn leads(&self) -> bool {
+        self.parts().iter().all(|part| !part.coordinator.is_detached())
+    }
+
+    /// Force is asked for, now or before.
+    fn is_hurried(&self) -> bool {
+        std::iter::from_fn(|| self.pending_command()).any(|Command::Shutdown { force }| force)
+    }
+
+    fn wait_for_force(&self) {
+        while !self.is_hurried() {
+            self.hub().changed.wait(self.next_look(Time::NEVER));
+        }
+    }
+
+    /// The first stage.
+    fn lead_down(&self, told: &Told) -> Came {
+        let hub = self.hub();
+        let take_down = &self.deployment().shutdown;
+        let goal = self.deployment().down_states();
+        let mut deadline = self.clock().now() + take_down.within;
+        let ticket = self.offer_watched(take_down.event, "deployment");
+        if let Err(refused) = &ticket {
+            hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
+        }
+        let unheard = || ticket.is_ok_and(|ticket| hub.was_heard(ticket) == Some(false));
+        let came = loop {
+            if self.is_down() {
+                break match self.is_empty() {
+                    true => Came::Empty,
+                    false => Came::Left(format!("`{goal}` was reached with components left")),
+                };
+            }
+            if self.is_hurried() {
+                break Came::Hurried;
+            }
+            if !self.leads() {
+                break Came::Left("a coordinator has ended".to_owned());
+            }
+            if told.coming_up && unheard() && self.is_still() {
+                break Came::Left(format!("{}, which does not hear `{}`", hub.whereabouts(), take_down.event));
+            }
+            let now = self.clock().now();
+            if now >= deadline {
+                // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when.
+                if !(self.made_safe_since(told.began) && self.attended.load(Ordering::Relaxed)) {
+                    break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
+                }
+                deadline = now + take_down.within;
+            }
+            self.tell_slow();
+            hub.changed.wait(self.next_look(deadline));
+        };
+        ticket.into_iter().for_each(|ticket| hub.forget(ticket));
+        came
+    }
+
+    /// The second stage, and whether what is left is held by a safe configuration.
+    fn take_all_back(&self, told: &mut Told) -> (Came, bool) {
+        let deadline = self.clock().now() + self.deployment().shutdown.within;
+        let Some(down) = self.stage_of(self.configurator().take_back(deadline), deadline) else {
+            told.notes.push("the configurator did not answer".to_owned());
+            return (Came::Left("the configurator did not answer".to_owned()), false);
+        };
+        let popped = down.popped.iter().map(|id| format!("`{id}` undone"));
+        let mut notes: Vec<String> = popped.collect();
+        notes.extend(down.put_to_rest.iter().map(|id| {
+            format!("nothing is undone: `{id}` has moved something since stopping began, which stays where it is")
+        }));
+        notes.extend(down.kept.iter().map(|id| format!("`{id}` not undone")));
+        notes.extend(down.troubles.iter().map(ToString::to_string));
+        self.note_all(notes, told);
+        let held = down.still;
+        if self.is_hurried() {
+            return (Came::Hurried, held);
+        }
+        if down.is_clean() {
+            // Of a bring-up that had not begun nothing was taken back.
+            if told.coming_up && down.is_idle() {
+                told.stage = Stage::Led;
+                told.notes.clear();
+            }
+            return (Came::Empty, held);
+        }
+        let left = super::life::leftovers(&down.left, &[]);
+        let what = match left.len() {
+            0 => "a call has not returned".to_owned(),
+            1 => format!("{} is left", left[0]),
+            more => format!("{more} things are left"),
+        };
+        (Came::Left(what), held)
+    }
+
+    /// The third stage.
+    fn force_all(&self, told: &mut Told) -> Came {
+        let deadline = self.clock().now() + self.deployment().shutdown.within;
+        let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
+            told.notes.push("the configurator did not answer".to_owned());
+            return Came::Left("the configurator did not answer".to_owned());
+        };
+        let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
+        let applied = applied.chain(down.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
+        let done = |id: &ConfigId| if down.partly.contains(id) { "applied as far as it went" } else { "applied" };
+        let mut notes: Vec<String> = applied.map(|(what, id)| format!("{what} {}", done(id))).collect();
+        notes.extend(forced(&down.forced));
+        notes.extend(down.troubles.iter().map(ToString::to_string));
+        self.note_all(notes, told);
+        if down.is_clean() { Came::Empty } else { Came::Left("something is left".to_owned()) }
+    }
+
+    /// What the configurator answers. What does not keep its time is broken off.
+    fn stage_of(&self, answer: Receiver<TakenDown>, deadline: Time) -> Option<TakenDown> {
+        let grace = self.deployment().limits.step_timeout + limits::VIEW;
+        answer.recv_deadline(deadline).ok().or_else(|| {
+            self.configurator().hurry();
+            answer.recv_deadline(deadline + grace).ok()
+        })
+    }
+
+    fn note_all(&self, notes: Vec<String>, told: &mut Told) {
+        for note in &notes {
+            self.hub().note(Happening::Forced { note: note.clone() });
+        }
+        told.notes.extend(notes);
+    }
+
+    /// Whether a safe configuration is in force that came since then.
+    fn made_safe_since(&self, began: Time) -> bool {
+        let safe = |id: ConfigId| self.deployment().configurations.iter().any(|c| c.id == id && c.safe);
+        self.frames().iter().any(|frame| frame.at >= began && safe(frame.configuration))
+    }
+}
+
+/// Steps that had to be forced: each, or how many of each kind where there are too many to read.
+fn forced(steps: &[Step]) -> Vec<String> {
+    if steps.len() <= limits::FORCED_SHOWN {
+        return steps.iter().map(ToString::to_string).collect();
+    }
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for step in steps {
+        match counts.iter_mut().find(|(verb, _)| *verb == step.verb()) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((step.verb(), 1)),
+        }
+    }
+    counts.into_iter().map(|(verb, count)| format!("{count} × {verb}")).collect()
+}

@@ -1,0 +1,148 @@
+//! Signals, `davit shutdown` and a script's end on the program itself: the stages of stopping, and the exit status.
+
+use crate::demo::Demo;
+use crate::foreground::{Foreground, until};
+use std::fs::File;
+use std::process::Stdio;
+
+/// `e_shutdown` leads to where it waits for what nobody says.
+fn waiting(demo: &Demo) {
+    let at = "trans { src = \"operational\", tgt = \"leaving\", events = { \"e_shutdown\" } },";
+    let instead = "waiting = state {},\n  trans { src = \"operational\", tgt = \"waiting\", events = { \"e_shutdown\" } },\n  \
+        trans { src = \"waiting\", tgt = \"leaving\", events = { \"e_empty\" } },";
+    demo.replace("coordinator.lua", at, instead);
+}
+
+/// The last call of its bring-up takes long.
+fn slow(demo: &Demo) {
+    let faults = "faults:\n  - { step: \"operation_call source.reset\", how: slow, takes_s: 600 }\n";
+    let deployment =
+        demo.read("deployment.yaml").replace("failed: [failed], within_s: 5", "failed: [failed], within_s: 900");
+    demo.write("deployment.yaml", &format!("{deployment}{faults}"));
+    let call = "slow = Configuration { group = \"speed\", timeout = 900.0, operation_call(\"source.reset\", 0.1),";
+    demo.replace("configurations.lua", "slow = Configuration { group = \"speed\",", call);
+}
+
+fn deploy(demo: &Demo, out: &str) -> Foreground {
+    let mut command = demo.command(&["deploy", "deployment.yaml", "--color", "never"]);
+    command.stdout(Stdio::from(File::create(demo.path(out)).unwrap())).stderr(Stdio::null());
+    Foreground::start(&mut command)
+}
+
+#[test]
+fn every_signal_that_asks_for_the_end_is_led_down() {
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT] {
+        let demo = Demo::new();
+        let deployed = deploy(&demo, "out");
+        demo.until_phase("up");
+        deployed.signal(signal);
+        assert_eq!(deployed.end().code(), Some(0), "{signal}");
+        assert!(demo.read("out").contains("demo down, nothing is left"), "{}", demo.read("out"));
+    }
+}
+
+/// Also while it comes up, with a step that would take ten minutes.
+#[test]
+fn a_signal_while_it_comes_up_is_led_down() {
+    let demo = Demo::new();
+    slow(&demo);
+    let deployed = deploy(&demo, "out");
+    until("the call", || demo.read("out").contains("slow_mode").then_some(()));
+    deployed.signal(libc::SIGTERM);
+    let ended = deployed.end();
+    let out = demo.read("out");
+    assert!(out.contains("interrupted while deploying"), "{out}");
+    assert!(ended.code() == Some(0) && out.contains("demo down, nothing is left"), "{ended} {out}");
+}
+
+#[test]
+fn what_its_coordinator_does_not_do_is_told_by_the_exit_status() {
+    let demo = Demo::new();
+    waiting(&demo);
+    demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 1");
+    let deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    let down = demo.run(&["shutdown", "--json"]);
+    assert_eq!((down.code, &down.json()["stage"]), (4, &"taken_back".into()), "{}{}", down.out, down.err);
+    assert_eq!(deployed.end().code(), Some(4));
+    assert!(demo.read("out").contains("without its coordinator, nothing is left"), "{}", demo.read("out"));
+}
+
+/// A second signal does not wait for the coordinator, and neither does `--force`; meanwhile nobody changes anything.
+#[test]
+fn a_second_signal_and_force_begin_with_force() {
+    for by_signal in [true, false] {
+        let demo = Demo::new();
+        waiting(&demo);
+        demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
+        demo.replace("deployment.yaml", "emits: [e_ready]", "emits: [e_ready]\nsafety: [e_empty]");
+        let deployed = deploy(&demo, "out");
+        demo.until_phase("up");
+        deployed.signal(libc::SIGINT);
+        demo.until_phase("shutting_down");
+        for refused in [vec!["apply", "fast", "--force"], vec!["undo"], vec!["commit"], vec!["event", "e_fast"]] {
+            let ran = demo.run(&refused);
+            assert!(ran.code == 1 && ran.err.contains("is being stopped"), "{refused:?} {}{}", ran.out, ran.err);
+        }
+        let status = demo.run(&["status"]);
+        assert!(status.out.contains("stopping     by its coordinator"), "{}", status.out);
+        if by_signal {
+            deployed.signal(libc::SIGINT);
+        } else {
+            assert_eq!(demo.run(&["shutdown", "--force"]).code, 4);
+        }
+        assert_eq!(deployed.end().code(), Some(4));
+        assert!(demo.read("out").contains("demo down by force, nothing is left"), "{}", demo.read("out"));
+    }
+}
+
+/// A bring-up that fails ends with 1 where its coordinator leads down.
+#[test]
+fn a_bring_up_that_fails_is_led_down() {
+    let demo = Demo::new();
+    let faults = "faults:\n  - { step: \"start source\", how: fail }\n";
+    demo.write("deployment.yaml", &format!("{}{faults}", demo.read("deployment.yaml")));
+    let ran = demo.run(&["deploy", "deployment.yaml"]);
+    assert!(ran.code == 1 && ran.out.contains("down, nothing is left"), "{} {}{}", ran.code, ran.out, ran.err);
+    // Nobody leads down from `failed`: what was done is taken back, and that is told instead.
+    demo.replace(
+        "coordinator.lua",
+        "trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },",
+        "trans { src = \"failed\", tgt = \"leaving\", events = { \"e_empty\" } },",
+    );
+    let ran = demo.run(&["deploy", "deployment.yaml"]);
+    assert!(ran.code == 4 && ran.out.contains("without its coordinator"), "{} {}{}", ran.code, ran.out, ran.err);
+}
+
+/// A script that is interrupted, or ends: what it brought up is led down, and nothing of it stays.
+#[test]
+fn a_script_is_stopped_by_signals_and_leaves_nothing() {
+    for (forced, code) in [(false, 1), (true, 4)] {
+        let demo = Demo::new();
+        if forced {
+            waiting(&demo);
+            demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
+        }
+        demo.write("story.lua", "deploy('deployment.yaml') say('it is up') pcall(wait, 1000) wait(1000) say('never')");
+        let mut command = demo.command(&["run", "story.lua", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let running = Foreground::start(&mut command);
+        until("it is up", || demo.read("out").contains("it is up").then_some(()));
+        running.signal(libc::SIGINT);
+        if forced {
+            until("waiting", || demo.read("out").contains("root.waiting").then_some(()));
+            running.signal(libc::SIGINT);
+        }
+        assert_eq!(running.end().code(), Some(code), "{}{}", demo.read("out"), demo.read("err"));
+        assert!(demo.read("err").contains("interrupted by a signal"), "{}", demo.read("err"));
+        let out = demo.read("out");
+        assert!(!out.contains("never") && (forced || out.contains("create_all.undone")), "{out}");
+    }
+    // Its end without `shutdown()` counts as well.
+    let demo = Demo::new();
+    waiting(&demo);
+    demo.write("story.lua", "deploy('deployment.yaml')");
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
+}

@@ -1,0 +1,338 @@
+//! The three stages of stopping, on a deployment of two components: what each does, and what it leaves to the next.
+
+use davit::app;
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::model::{Ask, ConfigId, EventName, RunState};
+use davit::platform::Platform;
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use davit::session::service::SessionService;
+use davit::session::socket::Service;
+use davit::session::{Command, Ended, Happening, Session, Stage, rpc};
+use davit::time::{Clock, Guard};
+use serde_json::json;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+const DEPLOYMENT: &str = "davit: 1
+name: small
+platform: simulated
+types:
+  T:
+    properties: { k: { type: float, default: 1.0 }, g: { type: float, default: 1.0 } }
+    operations:
+      raise: { effect: { undo: lower }, moves: true }
+      lower: { effect: { undo: raise }, moves: true }
+configurations: [conf.lua]
+coordinator: coordinator.lua
+safety: [e_estop]
+operator: [soft, lift]
+deploy:   { event: e_start, up: up, failed: [failed], within_s: 20 }
+shutdown: { event: e_stop, down: idle, within_s: 5, rest: [rest] }
+";
+
+const CONFIGURATIONS: &str = r#"ConfiguratorConf {
+  base = Configuration { create("a", "T"), create("b", "T"), post_conf_state = { "_default:running" } },
+  lift = Configuration { timeout = 10.0, operation_call("a.raise") },
+  soft = Configuration { property_set("b.k", 3.0) },
+  calm = Configuration { safe = true, property_set("a.g", 0.0) },
+  rest = Configuration { timeout = 10.0, operation_call("a.lower"):undo("a.raise") },
+}
+"#;
+
+/// `leading`: what happens when it is up and `e_stop` comes.
+fn coordinator(leading: &str) -> String {
+    format!(
+        r#"return state {{
+  idle = state {{}}, building = state {{ entry = "base" }}, lifting = state {{ entry = "lift" }}, up = state {{}}, failed = state {{}},
+  lowering = state {{ entry = "lift.undo" }}, removing = state {{ entry = "base.undo" }}, deaf = state {{}},
+  safe = state {{ entry = "calm" }},
+  trans {{ src = "initial", tgt = "idle" }},
+  trans {{ src = "idle", tgt = "building", events = {{ "e_start" }} }},
+  trans {{ src = "building", tgt = "lifting", events = {{ "base.ok" }} }},
+  trans {{ src = "building", tgt = "failed", events = {{ "base.failed", "base.broken" }} }},
+  trans {{ src = "lifting", tgt = "up", events = {{ "lift.ok" }} }},
+  trans {{ src = "lifting", tgt = "failed", events = {{ "lift.failed", "lift.broken" }} }},
+  trans {{ src = "lifting", tgt = "lowering", events = {{ "e_stop" }} }},
+  trans {{ src = "up", tgt = "{leading}", events = {{ "e_stop" }} }},
+  trans {{ src = "up", tgt = "safe", events = {{ "e_estop" }} }},
+  trans {{ src = "lowering", tgt = "safe", events = {{ "e_estop" }} }},
+  trans {{ src = "lowering", tgt = "removing", events = {{ "lift.undone" }} }},
+  trans {{ src = "lowering", tgt = "failed", events = {{ "lift.undo.failed", "lift.undo.broken" }} }},
+  trans {{ src = "removing", tgt = "idle", events = {{ "base.undone" }} }},
+  trans {{ src = "removing", tgt = "failed", events = {{ "base.undo.failed", "base.undo.broken" }} }},
+}}
+"#
+    )
+}
+
+struct Small {
+    clock: Clock,
+    platform: Simulated,
+    session: Arc<Session>,
+    heard: Arc<Mutex<Vec<String>>>,
+    _guard: Guard,
+}
+
+impl Small {
+    /// Raising and lowering take 2 s each.
+    fn new(leading: &str, faults: Vec<FaultRule>) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let coordinator = coordinator(leading);
+        for (name, text) in
+            [("d.yaml", DEPLOYMENT), ("conf.lua", CONFIGURATIONS), ("coordinator.lua", coordinator.as_str())]
+        {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        // It is about a coordinator that does not do what `check` demands.
+        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin());
+        let checked = read.and_then(app::check_to_replay).unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+        let clock = Clock::simulated();
+        let guard = clock.enter();
+        let two = |step: &str| (StepPattern::new(step), Duration::from_secs(2));
+        let delays =
+            Delays { of: vec![two("operation_call a.raise"), two("operation_call a.lower")], ..Delays::default() };
+        let options = Options { faults: Faults::new(faults), delays, blocking: true, ..Options::default() };
+        let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
+        platform.record();
+        let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
+        let heard = Arc::new(Mutex::new(Vec::new()));
+        let log = heard.clone();
+        session.hub().observe(Arc::new(move |_, what| {
+            let line = match what {
+                Happening::Answered(answer) => answer.answer.clone(),
+                Happening::Stopping { stage, .. } => format!("{stage:?}"),
+                _ => return,
+            };
+            log.lock().unwrap().push(line);
+        }));
+        Self { clock, platform, session, heard, _guard: guard }
+    }
+
+    fn up(leading: &str) -> Self {
+        let small = Self::new(leading, Vec::new());
+        small.session.bring_up().unwrap_or_else(|not| panic!("{not:#?}"));
+        small.platform.record();
+        small
+    }
+
+    /// Somebody does something so many seconds from now, while this thread is stopping it.
+    fn after(&self, seconds: f64, what: impl FnOnce(&Session) + Send + 'static) {
+        let (clock, session) = (self.clock.clone(), self.session.clone());
+        self.clock.spawn("somebody", move || {
+            clock.sleep(Duration::from_secs_f64(seconds));
+            what(&session);
+        });
+    }
+
+    /// The steps that the platform was asked for since they were read last.
+    fn steps(&self) -> Vec<String> {
+        self.platform.record().iter().map(ToString::to_string).collect()
+    }
+
+    fn heard(&self, what: &str) -> bool {
+        self.heard.lock().unwrap().iter().any(|line| line == what)
+    }
+
+    fn stop(&self) -> (Ended, f64) {
+        let began = self.clock.now();
+        let ended = self.session.take_down(false);
+        (ended, self.clock.now().since(began).as_secs_f64())
+    }
+
+    /// Nothing is there, whatever is said.
+    #[track_caller]
+    fn is_empty(&self) {
+        let seen = self.platform.observe(self.clock.now() + Duration::from_secs(1)).unwrap();
+        assert!(seen.is_empty(), "{seen:?}");
+    }
+}
+
+fn event(name: &str) -> EventName {
+    EventName::new(name).unwrap()
+}
+
+fn force(session: &Session) {
+    session.command(Command::Shutdown { force: true });
+}
+
+#[test]
+fn its_coordinator_leads_down() {
+    let small = Small::up("lowering");
+    let (ended, took) = small.stop();
+    assert!(ended.is_orderly() && ended.forced.is_empty(), "{ended:?}");
+    assert!((2.0..3.0).contains(&took), "{took}");
+    small.is_empty();
+}
+
+#[test]
+fn a_bring_up_that_is_interrupted_is_led_down_too() {
+    let small = Small::new("lowering", Vec::new());
+    small.after(1.0, |session| session.command(Command::Shutdown { force: false }));
+    let not_up = small.session.bring_up().unwrap_err();
+    assert!(not_up.interrupted && not_up.ended.is_orderly(), "{not_up:?}");
+    assert!(small.steps().iter().any(|step| step.contains("a.lower")), "what was half raised is lowered");
+    small.is_empty();
+}
+
+/// The state in which a bring-up failed hears nothing: what was done is taken back, and nobody waits for a coordinator.
+#[test]
+fn a_bring_up_that_failed_is_taken_back_where_nobody_leads_down() {
+    let small = Small::new("lowering", vec![FaultRule::on("operation_call a.raise", Fault::Fail)]);
+    let began = small.clock.now();
+    let not_up = small.session.bring_up().unwrap_err();
+    assert!(small.clock.now().since(began) < Duration::from_secs(4), "it waited for a coordinator that does not hear");
+    assert_eq!((not_up.ended.stage, not_up.interrupted), (Stage::TakenBack, false), "{not_up:?}");
+    assert!(not_up.ended.is_clean() && !not_up.ended.is_orderly(), "{not_up:?}");
+    small.is_empty();
+    // Where nothing was done nothing had to be taken back.
+    let small = Small::new("lowering", vec![FaultRule::on("create a", Fault::Fail)]);
+    let not_up = small.session.bring_up().unwrap_err();
+    assert!(not_up.ended.is_orderly(), "{not_up:?}");
+}
+
+#[test]
+fn a_coordinator_that_does_not_come_down_is_left_out_and_everything_is_taken_back() {
+    let small = Small::up("deaf");
+    let (ended, took) = small.stop();
+    assert_eq!(ended.stage, Stage::TakenBack, "{ended:?}");
+    assert!(ended.is_clean(), "{ended:?}");
+    // Its time, and the compensation of what was raised.
+    assert!((7.0..8.0).contains(&took), "{took}");
+    let steps = small.steps();
+    let at =
+        |what: &str| steps.iter().position(|step| step.contains(what)).unwrap_or_else(|| panic!("{what}: {steps:?}"));
+    assert!(at("a.lower") < at("stop a"), "{steps:?}");
+    small.is_empty();
+}
+
+#[test]
+fn force_comes_when_it_is_asked_for_in_every_stage() {
+    // In the first, while the coordinator has it lowered; in the second, while that is taken back.
+    for (leading, at, stages) in
+        [("lowering", 1.0, "Led Forced"), ("deaf", 2.0, "Led Forced"), ("deaf", 6.0, "Led TakenBack Forced")]
+    {
+        let small = Small::up(leading);
+        small.after(at, force);
+        let (ended, took) = small.stop();
+        let told: Vec<String> = small.heard.lock().unwrap().clone();
+        let told: Vec<&str> = told.iter().map(String::as_str).filter(|line| !line.contains('.')).collect();
+        assert_eq!(told.join(" "), stages, "{ended:?}");
+        assert_eq!(ended.stage, Stage::Forced);
+        assert!(ended.is_clean() && took < at + 4.0, "{took} {ended:?}");
+        // What is safe, what brings it to rest, then everything.
+        let steps = small.steps();
+        let at = |what: &str| {
+            steps.iter().rposition(|step| step.contains(what)).unwrap_or_else(|| panic!("{what}: {steps:?}"))
+        };
+        assert!(at("a.g") < at("a.lower") && at("a.lower") < at("stop a"), "{steps:?}");
+        small.is_empty();
+    }
+}
+
+/// What a safe configuration holds is let go by people only, and nothing moves on the way.
+#[test]
+fn what_is_held_waits_for_force_and_is_not_moved() {
+    let small = Small::up("deaf");
+    small.session.raise(event("e_estop"), "test");
+    small.clock.sleep(Duration::from_secs(1));
+    assert!(small.heard("calm.ok"));
+    small.steps();
+    small.after(100.0, |session| {
+        let view = session.status().stopping.expect("it is being stopped");
+        assert!(view.held && view.stage == Stage::TakenBack, "{view:?}");
+        assert_eq!(session.system().components.values().next().unwrap().state, RunState::Running);
+        force(session);
+    });
+    let (ended, took) = small.stop();
+    assert!((100.0..102.0).contains(&took), "{took}");
+    assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+    let steps = small.steps();
+    assert!(!steps.iter().any(|step| step.contains("operation_call")), "{steps:?}");
+    small.is_empty();
+}
+
+/// Nobody is there to let go.
+#[test]
+fn what_nobody_attends_is_not_waited_for() {
+    let small = Small::up("deaf");
+    small.session.raise(event("e_estop"), "test");
+    small.clock.sleep(Duration::from_secs(1));
+    small.session.unattended();
+    let (ended, took) = small.stop();
+    assert!(took < 8.0 && ended.stage == Stage::Forced && ended.is_clean(), "{took} {ended:?}");
+}
+
+/// An emergency while it is led down: its coordinator is not left out while what is safe is in force; shut down again, it is
+/// told again.
+#[test]
+fn an_emergency_on_the_way_down_stops_the_time() {
+    let small = Small::up("lowering");
+    small.after(1.0, |session| session.raise(event("e_estop"), "test"));
+    small.after(60.0, |session| {
+        let status = session.status();
+        assert_eq!(status.stopping.map(|view| view.stage), Some(Stage::Led), "{:?}", status.coordinator);
+        force(session);
+    });
+    let (ended, took) = small.stop();
+    assert!((60.0..62.0).contains(&took), "{took}");
+    assert!(ended.is_clean(), "{ended:?}");
+    let calls = small.steps().iter().filter(|step| step.contains("operation_call")).count();
+    assert_eq!(calls, 1, "nothing moves after it: {:?}", small.heard.lock().unwrap());
+}
+
+/// When no coordinator hears it any more, a safety event acts by itself: the call under way is given up, and nothing moves.
+#[test]
+fn a_safety_event_acts_by_itself_once_nobody_leads() {
+    let small = Small::up("deaf");
+    small.after(6.0, |session| session.raise(event("e_estop"), "test"));
+    small.after(50.0, force);
+    let (ended, took) = small.stop();
+    assert!(small.heard("calm.ok"), "{:?}", small.heard.lock().unwrap());
+    assert!((50.0..52.0).contains(&took), "held until somebody lets go: {took}");
+    assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+    let steps = small.steps();
+    let safe = steps.iter().position(|step| step.contains("a.g")).unwrap();
+    assert!(!steps[safe..].iter().any(|step| step.contains("operation_call")), "{steps:?}");
+}
+
+/// From the first moment on; what makes safe, what shuts down and what only looks stays open.
+#[test]
+fn while_it_is_stopped_others_are_refused_in_words() {
+    let small = Small::up("lowering");
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let told = seen.clone();
+    small.after(1.0, move |session| {
+        let session = session.hub().is_stopping().then_some(session).expect("it is being stopped");
+        told.lock().unwrap().push(session.request(Ask::Apply(ConfigId::new("soft").unwrap()), "script", false));
+    });
+    let (service, refused) = (SessionService::new(Arc::downgrade(&small.session)), Arc::new(Mutex::new(Vec::new())));
+    let log = refused.clone();
+    small.after(1.0, move |_| {
+        for (method, params) in [
+            ("apply", json!({"configuration": "lift"})),
+            ("undo", json!({"configuration": "lift", "force": true})),
+            ("commit", json!({})),
+            ("event", json!({"event": "e_start"})),
+        ] {
+            let error = service.call(1, method, &params).expect_err(method);
+            assert_eq!(error.code, rpc::GOING_DOWN, "{method}: {error}");
+            assert!(error.message.contains("`small` is being stopped"), "{error}");
+            log.lock().unwrap().push(method);
+        }
+        for (method, params) in [
+            ("status", json!({})),
+            ("log", json!({})),
+            ("event", json!({"event": "e_stop"})),
+            ("event", json!({"event": "e_estop"})),
+        ] {
+            service.call(1, method, &params).unwrap_or_else(|error| panic!("{method}: {error}"));
+            log.lock().unwrap().push(method);
+        }
+    });
+    small.after(20.0, force);
+    small.stop();
+    assert_eq!(refused.lock().unwrap().len(), 8, "{:?}", refused.lock().unwrap());
+    assert!(small.heard("soft.failed"), "{:?}", small.heard.lock().unwrap());
+    assert!(!small.steps().iter().any(|step| step.contains("b.k")));
+}
