@@ -166,6 +166,7 @@ pub const FUNCTIONS: &[&str] = &[
     "now",
     "say",
     "fault",
+    "fail",
     "shutdown",
 ];
 
@@ -186,7 +187,9 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| {
         deploy(h, &file, options::flag(options, "replay")?)
     });
-    function!("raise", String, |h, _lua, event| raise(h, &event));
+    function!("raise", (String, Option<Table>), |h, _lua, (event, options)| {
+        raise(h, &event, options::names(options, "to")?)
+    });
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
         request(h, Some(&id), Ask::Apply, options::flag(options, "force")?)
     });
@@ -232,6 +235,10 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     });
     function!("fault", (String, String, Option<f64>, Option<f64>), |h, _lua, (step, how, times, takes)| {
         h.borrow_mut().faults.add(&step, &how, times, takes)
+    });
+    function!("fail", String, |h, _lua, component| {
+        session(h)?;
+        h.borrow().faults.fail(&component)
     });
     function!("shutdown", Option<Table>, |h, _lua, options| {
         let force = options::flag(options, "force")?;
@@ -336,8 +343,16 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
 /// The connection that a script is: what it asks for begins one after the other.
 const LINE: u32 = 1;
 
-fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
+fn raise(host: &Shared, name: &str, to: Option<Vec<String>>) -> mlua::Result<()> {
     let session = session(host)?;
+    let names = session.coordinators();
+    let known = |to: String| {
+        names.iter().find(|name| name.as_str() == to).copied().ok_or_else(|| {
+            let help = did_you_mean(&to, "coordinators", names.iter().map(Ident::as_str));
+            error(format!("there is no coordinator `{to}`: {help}"))
+        })
+    };
+    let to: Option<Vec<Ident>> = to.map(|to| to.into_iter().map(known).collect::<mlua::Result<_>>()).transpose()?;
     let known = session.events();
     // Functions see every event, also one that no transition lists.
     let heard = |e: &EventName| known.contains(e) || session.sees_all_events();
@@ -346,7 +361,10 @@ fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
         error(format!("the coordinator knows no event `{name}`: {help}"))
     })?;
     listen_anew(host, &session);
-    session.raise(event, "script");
+    match to {
+        Some(to) => session.raise_to(event, &to, "script"),
+        None => session.raise(event, "script"),
+    }
     Ok(())
 }
 

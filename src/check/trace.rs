@@ -13,6 +13,9 @@ pub struct TraceStep {
     pub what: Happened,
     /// The innermost states of the coordinators then, in the order of the deployment.
     pub states: Vec<Place>,
+    /// What coordinators hear then, in order: each is stepped alone by that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hears: Vec<Hears>,
     /// What a script does to bring it about.
     #[serde(skip)]
     pub replay: Replay,
@@ -26,6 +29,16 @@ pub struct Place {
     pub coordinator: Option<String>,
     /// The full name of its innermost state.
     pub state: String,
+}
+
+/// What a coordinator hears.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Hears {
+    /// The coordinator; none: there is only this one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinator: Option<String>,
+    /// The event; a time event comes by itself.
+    pub event: String,
 }
 
 /// What can happen on a way.

@@ -16,7 +16,7 @@ use crate::configurator::{
 use crate::coordinator::{Dropped, Incoming};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot, Step};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Ident, RequestId, Snapshot, Step};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::{Clock, Time, lock};
@@ -167,21 +167,31 @@ impl Session {
 
     /// Gives an event to all coordinators, in the name of `from`.
     pub fn raise(&self, event: EventName, from: &str) {
-        self.deliver(event, from, 0);
+        self.deliver(event, from, 0, |_| true);
     }
 
-    /// The same; [`Hub::was_heard`] says with the number that this answers what became of it, until it is
+    /// The same to these coordinators alone: each hears of one event in its own time, and this is how that is tried.
+    pub fn raise_to(&self, event: EventName, to: &[Ident], from: &str) {
+        self.deliver(event, from, 0, |name| to.contains(&name));
+    }
+
+    /// The names of the coordinators.
+    pub fn coordinators(&self) -> Vec<Ident> {
+        self.parts.iter().map(|part| part.name).collect()
+    }
+
+    /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
     /// [forgotten](Hub::forget).
     pub fn raise_watched(&self, event: EventName, from: &str) -> u64 {
         let ticket = self.hub.ticket(self.parts.len());
-        self.deliver(event, from, ticket);
+        self.deliver(event, from, ticket, |_| true);
         ticket
     }
 
-    fn deliver(&self, event: EventName, from: &str, ticket: u64) {
+    fn deliver(&self, event: EventName, from: &str, ticket: u64, to: impl Fn(Ident) -> bool) {
         self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator.event(event);
-        for part in &self.parts {
+        for part in self.parts.iter().filter(|part| to(part.name)) {
             if part.coordinator.deliver(Incoming::watched(event, ticket)).is_err() {
                 self.hub.taken_up(ticket, false);
                 self.hub.note(Happening::Forced {
