@@ -8,7 +8,6 @@ use super::outcome::WorldId;
 use super::product::Product;
 use super::report::Explored;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
-use super::way::Ways;
 use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Findings, Verdict};
@@ -79,6 +78,21 @@ pub struct Graph<'p, 'a> {
 }
 
 pub(super) const NOWHERE: u32 = u32::MAX;
+
+/// By which edge each state is come to on the shortest way.
+pub struct Ways {
+    /// On those that a script can go.
+    pub(super) shown: Vec<u32>,
+    /// On any.
+    pub(super) all: Vec<u32>,
+}
+
+impl Ways {
+    /// Whether a script can go to a state.
+    pub(super) fn shows(&self, at: u32) -> bool {
+        at == 0 || self.shown[at as usize] != NOWHERE
+    }
+}
 
 /// Follows everything, within the budget.
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {

@@ -11,70 +11,15 @@ use super::product::Product;
 use super::shows::{answered, races, same, too_late, under_way};
 use super::stands::stands_after;
 use super::state::{Move, Next, State};
-use super::trace::TraceStep;
+use super::trace::{Does, Replay};
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
-use crate::model::{Ask, ComponentName, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
+use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
 use crate::stack::Request;
 use crate::statechart::EventId;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::time::Duration;
-
-/// What a move of a way needs.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Replay {
-    /// When it happens, from the beginning.
-    pub at: Duration,
-    /// What is armed before it: the text of a step, how it goes, and how long it takes.
-    pub arms: Vec<(String, FaultKind, Duration)>,
-    /// What is to be done for it.
-    pub does: Does,
-    /// At the end of a way: an answer that comes there within that time, without being part of it.
-    pub then: Option<(EventName, Duration)>,
-    /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
-    pub passes: bool,
-    /// Answers that may be others, and lead to the same: what was given up and has nothing to do may be through before.
-    pub either: SmallVec<[EventName; 1]>,
-    /// A circle is gone round.
-    pub again: Option<Again>,
-    /// For which coordinators alone something is raised; or where those that are not followed with these are to be, each with
-    /// its name before it.
-    pub others: Vec<String>,
-}
-
-/// A circle that is gone round again and again.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Again {
-    /// So many times.
-    pub times: usize,
-    /// Of so many moves.
-    pub round: usize,
-    /// The moves of the first rounds, [`limits::REPLAY_ROUNDS`] at most.
-    pub steps: Vec<TraceStep>,
-}
-
-/// What is to be done for a move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Does {
-    /// It comes by itself.
-    #[default]
-    Nothing,
-    /// This event is raised.
-    Raise(EventName),
-    /// This event is raised for some coordinators alone: others hear of it at another time.
-    RaiseTo(EventName),
-    /// An operator asks for this.
-    Ask(Ask),
-    /// A component fails by itself, and this is told.
-    Fail(ComponentName, EventName),
-    /// Nothing: it comes by itself that this is told.
-    Hear(EventName),
-    /// The coordinators that are not followed with these have come to *down* too, since the event that ends the deployment.
-    OthersDown,
-    /// No script brings it about, and why.
-    Cannot(&'static str),
-}
 
 /// For moves of a way: what is raised with them, for which coordinators alone, and whether that is later than what comes before.
 type Split = FxHashMap<usize, (EventName, Vec<String>, bool)>;
@@ -137,7 +82,13 @@ impl Product<'_> {
         for k in (0..way.len()).filter(|k| own_time(*k) && self.is_told_between(way[*k].0)) {
             all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
         }
-        for (k, (event, to, _)) in split {
+        for (k, (event, to, later)) in split {
+            if let (Move::Taken(number, _), true) = (way[k].1.by, later)
+                && way[k].0.inbox.iter().filter(|(to, _)| *to == number).count() > 1
+            {
+                all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
+                continue;
+            }
             all[k].does = if to.is_empty() { Does::Nothing } else { Does::RaiseTo(event) };
             all[k].others = to;
         }

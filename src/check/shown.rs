@@ -30,8 +30,6 @@ pub const FOLLOWED: &[Code] = &[
     TOUCHES_DESTROYED,
     UNKNOWN_COMPONENT,
     COMPONENT_EXISTS,
-    ILLEGAL_TRANSITION,
-    NOT_UNCONFIGURED,
     STILL_CONNECTED,
     ALREADY_CONNECTED,
     NOT_CONNECTED,
@@ -97,6 +95,10 @@ pub const READ: &[(&str, &[Code])] = &[
     ),
     ("it is told of all that two coordinators ask for together: no way leads to it", &[COORD_SHARED]),
     ("it is told as the reason why a request is refused, with the way to that", &[STACK_FULL]),
+    (
+        "what is planned leads through all run states on its way: only a component that has failed meets it",
+        &[ILLEGAL_TRANSITION, NOT_UNCONFIGURED],
+    ),
 ];
 
 /// Why no way leads to a finding that has none.

@@ -67,7 +67,10 @@ impl Shows {
                 // What is taken back unconfirmed may have to wait for what is under way.
                 let waits =
                     next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted) && !before.desk.is_empty();
-                !self.unknown && !own_time && !waits && !races(before, next)
+                // What is told behind an event that is held up would be heard before it.
+                let inbox = &next.state.inbox;
+                let behind = inbox.iter().enumerate().any(|(at, (to, _))| inbox[..at].iter().any(|(own, _)| own == to));
+                !self.unknown && !own_time && !waits && !behind && !races(before, next)
             }
             Move::Lost(id) if product.loss(before, id).is_none() => false,
             _ => !self.at_once && !self.answers && !self.unheard && !races(before, next),

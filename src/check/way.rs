@@ -1,29 +1,13 @@
 //! The ways to what is found: the shortest one that a script can go, as far as each of its moves tells; else the shortest.
 
-use super::explore::{Edge, Graph, NOWHERE};
+use super::explore::{Edge, Graph, NOWHERE, Ways};
 use super::product::Product;
-use super::replay::{Again, Replay};
 use super::state::{Failed, Move, Next, State};
-use super::trace::{Happened, TraceStep};
+use super::trace::{Again, Happened, Replay, TraceStep};
 use crate::limits;
 use crate::stack::Request;
 use smallvec::SmallVec;
 use std::collections::VecDeque;
-
-/// By which edge each state is come to on the shortest way.
-pub struct Ways {
-    /// On those that a script can go.
-    shown: Vec<u32>,
-    /// On any.
-    all: Vec<u32>,
-}
-
-impl Ways {
-    /// Whether a script can go to a state.
-    fn shows(&self, at: u32) -> bool {
-        at == 0 || self.shown[at as usize] != NOWHERE
-    }
-}
 
 /// What happens on a way.
 enum Part {

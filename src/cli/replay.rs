@@ -1,7 +1,6 @@
 //! A script that goes the way to a finding of `davit check`.
 
-use crate::check::replay::{Again, Does};
-use crate::check::{Happened, TraceStep, why_no_way};
+use crate::check::{Again, Does, Happened, TraceStep, why_no_way};
 use crate::limits;
 use crate::model::{Ask, FaultKind, Finding};
 use std::fmt::Write as _;
