@@ -112,7 +112,7 @@ impl Product<'_> {
             // At the end of the way it may have become one that is refused.
             let begins = &way[batch.at].1.state;
             let state = batch.over.map_or(&way[way.len() - 1].1.state, |_| begins);
-            let stands = batch.over.and_then(|at| self.stands_after(&way[at].1)).unwrap_or_default();
+            let stands = batch.over.and_then(|at| self.stands_after(way[at].1)).unwrap_or_default();
             let takes = until.saturating_sub(times[batch.at]).saturating_sub(stands);
             let mut arms = self.arms(state, &batch.requests, answers, takes);
             arms.extend(batch.over.and_then(|at| self.lie(way, at, state, batch)));
@@ -145,7 +145,9 @@ impl Product<'_> {
         for (k, (_, next)) in way.iter().enumerate() {
             let Move::Event(at) = next.by else { continue };
             let name = self.outside[usize::from(at)];
-            let waits: Vec<u8> = next.state.inbox.iter().map(|(to, _)| *to).collect();
+            let inbox = next.state.inbox.iter();
+            let lies = inbox.filter(|(to, event)| self.members[usize::from(*to)].name_of(*event) == Some(name));
+            let waits: Vec<u8> = lies.map(|(to, _)| *to).collect();
             let mut taken: Vec<(usize, u8)> = Vec::new();
             for (j, (_, next)) in way.iter().enumerate().skip(k + 1) {
                 match next.by {

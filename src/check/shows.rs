@@ -55,6 +55,9 @@ impl Shows {
         if self.nothing || !next.state.flight.is_empty() {
             return false;
         }
+        // Most states have nothing under way.
+        let goes_on = !before.desk.under_way().is_empty() || !before.safe.is_empty();
+        let races = || goes_on && races(before, next);
         match next.by {
             Move::Taken(..) => true,
             Move::Answer => {
@@ -70,10 +73,10 @@ impl Shows {
                 // What is told behind an event that is held up would be heard before it.
                 let inbox = &next.state.inbox;
                 let behind = inbox.iter().enumerate().any(|(at, (to, _))| inbox[..at].iter().any(|(own, _)| own == to));
-                !self.unknown && !own_time && !waits && !behind && !races(before, next)
+                !self.unknown && !own_time && !waits && !behind && !races()
             }
             Move::Lost(id) if product.loss(before, id).is_none() => false,
-            _ => !self.at_once && !self.answers && !self.unheard && !races(before, next),
+            _ => !self.at_once && !self.answers && !self.unheard && !races(),
         }
     }
 }

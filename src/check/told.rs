@@ -41,11 +41,15 @@ impl Product<'_> {
             let charts = self.members.iter().map(|member| member.chart.event(name)).enumerate();
             charts.filter(|(_, event)| *event != EventId::OTHER).collect::<Vec<_>>()
         };
+        // Of what lies in inboxes each hears when it takes it.
+        let lies = |name: EventName| {
+            let is = |(to, event): &(u8, EventId)| self.members[usize::from(*to)].name_of(*event) == Some(name);
+            next.state.inbox.iter().any(is)
+        };
+        let at_once = |name: EventName| if lies(name) { Vec::new() } else { all(name) };
         match next.by {
-            Move::Event(at) | Move::Dropped(at) if next.state.inbox.is_empty() => {
-                heard = all(self.outside[usize::from(at)]);
-            }
-            Move::Lost(id) if next.state.inbox.is_empty() => heard = all(Verdict::Lost.event(Ask::Apply(id))),
+            Move::Event(at) | Move::Dropped(at) => heard = at_once(self.outside[usize::from(at)]),
+            Move::Lost(id) => heard = at_once(Verdict::Lost.event(Ask::Apply(id))),
             Move::Time(number, event) | Move::Taken(number, event) => heard.push((usize::from(number), event)),
             Move::Answer => {
                 // Whose state is left by what is heard before hears no more.

@@ -14,7 +14,7 @@ enum Part {
     /// A move.
     Move(Box<(State, Next)>),
     /// A circle is gone round so many times, and where that leads.
-    Rounds(usize, Vec<(State, Next)>, State),
+    Rounds(usize, Vec<(State, Next)>, Box<State>),
 }
 
 impl Product<'_> {
@@ -47,7 +47,7 @@ impl Graph<'_, '_> {
             parts.push(match rounds {
                 Some((times, circle)) => {
                     let circle = circle.iter().map(|number| self.gone(*number)).collect();
-                    Part::Rounds(times, circle, self.states[edge.to as usize].clone())
+                    Part::Rounds(times, circle, Box::new(self.states[edge.to as usize].clone()))
                 }
                 None => Part::Move(Box::new((from, self.gone(number).1))),
             });
@@ -84,7 +84,7 @@ impl Graph<'_, '_> {
                     let all: Vec<TraceStep> = moves.map(|pair| step(pair, replays.next())).collect();
                     let at = all.last().map(|step| step.replay.at).unwrap_or_default();
                     let again = Again { times: *times, round: circle.len(), steps: all };
-                    let to = Next::plain(Move::Rounds, to.clone(), Failed::Nothing);
+                    let to = Next::plain(Move::Rounds, (**to).clone(), Failed::Nothing);
                     let told =
                         step(&(to.state.clone(), to), Some(Replay { at, again: Some(again), ..Replay::default() }));
                     steps.push(TraceStep { what: Happened::Rounds { times: *times }, ..told });

@@ -167,7 +167,9 @@ fn coordinators() -> Vec<Row> {
             "idle = state {{}}, up = state {{ entry = '{own}' }}, leaving = state {{ entry = '{own}.undo' }},
              trans {{ src = 'initial', tgt = 'idle' }}, {more}
              trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
-             trans {{ src = 'leaving', tgt = 'idle', events = {{ '{own}.undone', '{own}.undo.failed' }} }},"
+             trans {{ src = 'leaving', tgt = 'idle', events = {{ '{own}.undone' }} }}, left = state {{}},
+             trans {{ src = 'leaving', tgt = 'left', events = {{ '{own}.undo.failed', '{own}.undo.broken' }} }},
+             trans {{ src = 'left', tgt = 'leaving', events = {{ 'e_shutdown' }} }},"
         )
     };
     let apart = |own: &str| shared(own, "trans { src = 'idle', tgt = 'up', events = { 'e_start' } },");
@@ -234,7 +236,7 @@ fn coordinators() -> Vec<Row> {
                 ),
                 "",
             ),
-            "raise('e_nothing') wait_answer('one.ok', 1) wait_answer('one.undone', 1)",
+            "wait_answer('one.ok', 1) wait_answer('one.undone', 1)",
             &["one.ok", "one.undone"],
         ),
         row(
@@ -318,13 +320,22 @@ fn coordinators() -> Vec<Row> {
                     (
                         "first",
                         &(apart("one")
-                            + "lost = state { entry = 'e_lost' }, trans { src = 'up', tgt = 'lost', events = { 'e_go' } },"),
+                            + "lost = state { entry = 'e_lost' }, found = state {},
+                               trans { src = 'up', tgt = 'lost', events = { 'e_go' } },
+                               trans { src = 'lost', tgt = 'found', events = { 'e_go' } },
+                               trans { src = 'found', tgt = 'lost', events = { 'e_go' } },"),
                     ),
-                    ("second", &(apart("two") + "trans { src = 'up', tgt = 'up', events = { 'e_lost' } },")),
+                    (
+                        "second",
+                        &(apart("two")
+                            + "heard = state {}, trans { src = 'up', tgt = 'heard', events = { 'e_lost' } },
+                               trans { src = 'heard', tgt = 'leaving', events = { 'e_shutdown' } },"),
+                    ),
                 ],
                 "emits: [e_lost]\n",
             ),
-            "raise('e_shutdown') wait(2) wait_state('first:lost', 0)",
+            "raise('e_shutdown') wait(2) raise('e_go') wait(2)
+             assert(not table.concat(active(), ' '):find('first:root.idle', 1, true))",
             &[],
         ),
         Row {
@@ -334,7 +345,7 @@ fn coordinators() -> Vec<Row> {
                 "`e_estop` does not lead to a `safe` configuration",
                 Small::new(safe, &life(stopped), "safety: [e_estop]\n"),
                 "wait(2) for _, frame in ipairs(stack()) do assert(frame.configuration ~= 'stop') end",
-                &["e_estop"],
+                &[],
             )
         },
         row(
@@ -503,4 +514,29 @@ fn every_code_that_check_gives_is_listed() {
     let ways: BTreeSet<&str> = FOLLOWED.iter().map(|code| code.0).collect();
     let both = READ.iter().flat_map(|(_, codes)| *codes).filter(|code| ways.contains(code.0));
     assert_eq!(both.count(), 0);
+}
+
+/// What has no way says why, and of several coordinators one is stepped alone.
+#[test]
+fn what_has_no_way_says_why() {
+    let row = coordinators().into_iter().find(|row| row.code == "coord::refused_by_other").unwrap();
+    let said = row.small.demo.run(&["check", "small.yaml", "--json"]).json();
+    let all = said["findings"].as_array().unwrap();
+    let number = |code: &str| (all.iter().position(|f| f["code"] == code).unwrap() + 1).to_string();
+    for script in ["way.lua", "way.events"] {
+        let shared = number("coord::shared");
+        let made = row.small.demo.run(&["check", "small.yaml", "--trace", &shared, "--as", script, "--of", "first"]);
+        assert!(
+            made.code == 1 && made.err.contains("ask for together: no way leads to it"),
+            "{}{}",
+            made.code,
+            made.err
+        );
+    }
+    let refused = number("coord::refused_by_other");
+    for (of, says) in [(&[][..], "several coordinators"), (&["--of", "third"], "no coordinator `third`")] {
+        let made =
+            row.small.demo.run(&[&["check", "small.yaml", "--trace", &refused, "--as", "way.events"], of].concat());
+        assert!(made.code == 2 && made.err.contains(says) && made.err.contains("first, second"), "{}", made.err);
+    }
 }
