@@ -460,6 +460,10 @@ pub const CHECK_FORKS: usize = 64;
 /// chance in another order.
 pub const REPLAY_STEP: Duration = Duration::from_millis(20);
 
+/// So many rounds of a circle that a script goes again and again are written out: the first, the last, and one between that is
+/// repeated.
+pub const REPLAY_ROUNDS: usize = 3;
+
 /// Circles of answers that are told; more of them say nothing new.
 pub const CHECK_TOLD: usize = 4;
 

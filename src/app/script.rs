@@ -163,6 +163,7 @@ pub const FUNCTIONS: &[&str] = &[
     "now",
     "say",
     "fault",
+    "fail",
     "shutdown",
 ];
 
@@ -183,7 +184,9 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| {
         deploy(h, &file, options::flag(options, "replay")?)
     });
-    function!("raise", String, |h, _lua, event| raise(h, &event));
+    function!("raise", (String, Option<Table>), |h, _lua, (event, options)| {
+        raise(h, &event, options::names(options, "to")?)
+    });
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
         request(h, Some(&id), Ask::Apply, options::flag(options, "force")?)
     });
@@ -228,6 +231,10 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     });
     function!("fault", (String, String, Option<f64>, Option<f64>), |h, _lua, (step, how, times, takes)| {
         h.borrow_mut().faults.add(&step, &how, times, takes)
+    });
+    function!("fail", String, |h, _lua, component| {
+        session(h)?;
+        h.borrow().faults.fail(&component)
     });
     function!("shutdown", Option<Table>, |h, _lua, options| {
         let force = options::flag(options, "force")?;
@@ -343,14 +350,26 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
 /// The connection that a script is: what it asks for begins one after the other.
 const LINE: u32 = 1;
 
-fn raise(host: &Shared, name: &str) -> mlua::Result<()> {
+fn raise(host: &Shared, name: &str, to: Option<Vec<String>>) -> mlua::Result<()> {
     let session = session(host)?;
+    let names = session.coordinators();
+    let known = |to: String| {
+        names.iter().find(|name| name.as_str() == to).copied().ok_or_else(|| {
+            let help = did_you_mean(&to, "coordinators", names.iter().map(Ident::as_str));
+            error(format!("there is no coordinator `{to}`: {help}"))
+        })
+    };
+    let to: Option<Vec<Ident>> = to.map(|to| to.into_iter().map(known).collect::<mlua::Result<_>>()).transpose()?;
     let event = session.named(name).map_err(|why| {
         let help = did_you_mean(name, "events", session.events().iter().map(EventName::as_str));
         error(format!("{why}: {help}"))
     })?;
     listen_anew(host, &session);
-    session.offer(event, "script").map_err(|why| error(format!("`{name}` was not delivered: {why}")))
+    let offered = match to {
+        Some(to) => session.offer_to(event, &to, "script"),
+        None => session.offer(event, "script"),
+    };
+    offered.map_err(|why| error(format!("`{name}` was not delivered: {why}")))
 }
 
 /// From now on only what comes is news.

@@ -397,6 +397,6 @@ impl Product<'_> {
 }
 
 /// Whether an answer is for a coordinator: for the state that asked, while that is not left, or for whatever state there is.
-fn is_for_somebody(request: &Request) -> bool {
+pub(super) fn is_for_somebody(request: &Request) -> bool {
     !request.is_asked() && request.requester != Requester::Operator || request.tag.0 != 0
 }

@@ -38,14 +38,19 @@ impl Bound {
     /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
     pub(super) fn told(self, failed: Failed, most_waiting: usize) -> String {
         let what = match self {
-            Self::Budget => format!("the budget of {} transitions was used up", limits::CHECK_TRANSITIONS),
+            Self::Budget => format!(
+                "what comes after the first {} transitions was not followed, for they are as many as are looked at",
+                limits::CHECK_TRANSITIONS
+            ),
             Self::Waiting => {
                 format!("more than {most_waiting} batches of one coordinator that wait at once were not followed")
             }
             Self::Lean => {
-                return "behind an undo that failed, only one batch of a coordinator at a time was followed".to_owned();
+                return "what a coordinator asks for behind an undo that failed, before it was answered what it had asked for, \
+                        was not followed"
+                    .to_owned();
             }
-            Self::Piled => format!("more than {} requests that wait were not followed", limits::CHECK_PILED),
+            Self::Piled => format!("what comes when more than {} requests are not answered was not followed", limits::CHECK_PILED),
             Self::Frames => {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_FRAMES)
             }
@@ -62,7 +67,7 @@ impl Bound {
             ),
             Self::ByHand => "what an operator's safe configuration leads to was not followed".to_owned(),
             Self::Rounds => {
-                "of the rounds on which frames pile up not all were followed to where the oldest are squashed"
+                "where each round leaves a frame more, not all rounds were followed to where the oldest frames are squashed"
                     .to_owned()
             }
             Self::Stopping => {

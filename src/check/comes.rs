@@ -43,12 +43,8 @@ impl Worlds<'_> {
         let refused = refused.collect();
         let planned = group.planned.take();
         group.told.iter_mut().for_each(|told| told.reason = None);
-        for warning in planned.iter().flat_map(|planned| &planned.warnings) {
-            let place = (warning.code, warning.origin.0, warning.path.clone(), warning.message.clone());
-            if self.warned.insert(place) {
-                self.warnings.push(warning.clone());
-            }
-        }
+        let warnings = planned.as_ref().map(|planned| planned.warnings.clone()).filter(|warnings| !warnings.is_empty());
+        let warnings = warnings.map(Rc::new);
         let can_fail = planned.as_ref().map(can_fail).unwrap_or_default();
         let mut ends = |endings: &[Ending]| self.after(id, requests, &group, planned.as_ref(), endings, &beside.held);
         let parts = can_fail.len();
@@ -71,7 +67,7 @@ impl Worlds<'_> {
         });
         let stopped = stopped.collect();
         let hollow = self.hollow(done.world, &group, planned.as_ref());
-        Comes { group, refused, hollow, can_fail, done, stopped }
+        Comes { group, refused, hollow, warnings, can_fail, done, stopped }
     }
 
     /// The requests of a group that say what is false in the world in which all of it is done.

@@ -3,6 +3,7 @@
 use super::bound::Bound;
 use super::explore::{Edge, Graph};
 use super::judge::Traced;
+use super::product::Product;
 use super::state::{Failed, State};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};
@@ -13,19 +14,11 @@ use rustc_hash::FxHashSet;
 impl Graph<'_, '_> {
     /// Ways down that leave something behind.
     pub(super) fn leftovers(&mut self, found: &mut Traced) {
-        let left = |state: &State| -> Vec<ComponentName> {
-            let mut names = Vec::new();
-            if let Some(world) = self.product.worlds.get(state.world).filter(|_| self.product.is_down(state)) {
-                world.system.for_each_component(&mut |node| names.push(node.name));
-            }
-            names.sort_unstable();
-            names
-        };
-        let first = self.in_order().into_iter().find_map(|at| {
-            let left = left(&self.states[at as usize]);
-            (!left.is_empty()).then_some((at, left))
-        });
-        let Some((at, left)) = first else { return };
+        let left = |state: &State| left_in(self.product, state);
+        let some = (0u32..).zip(&self.states).filter(|(_, state)| !left(state).is_empty());
+        let some = some.map(|(at, _)| at).collect();
+        let Some(at) = self.best_first(some).first().copied() else { return };
+        let left = left_in(self.product, &self.states[at as usize]);
         let names: Vec<String> = left.iter().take(6).map(ToString::to_string).collect();
         let more = if left.len() > 6 { format!(" and {} more", left.len() - 6) } else { String::new() };
         let finding = Finding::warning(COORD_LEFTOVERS, format!("a way down leaves {}{more} behind", names.join(", ")))
@@ -48,16 +41,16 @@ impl Graph<'_, '_> {
         let reaches = self.reaching_down(|_| true);
         let several = self.product.members.len() > 1;
         let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
-        let order = self.in_order();
+        let all: Vec<u32> = (0u32..).zip(&self.states).map(|(at, _)| at).filter(lost).collect();
         let leaves: FxHashSet<&[NodeId]> = stuck.iter().map(|at| &self.states[*at as usize].leaves[..]).collect();
-        let first = if several {
+        let some: Vec<u32> = if several {
             // Where nothing leads on at all tells most.
-            let first = order.iter().copied().find(|at| lost(at) && stuck.contains(at));
-            first.or_else(|| order.iter().copied().find(lost))
+            let some: Vec<u32> = all.iter().copied().filter(|at| stuck.contains(at)).collect();
+            if some.is_empty() { all } else { some }
         } else {
-            order.iter().copied().find(|at| lost(at) && !leaves.contains(&self.states[*at as usize].leaves[..]))
+            all.into_iter().filter(|at| !leaves.contains(&self.states[*at as usize].leaves[..])).collect()
         };
-        let Some(at) = first else { return self.once_down(&reaches, found) };
+        let Some(at) = self.best_first(some).first().copied() else { return self.once_down(&reaches, found) };
         let deployment = self.product.deployment;
         let state = &self.states[at as usize];
         let finding = if several {
@@ -110,7 +103,8 @@ impl Graph<'_, '_> {
             let state = &self.states[*at as usize];
             state.stopping && state.is_at_rest() && reaches[*at as usize] && !once[*at as usize]
         };
-        let Some(at) = self.in_order().into_iter().find(again) else { return };
+        let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(again).collect();
+        let Some(at) = self.best_first(some).first().copied() else { return };
         let (deployment, state) = (self.product.deployment, &self.states[at as usize]);
         let severity = if self.failed[at as usize] == Failed::Nothing { Severity::Warning } else { Severity::Info };
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
@@ -131,4 +125,14 @@ impl Graph<'_, '_> {
         let trace = self.trace(at);
         found.push((finding, trace));
     }
+}
+
+/// What is left in a state in which all are down.
+fn left_in(product: &Product<'_>, state: &State) -> Vec<ComponentName> {
+    let mut names = Vec::new();
+    if let Some(world) = product.worlds.get(state.world).filter(|_| product.is_down(state)) {
+        world.system.for_each_component(&mut |node| names.push(node.name));
+    }
+    names.sort_unstable();
+    names
 }

@@ -4,7 +4,7 @@
 
 use super::explore::{Edge, Graph};
 use super::judge::Traced;
-use super::state::{Failed, Move};
+use super::state::{Failed, Move, Next, State};
 use crate::limits;
 use crate::model::codes::COORD_ENDLESS;
 use crate::model::{Finding, Severity};
@@ -53,13 +53,25 @@ impl Graph<'_, '_> {
             )
             .at(self.product.members[of[0]].chart.origin(first))
             .help("wait for an event or for a time (`e_after(1.0)`) somewhere on the way round");
-            let trace = self.trace(at);
+            let round = self.round(&circle);
+            let trace = self.trace_on(at, round);
             found.push((finding, trace));
             // One that is entered from many places is told once.
             if said.len() >= limits::CHECK_TOLD {
                 return;
             }
         }
+    }
+
+    /// The moves of a circle, once round.
+    fn round(&mut self, circle: &[u32]) -> Vec<(State, Next)> {
+        let ends: Vec<(u32, u32)> = circle.iter().copied().zip(circle.iter().copied().cycle().skip(1)).collect();
+        let edge = |(from, to): &(u32, u32)| {
+            let is = |edge: &Edge| edge.quiet && (edge.from, edge.to) == (*from, *to);
+            self.edges.iter().position(is).and_then(|number| u32::try_from(number).ok())
+        };
+        let numbers: Vec<u32> = ends.iter().filter_map(edge).collect();
+        numbers.into_iter().map(|number| self.gone(number)).collect()
     }
 
     /// The coordinators that go round on a circle: those that change their state on it, or who hear something on it; one at

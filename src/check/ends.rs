@@ -44,6 +44,7 @@ impl Product<'_> {
                 nexts.troubles.push(Trouble::Hollow(requests[*place], reasons.clone()));
             }
         }
+        nexts.warnings.extend(comes.warnings.clone());
         for endings in comes.endings(Stopping::Not, self.tells_all) {
             let from = nexts.all.len();
             self.ends_so(state, number, &requests, &comes, &endings, nexts);

@@ -6,19 +6,18 @@
 use super::bound::Bound;
 use super::outcome::WorldId;
 use super::product::Product;
-use super::replay::Replay;
 use super::report::Explored;
 use super::state::{Failed, Move, Next, Nexts, State, Trouble};
-use super::trace::{Happened, Place, TraceStep};
 use super::world::Top;
 use crate::limits;
-use crate::model::{Ask, ConfigId, Verdict};
+use crate::model::{Ask, ConfigId, Findings, Verdict};
 use crate::stack::Requester;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::BinaryHeap;
 use std::hash::{Hash, Hasher};
+use std::rc::Rc;
 
 /// A move that was followed.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +36,8 @@ pub struct Edge {
     pub again: bool,
     /// It comes, and nobody hears it.
     pub dropped: bool,
+    /// As far as this move alone tells, a script can bring it about.
+    pub shown: bool,
 }
 
 /// Everything that was followed.
@@ -53,6 +54,8 @@ pub struct Graph<'p, 'a> {
     pub edges: Vec<Edge>,
     /// What is wrong, and where.
     pub troubles: Vec<(u32, Trouble)>,
+    /// What planning warns of, and where.
+    pub warned: Vec<(u32, Rc<Findings>)>,
     /// Going round adds frames of this configuration.
     pub deep: Vec<(u32, ConfigId)>,
     /// States that are not followed on some way for a reason.
@@ -68,11 +71,28 @@ pub struct Graph<'p, 'a> {
     pub(super) depth: Vec<u32>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
-    /// For each class the first edge to each state, on the shortest ways with nothing worse.
-    ways: FxHashMap<Failed, Vec<u32>>,
+    /// For each class the shortest ways with nothing worse.
+    pub(super) ways: FxHashMap<Failed, Ways>,
+    /// The circles of edges that are gone round where an edge is no move.
+    pub(super) rounds: FxHashMap<u32, Vec<u32>>,
 }
 
 pub(super) const NOWHERE: u32 = u32::MAX;
+
+/// By which edge each state is come to on the shortest way.
+pub struct Ways {
+    /// On those that a script can go.
+    pub(super) shown: Vec<u32>,
+    /// On any.
+    pub(super) all: Vec<u32>,
+}
+
+impl Ways {
+    /// Whether a script can go to a state.
+    pub(super) fn shows(&self, at: u32) -> bool {
+        at == 0 || self.shown[at as usize] != NOWHERE
+    }
+}
 
 /// Follows everything, within the budget.
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
@@ -83,6 +103,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         followed: Vec::new(),
         edges: Vec::new(),
         troubles: Vec::new(),
+        warned: Vec::new(),
         deep: Vec::new(),
         ends: FxHashSet::default(),
         bounds: FxHashMap::default(),
@@ -93,6 +114,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         index: FxHashMap::default(),
         open: BinaryHeap::new(),
         ways: FxHashMap::default(),
+        rounds: FxHashMap::default(),
     };
     match graph.product.start() {
         Some(start) => {
@@ -190,6 +212,8 @@ impl Graph<'_, '_> {
             self.cut(Bound::Waiting, so_far);
         }
         self.troubles.extend(nexts.troubles.into_iter().map(|trouble| (at, trouble)));
+        self.warned.extend(nexts.warnings.into_iter().map(|warnings| (at, warnings)));
+        let shows = self.product.shows(&state);
         for (place, next) in nexts.all.into_iter().enumerate() {
             let place = u32::try_from(place).ok();
             if let Some(deep) = next.deep.0 {
@@ -224,11 +248,12 @@ impl Graph<'_, '_> {
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let again = state.stopping && self.product.is_first_or_last(next.by);
             let dropped = matches!(next.by, Move::Dropped(_));
+            let shown = shows.shows(self.product, &state, &next);
             let (mut next, class) = self.abstracted(next, so_far);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
-            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again, dropped });
+            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again, dropped, shown });
         }
     }
 
@@ -268,68 +293,6 @@ impl Graph<'_, '_> {
         state.safe.retain(|request| request.requester != Requester::Operator);
         state.flight.clear();
         (state, failed.max(Failed::Undo))
-    }
-
-    /// The shortest way to a state on which nothing worse fails than on the best one.
-    pub fn trace(&mut self, at: u32) -> Vec<TraceStep> {
-        let mut edges = Vec::new();
-        let mut to = at;
-        let class = self.failed[at as usize];
-        self.find_ways(class);
-        let ways = &self.ways[&class];
-        while ways[to as usize] != NOWHERE {
-            let edge = self.edges[ways[to as usize] as usize];
-            edges.push(edge);
-            to = edge.from;
-        }
-        edges.reverse();
-        let start =
-            TraceStep { what: Happened::Start, states: self.places(&self.states[0]), replay: Replay::default() };
-        let mut way: Vec<(u32, Next)> = Vec::with_capacity(edges.len());
-        for edge in &edges {
-            let next = edge.place.and_then(|place| self.nexts(edge.from).all.into_iter().nth(place as usize));
-            let round = || Next::plain(Move::Rounds, self.states[edge.to as usize].clone(), Failed::Nothing);
-            let next = next.unwrap_or_else(round);
-            way.push((edge.from, Next { state: self.states[edge.to as usize].clone(), ..next }));
-        }
-        let pairs: Vec<(&State, &Next)> = way.iter().map(|(from, next)| (&self.states[*from as usize], next)).collect();
-        let replays = self.product.replay(&pairs);
-        let told = way.iter().zip(replays).map(|((_, next), replay)| TraceStep {
-            what: self.product.told(next),
-            states: self.product.places(&next.state),
-            replay,
-        });
-        std::iter::once(start).chain(told).collect()
-    }
-
-    fn find_ways(&mut self, class: Failed) {
-        if self.ways.contains_key(&class) {
-            return;
-        }
-        let mut out: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); self.states.len()];
-        for (number, edge) in (0u32..).zip(&self.edges) {
-            if edge.failed <= class {
-                out[edge.from as usize].push(number);
-            }
-        }
-        let mut by = vec![NOWHERE; self.states.len()];
-        let mut seen = vec![false; self.states.len()];
-        let mut queue: VecDeque<u32> = VecDeque::from([0]);
-        seen[0] = true;
-        while let Some(at) = queue.pop_front() {
-            for number in &out[at as usize] {
-                let to = self.edges[*number as usize].to;
-                if !std::mem::replace(&mut seen[to as usize], true) {
-                    by[to as usize] = *number;
-                    queue.push_back(to);
-                }
-            }
-        }
-        self.ways.insert(class, by);
-    }
-
-    fn places(&self, state: &State) -> Vec<Place> {
-        self.product.places(state)
     }
 
     /// The states, those with the least failing and the shortest ways first.

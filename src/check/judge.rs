@@ -3,7 +3,7 @@
 use super::coordinator::{answers, place};
 use super::explore::Graph;
 use super::reactions::triggers;
-use super::state::{Failed, State, Trouble};
+use super::state::{Failed, Move, Next, State, Trouble};
 use super::trace::TraceStep;
 use crate::model::codes::{
     COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD, COORD_STACK_GROWS,
@@ -36,26 +36,40 @@ impl Graph<'_, '_> {
         self.leftovers(&mut found);
         self.ways_down(&stuck, &mut found);
         self.safety(&mut found);
-        found.extend(self.product.worlds.warnings.iter().cloned().map(|finding| (finding, Vec::new())));
+        self.warned(&mut found);
         found
     }
 
     /// Which of the states comes first, in the order of failing and length.
-    fn firsts<T: Clone>(&self, list: &[(u32, T)]) -> Vec<(u32, T)> {
-        let order = self.in_order();
-        let mut rank = vec![0u32; order.len()];
-        (0u32..).zip(&order).for_each(|(place, at)| rank[*at as usize] = place);
-        let mut list = list.to_vec();
-        list.sort_by_key(|(at, _)| rank[*at as usize]);
+    fn firsts<T>(&mut self, list: Vec<(u32, T)>) -> Vec<(u32, T)> {
+        let order = self.best_first(list.iter().map(|(at, _)| *at).collect());
+        let rank: FxHashMap<u32, usize> = order.into_iter().zip(0..).collect();
+        let mut list = list;
+        list.sort_by_key(|(at, _)| rank[at]);
         list
+    }
+
+    /// What is wrong of one kind, the best way first.
+    fn troubled<T>(&mut self, of: impl Fn(&Trouble) -> Option<T>) -> Vec<(u32, T)> {
+        let list = self.troubles.iter().filter_map(|(at, trouble)| Some((*at, of(trouble)?))).collect();
+        self.firsts(list)
+    }
+
+    /// The first move that follows from a state of which this is so, with that state; none: there is none.
+    pub(super) fn following(&mut self, at: u32, is: impl Fn(&Next) -> bool) -> Vec<(State, Next)> {
+        let next = self.nexts(at).all.into_iter().find(is);
+        next.map(|next| (self.states[at as usize].clone(), next)).into_iter().collect()
     }
 
     fn refusals(&mut self, found: &mut Traced) {
         // What is said of a refusal is told again only where it is worse.
         let mut said: FxHashMap<(Requester, Ask, Code, u32, String), Severity> = FxHashMap::default();
         let mut judged = FxHashSet::default();
-        for (at, trouble) in self.firsts(&self.troubles) {
-            let Trouble::Refused(request, reasons) = trouble else { continue };
+        let refused = |trouble: &Trouble| match trouble {
+            Trouble::Refused(request, reasons) => Some((*request, reasons.clone())),
+            _ => None,
+        };
+        for (at, (request, reasons)) in self.troubled(refused) {
             let Some(first) = reasons.first() else { continue };
             let told = (request.requester, request.ask, first.code, first.origin.0, first.message.clone());
             let (class, world) = (self.failed[at as usize], self.states[at as usize].world);
@@ -154,8 +168,11 @@ impl Graph<'_, '_> {
     /// What can only fail, since what it stands for is false where it is applied.
     fn hollow(&mut self, found: &mut Traced) {
         let mut said: FxHashSet<ConfigId> = FxHashSet::default();
-        for (at, trouble) in self.firsts(&self.troubles) {
-            let Trouble::Hollow(request, reasons) = trouble else { continue };
+        let hollow = |trouble: &Trouble| match trouble {
+            Trouble::Hollow(request, reasons) => Some((*request, reasons.clone())),
+            _ => None,
+        };
+        for (at, (request, reasons)) in self.troubled(hollow) {
             let (Ask::Apply(id), Some(reason)) = (request.ask, reasons.first()) else { continue };
             if !said.insert(id) {
                 continue;
@@ -292,12 +309,13 @@ impl Graph<'_, '_> {
     /// Configurations that are applied again and again.
     fn growing(&mut self, found: &mut Traced) {
         let mut said: FxHashSet<ConfigId> = FxHashSet::default();
-        for (at, id) in self.firsts(&self.deep) {
+        for (at, id) in self.firsts(self.deep.clone()) {
             if !said.insert(id) {
                 continue;
             }
             let origin = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
-            let trace = self.trace(at);
+            let pushes = self.following(at, |next| next.deep.0 == Some(id));
+            let trace = self.trace_on(at, pushes);
             let undo = Ask::UndoOf(id);
             let not_undone = [undo.failed().event(undo), undo.broken().event(undo)];
             let failed =
@@ -333,8 +351,14 @@ impl Graph<'_, '_> {
     /// What is lost, or taken back unconfirmed, and nobody hears.
     fn unheard(&mut self, found: &mut Traced) {
         let mut said: FxHashSet<(ConfigId, Verdict)> = FxHashSet::default();
-        for (at, trouble) in self.firsts(&self.troubles) {
-            let Trouble::Unheard(id, verdict) = trouble else { continue };
+        let unheard = |trouble: &Trouble| match trouble {
+            Trouble::Unheard(id, verdict) => Some((*id, *verdict)),
+            _ => None,
+        };
+        let mut list = self.troubled(unheard);
+        // Where nothing is under way it comes without waiting for anything.
+        list.sort_by_key(|(at, _)| (self.failed[*at as usize], !self.states[*at as usize].desk.is_empty()));
+        for (at, (id, verdict)) in list {
             if !said.insert((id, verdict)) {
                 continue;
             }
@@ -354,8 +378,29 @@ impl Graph<'_, '_> {
                 .labelled(what)
                 .path(format!("configurations.{id}"))
                 .help(format!("add a transition on `{event}` to a state around all in which `{id}` {doubt}"));
-            let trace = self.trace(at);
+            let told = self.following(at, |next| {
+                let told = |(request, given): &(Request, Verdict)| (request.ask, *given) == (Ask::Apply(id), verdict);
+                next.by == Move::Lost(id) && verdict == Verdict::Lost || next.answers.iter().any(told)
+            });
+            let trace = self.trace_on(at, told);
             found.push((finding, trace));
+        }
+    }
+
+    /// What planning warns of, where that is asked for and done.
+    fn warned(&mut self, found: &mut Traced) {
+        let mut said: FxHashSet<(Code, u32, String, String)> = FxHashSet::default();
+        for (at, warnings) in self.firsts(self.warned.clone()) {
+            for warning in warnings.iter() {
+                let place = (warning.code, warning.origin.0, warning.path.clone(), warning.message.clone());
+                if said.insert(place) {
+                    let done = self.following(at, |next| {
+                        next.failed == Failed::Nothing && next.answers.iter().any(|(_, verdict)| verdict.is_success())
+                    });
+                    let trace = self.trace_on(at, done);
+                    found.push((warning.clone(), trace));
+                }
+            }
         }
     }
 
@@ -365,21 +410,26 @@ impl Graph<'_, '_> {
         self.edges.iter().filter(|edge| !edge.dropped).for_each(|edge| leads_on[edge.from as usize] = true);
         let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
         let mut stuck = FxHashSet::default();
-        let mut told: FxHashSet<Vec<NodeId>> = FxHashSet::default();
         for at in self.in_order() {
             let state = &self.states[at as usize];
             let known = self.product.worlds.top(state.world).is_none();
             let over = self.product.is_down(state) || self.ends.contains(&at) || troubled.contains(&at);
-            if leads_on[at as usize] || !self.followed[at as usize] || over || !known {
-                continue;
+            if !leads_on[at as usize] && self.followed[at as usize] && !over && known {
+                stuck.insert(at);
             }
-            stuck.insert(at);
-            if self.product.members.len() > 1 || !told.insert(state.leaves.to_vec()) {
-                continue;
+        }
+        if self.product.members.len() > 1 {
+            return stuck;
+        }
+        let mut told: FxHashSet<Vec<NodeId>> = FxHashSet::default();
+        for at in self.best_first(stuck.iter().copied().collect()) {
+            let leaves = self.states[at as usize].leaves.to_vec();
+            let leaf = leaves[0];
+            if told.insert(leaves) {
+                let finding = self.nothing_leads_on(leaf);
+                let trace = self.trace(at);
+                found.push((finding, trace));
             }
-            let finding = self.nothing_leads_on(state.leaves[0]);
-            let trace = self.trace(at);
-            found.push((finding, trace));
         }
         stuck
     }

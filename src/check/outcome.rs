@@ -57,6 +57,8 @@ pub struct Comes {
     pub refused: Vec<(usize, Rc<Findings>)>,
     /// Those that can only fail, since what they stand for is false when all is done.
     pub hollow: Vec<(usize, Rc<Findings>)>,
+    /// What planning warns of, if of anything.
+    pub warnings: Option<Rc<Findings>>,
     /// Of each part of the group, whether something in it can fail.
     pub can_fail: SmallVec<[bool; 2]>,
     /// When all is done.

@@ -5,48 +5,24 @@
 //! several of them has a slow step as long. What has no step takes no time: a way on which such a batch is still under way
 //! when something else happens is gone in another order, and a script that replays it fails there.
 
+use super::loss::Loss;
 use super::outcome::Beside;
 use super::product::Product;
-use super::stands::takes_time;
+use super::shows::{answered, races, same, too_late, under_way};
+use super::stands::stands_after;
 use super::state::{Move, Next, State};
+use super::trace::{Does, Replay};
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
-use crate::stack::{Request, Why};
+use crate::stack::Request;
 use crate::statechart::EventId;
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::time::Duration;
 
-/// What a move of a way needs.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Replay {
-    /// When it happens, from the beginning.
-    pub at: Duration,
-    /// What is armed before it: the text of a step, how it goes, and how long it takes.
-    pub arms: Vec<(String, FaultKind, Duration)>,
-    /// What is to be done for it.
-    pub does: Does,
-    /// At the end of a way: an answer that comes there within that time, without being part of it.
-    pub then: Option<(EventName, Duration)>,
-    /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
-    pub passes: bool,
-    /// Answers that may be others, and lead to the same: what was given up and has nothing to do may be through before.
-    pub either: SmallVec<[EventName; 1]>,
-}
-
-/// What is to be done for a move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Does {
-    /// It comes by itself.
-    #[default]
-    Nothing,
-    /// This event is raised.
-    Raise(EventName),
-    /// An operator asks for this.
-    Ask(Ask),
-    /// No script brings it about, and why.
-    Cannot(&'static str),
-}
+/// For moves of a way: what is raised with them, for which coordinators alone, and whether that is later than what comes before.
+type Split = FxHashMap<usize, (EventName, Vec<String>, bool)>;
 
 /// A batch that begins on a way.
 struct Begun {
@@ -63,15 +39,14 @@ impl Product<'_> {
     /// What each move of a way needs. `way` has the state before each move.
     pub fn replay(&self, way: &[(&State, &Next)]) -> Vec<Replay> {
         let begun = self.begun(way);
-        let times = self.times(way, &begun);
+        let split = self.split(way);
+        let times = self.times(way, &begun, &split);
         let mut all: Vec<Replay> = (way.iter().zip(&times))
-            .map(|((_, next), at)| Replay {
+            .enumerate()
+            .map(|(k, ((before, next), at))| Replay {
                 at: *at,
-                arms: Vec::new(),
-                does: self.does(next),
-                then: None,
-                passes: false,
-                either: SmallVec::new(),
+                does: self.does(&way[..k], before, next),
+                ..Replay::default()
             })
             .collect();
         // What comes at the instant of something else is armed before that.
@@ -83,24 +58,39 @@ impl Product<'_> {
             if before.safe.is_empty() && !before.interrupted.is_empty() && next.by != Move::Answer {
                 all[k].does = Does::Cannot("what was interrupted goes back at once");
             }
+            let reverted = next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted);
+            if reverted && !before.desk.is_empty() {
+                all[k].does = Does::Cannot("what is taken back unconfirmed may have to wait for what is under way");
+            }
             if let Move::Time(number, event) = next.by
                 && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
             {
                 all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
             }
-            let stands = |(request, verdict): &(Request, Verdict)| match request.ask {
-                Ask::Apply(id) if *verdict == Verdict::Ok => self.worlds.configuration(id).is_some_and(takes_time),
-                _ => false,
-            };
-            if next.answers.iter().any(stands) {
-                all[k].does = Does::Cannot("what it stands for becomes true only with time");
+            if self.stands_after(next).is_none() {
+                all[k].does = Does::Cannot("what it stands for never becomes true there");
             }
             if next.by == Move::Answer && self.worlds.top(before.world).is_some() {
                 all[k].does = Does::Cannot("what is there is not known any more");
             }
         }
-        for k in (0..way.len()).filter(|k| own_time(*k) && !way[*k].0.inbox.is_empty()) {
-            all[k].does = Does::Cannot("coordinators hear at different times of one event");
+        for replay in all.iter_mut().filter(|replay| replay.does == Does::OthersDown) {
+            let members = || self.members.iter().map(|member| member.name);
+            let others = self.deployment.coordinators.iter().filter(|c| !members().any(|name| name == c.name));
+            replay.others = others.map(|other| format!("{}:{}", other.name, other.down)).collect();
+        }
+        for k in (0..way.len()).filter(|k| own_time(*k) && self.is_told_between(way[*k].0)) {
+            all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
+        }
+        for (k, (event, to, later)) in split {
+            if let (Move::Taken(number, _), true) = (way[k].1.by, later)
+                && way[k].0.inbox.iter().filter(|(to, _)| *to == number).count() > 1
+            {
+                all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
+                continue;
+            }
+            all[k].does = if to.is_empty() { Does::Nothing } else { Does::RaiseTo(event) };
+            all[k].others = to;
         }
         if let Some(end) = all.last_mut() {
             end.passes = begun.iter().any(|batch| batch.idle && batch.over.is_none());
@@ -122,8 +112,11 @@ impl Product<'_> {
             // At the end of the way it may have become one that is refused.
             let begins = &way[batch.at].1.state;
             let state = batch.over.map_or(&way[way.len() - 1].1.state, |_| begins);
-            match self.arms(state, &batch.requests, answers, until.saturating_sub(times[batch.at])) {
-                Ok(arms) => {
+            let stands = batch.over.and_then(|at| self.stands_after(way[at].1)).unwrap_or_default();
+            let takes = until.saturating_sub(times[batch.at]).saturating_sub(stands);
+            match self.arms(state, &batch.requests, answers, takes) {
+                Ok(mut arms) => {
+                    arms.extend(batch.over.and_then(|at| self.lie(way, at, state, batch)));
                     let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);
                     all[armed].arms.extend(arms);
                 }
@@ -141,20 +134,68 @@ impl Product<'_> {
         !heard && self.worlds.configuration(id).is_some_and(|c| c.group.is_none())
     }
 
+    /// Whether an event from another coordinator, or of a loss, is on its way to one: that nobody holds up.
+    pub(super) fn is_told_between(&self, state: &State) -> bool {
+        state.inbox.iter().any(|(to, event)| {
+            let name = self.members[usize::from(*to)].name_of(*event);
+            !name.is_some_and(|name| self.outside.contains(&name))
+        })
+    }
+
+    /// Where an event from outside has to be raised for each coordinator alone, since they do not hear of it one after the
+    /// other and before anything else happens.
+    fn split(&self, way: &[(&State, &Next)]) -> Split {
+        let mut split = Split::default();
+        for (k, (_, next)) in way.iter().enumerate() {
+            let Move::Event(at) = next.by else { continue };
+            let name = self.outside[usize::from(at)];
+            let inbox = next.state.inbox.iter();
+            let lies = inbox.filter(|(to, event)| self.members[usize::from(*to)].name_of(*event) == Some(name));
+            let waits: Vec<u8> = lies.map(|(to, _)| *to).collect();
+            let mut taken: Vec<(usize, u8)> = Vec::new();
+            for (j, (_, next)) in way.iter().enumerate().skip(k + 1) {
+                match next.by {
+                    Move::Event(_) => break,
+                    Move::Taken(number, event) if self.members[usize::from(number)].name_of(event) == Some(name) => {
+                        taken.push((j, number));
+                    }
+                    _ => {}
+                }
+            }
+            let in_order = taken.iter().map(|(_, number)| number).is_sorted();
+            let at_once = taken.iter().zip(k + 1..).all(|((j, _), place)| *j == place);
+            if waits.is_empty() || in_order && at_once && taken.len() == waits.len() {
+                continue;
+            }
+            let waiting = |name| waits.iter().any(|number| self.members[usize::from(*number)].name == name);
+            let others = self.deployment.coordinators.iter().filter(|c| !waiting(c.name));
+            split.insert(k, (name, others.map(|c| c.name.to_string()).collect(), false));
+            let mut before = k;
+            for (j, number) in taken {
+                let to = vec![self.members[usize::from(number)].name.to_string()];
+                split.insert(j, (name, to, j > before + 1));
+                before = j;
+            }
+        }
+        split
+    }
+
     /// When each move happens.
-    fn times(&self, way: &[(&State, &Next)], begun: &[Begun]) -> Vec<Duration> {
+    fn times(&self, way: &[(&State, &Next)], begun: &[Begun], split: &Split) -> Vec<Duration> {
         let mut times: Vec<Duration> = Vec::with_capacity(way.len());
         for (k, (_, next)) in way.iter().enumerate() {
             let before = times.last().copied().unwrap_or_default();
             let of = |request: &Request| begun.iter().find(|b| b.over == Some(k) && b.requests.contains(request));
             let at_once = match next.by {
-                Move::Taken(..) => true,
+                Move::Taken(..) => split.get(&k).is_none_or(|(_, _, later)| !later),
                 Move::Answer => next.answers.iter().all(|(request, _)| of(request).is_none_or(|batch| batch.idle)),
                 _ => false,
             };
             let mut at = if at_once { before } else { before + limits::REPLAY_STEP };
             for (request, verdict) in &next.answers {
+                let stands = self.stands_after(next).filter(|stands| !stands.is_zero());
                 let since = match verdict {
+                    Verdict::Ok => of(request).and_then(|b| Some(*times.get(b.at)? + stands?)),
                     Verdict::Reverted => self.applied_at(way, &times, k, request.ask),
                     // Nobody knows what became of a call until its time is over.
                     Verdict::Broken | Verdict::UndoBroken => {
@@ -163,6 +204,11 @@ impl Product<'_> {
                     _ => None,
                 };
                 at = at.max(since.map_or(at, |since| since + limits::REPLAY_STEP));
+            }
+            if let Move::Lost(id) = next.by
+                && self.loss(way[k].0, id) == Some(Loss::Lie)
+            {
+                at += limits::OBSERVE_EVERY;
             }
             if let Move::Time(number, event) = next.by {
                 at = at.max(self.time_due(&way[..k], &times, usize::from(number), event));
@@ -252,7 +298,46 @@ impl Product<'_> {
         Ok(arms)
     }
 
-    fn does(&self, next: &Next) -> Does {
+    /// How long after its last step what a move answers *ok* stands; none: it does not.
+    fn stands_after(&self, next: &Next) -> Option<Duration> {
+        let mut after = Duration::ZERO;
+        for (request, verdict) in &next.answers {
+            if let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict)
+                && let Some(configuration) = self.worlds.configuration(id).filter(|c| c.holds.is_some())
+                && let Some(world) = self.worlds.get(next.state.world)
+            {
+                after = after.max(stands_after(self.deployment, configuration, &world.system)?);
+            }
+        }
+        Some(after)
+    }
+
+    /// What a batch says to have done and has not, where something it applies is lost for that later.
+    fn lie(
+        &self,
+        way: &[(&State, &Next)],
+        over: usize,
+        state: &State,
+        batch: &Begun,
+    ) -> Option<(String, FaultKind, Duration)> {
+        let ok = |next: &Next, id: ConfigId| {
+            next.answers.iter().any(|(request, verdict)| request.ask == Ask::Apply(id) && *verdict == Verdict::Ok)
+        };
+        let lost = |k: usize| match way[k].1.by {
+            Move::Lost(id) if self.loss(way[k].0, id) == Some(Loss::Lie) => Some(id),
+            _ => None,
+        };
+        let id = (over + 1..way.len()).filter_map(lost).find(|id| ok(way[over].1, *id))?;
+        let group = self.worlds.group(state.world, &batch.requests, &Beside::default())?;
+        let planned = group.planned.as_ref()?;
+        let place = batch.requests.iter().position(|request| request.ask == Ask::Apply(id))?;
+        let part = group.places.iter().position(|of| *of == place)?;
+        let steps = (0..planned.steps.len()).rev().filter(|at| planned.part_of(planned.place(*at)) == part);
+        let mut seen = steps.map(|at| &planned.steps[at].step).filter(|step| !matches!(step, Step::Operation(_)));
+        seen.next().map(|step| (pattern(step), FaultKind::Lie, Duration::ZERO))
+    }
+
+    fn does(&self, way: &[(&State, &Next)], before: &State, next: &Next) -> Does {
         if !next.state.flight.is_empty() {
             return Does::Cannot("an answer comes while what would stop it is on its way");
         }
@@ -263,11 +348,30 @@ impl Product<'_> {
                 None => Does::Nothing,
             },
             Move::Operator(ask) => Does::Ask(ask),
-            Move::Lost(_) => Does::Cannot("what a configuration stands for is lost by what components do"),
+            Move::Lost(id) => {
+                let told = Verdict::Lost.event(Ask::Apply(id));
+                match self.loss(before, id) {
+                    Some(Loss::Fails(component)) => Does::Fail(component, told),
+                    Some(Loss::Lie) => Does::Hear(told),
+                    None => Does::Cannot("what it stands for cannot be lost alone"),
+                }
+            }
             Move::Rounds => Does::Cannot("the same happens again and again, until frames are squashed"),
-            Move::OthersDown => Does::Cannot("other coordinators go down"),
+            Move::OthersDown if self.was_ended(way) => Does::OthersDown,
+            Move::OthersDown => Does::Cannot("nobody has told the other coordinators to come down"),
             Move::Time(..) | Move::Taken(..) | Move::Answer => Does::Nothing,
         }
+    }
+
+    /// Whether the event that ends the deployment has come since it was last wanted up.
+    fn was_ended(&self, way: &[(&State, &Next)]) -> bool {
+        let last = way.iter().rev().find_map(|(_, next)| match next.by {
+            Move::Event(at) | Move::Dropped(at) if self.is_first_or_last(Move::Event(at)) => {
+                Some(self.outside[usize::from(at)])
+            }
+            _ => None,
+        });
+        last == Some(self.deployment.shutdown.event)
     }
 
     /// When the frame whose confirmation did not come is taken back.
@@ -302,64 +406,7 @@ fn pattern(step: &Step) -> String {
     text[..end].trim_end().to_owned()
 }
 
-/// The requests of each batch under way, and each safe configuration that is being applied.
-fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
-    let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
-    batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
-}
-
-/// Whether an undo came too late to give up what is still under way: it waits for it.
-fn too_late(state: &State) -> bool {
-    let waits = |undo: &Request| {
-        let of = |batch: SmallVec<[Request; 2]>| crate::stack::given_up_of(undo, &batch).is_some();
-        under_way(state).into_iter().any(of)
-    };
-    state.desk.waiting().flat_map(|batch| &batch.requests).any(waits)
-}
-
-/// Whether what is stopped is through all the same, or what was under way turns out not to have begun.
-fn races(before: &State, next: &Next) -> bool {
-    let through = |(request, verdict): &(Request, Verdict)| {
-        let of = before.desk.under_way().iter().find(|turn| turn.batch.requests.contains(request));
-        verdict.is_success() && of.is_some_and(|turn| before.is_stopped(turn.number))
-    };
-    let back = |requests: &SmallVec<[Request; 2]>| {
-        let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
-        waits && !under_way(&next.state).iter().any(|other| same(other, requests))
-    };
-    // Or only some of it had begun: what is left of it begins anew.
-    let shrinks = |requests: &SmallVec<[Request; 2]>| {
-        let within = |other: &SmallVec<[Request; 2]>| {
-            let known = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
-            other.len() < requests.len() && other.iter().all(known)
-        };
-        next.answers.is_empty() && under_way(&next.state).iter().any(within)
-    };
-    // Or nothing of it had, and what came has cancelled it.
-    let cancelled = |requests: &SmallVec<[Request; 2]>| {
-        let of = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
-        let goes_on = under_way(&next.state).iter().flatten().any(of);
-        !goes_on && !next.answers.iter().any(|(request, _)| of(request)) && requests[0].why == Why::Asked
-    };
-    let stops = |requests| back(requests) || shrinks(requests) || cancelled(requests);
-    next.answers.iter().any(through) || under_way(before).iter().any(stops)
-}
-
 /// Whether this answer says that a request of the batch was given up.
 fn cancels(batch: &Begun, request: &Request, verdict: Verdict) -> bool {
     verdict == Verdict::Cancelled && batch.requests.iter().any(|own| own.ask == request.ask)
-}
-
-/// Whether a move answers all of a batch.
-fn answered(next: &Next, batch: &[Request]) -> bool {
-    let is = |request: &Request| {
-        next.answers.iter().any(|(other, _)| (other.ask, other.requester) == (request.ask, request.requester))
-    };
-    batch.iter().all(is)
-}
-
-/// Whether two lists ask for the same.
-fn same(a: &[Request], b: &[Request]) -> bool {
-    let what = |request: &Request| (request.ask, request.requester);
-    a.iter().map(what).eq(b.iter().map(what))
 }

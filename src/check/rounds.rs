@@ -178,7 +178,11 @@ impl Graph<'_, '_> {
         state.unconfirmed.clear();
         let (failed, depth) = (self.failed[at as usize].max(worst), self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
-        self.edges.push(Edge { from: at, to, place: None, failed: worst, quiet: false, again: false, dropped: false });
+        let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
+        self.rounds.insert(number, circle.to_vec());
+        let shown = circle.iter().all(|edge| self.edges[*edge as usize].shown);
+        let edge = Edge { from: at, to, place: None, failed: worst, quiet: false, again: false, dropped: false, shown };
+        self.edges.push(edge);
         true
     }
 }

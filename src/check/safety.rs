@@ -4,7 +4,7 @@ use super::coordinator::outside_events;
 use super::explore::Graph;
 use super::judge::Traced;
 use super::product::Product;
-use super::state::{Move, State};
+use super::state::{Failed, Move, Next, State};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::did_you_mean;
@@ -38,14 +38,14 @@ impl Graph<'_, '_> {
         let events: Vec<_> = self.product.deployment.safety.clone();
         let order = self.in_order();
         // Where nothing comes from outside, it does not matter what came first.
-        let mut walk = Walk { good: FxHashSet::default(), on_the_way: Vec::new() };
-        let mut alike: FxHashMap<usize, (Option<u32>, Vec<String>)> = FxHashMap::default();
+        let mut good: FxHashSet<State> = FxHashSet::default();
+        let mut alike: FxHashMap<usize, (Vec<u32>, Vec<String>)> = FxHashMap::default();
         for (event, origin) in events {
             let mut known: FxHashSet<(Vec<NodeId>, u32)> = FxHashSet::default();
             let class =
                 self.product.outside.iter().position(|outside| *outside == event).map(|at| self.product.alike[at]);
             let said = class.and_then(|class| alike.get(&class).cloned());
-            let (mut first, mut places) = said.clone().unwrap_or_default();
+            let (mut bad, mut places) = said.clone().unwrap_or_default();
             for at in order.iter().filter(|_| said.is_none()) {
                 let state = &self.states[*at as usize];
                 let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_empty());
@@ -57,17 +57,17 @@ impl Graph<'_, '_> {
                 if state.desk.is_empty() && !known.insert((state.leaves.to_vec(), world)) {
                     continue;
                 }
-                if leads_to_safe(self.product, &state, event, &mut walk) {
+                if leads_elsewhere(self.product, &state, event, &mut good).is_none() {
                     continue;
                 }
-                first.get_or_insert(*at);
+                bad.push(*at);
                 let place = format!("`{}`", self.product.place(&state));
                 if !places.contains(&place) {
                     places.push(place);
                 }
             }
-            class.into_iter().for_each(|class| _ = alike.insert(class, (first, places.clone())));
-            let Some(at) = first else { continue };
+            class.into_iter().for_each(|class| _ = alike.insert(class, (bad.clone(), places.clone())));
+            let Some(at) = self.best_first(bad).first().copied() else { continue };
             let more = places.len().saturating_sub(6);
             places.truncate(6);
             let more = if more > 0 { format!(" and {more} more places") } else { String::new() };
@@ -84,7 +84,9 @@ impl Graph<'_, '_> {
                 "{near}add a transition on `{event}` to a state that asks for a `safe` configuration on its entry; one from the \
                  outermost state in which actuators exist serves for all inside"
             ));
-            let trace = self.trace(at);
+            let state = self.states[at as usize].clone();
+            let on = leads_elsewhere(self.product, &state, event, &mut good).unwrap_or_default();
+            let trace = self.trace_on(at, on);
             found.push((finding, trace));
         }
     }
@@ -99,10 +101,16 @@ fn is_asked(product: &Product<'_>, state: &State) -> bool {
     product.worlds.is_safe(state.world) || !state.safe.is_empty() || in_flight
 }
 
-/// Whether `event` leads to a safe configuration from this state on every way on which nothing else comes from outside.
-fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName, walk: &mut Walk) -> bool {
+/// A way on which `event` does not lead to a safe configuration from this state, though nothing else comes from outside; none:
+/// on each it does. `good` are states from which every such way does.
+fn leads_elsewhere(
+    product: &mut Product<'_>,
+    state: &State,
+    event: EventName,
+    good: &mut FxHashSet<State>,
+) -> Option<Vec<(State, Next)>> {
     if is_asked(product, state) {
-        return true;
+        return None;
     }
     let mut after = vec![state.clone()];
     for number in 0..product.members.len() {
@@ -111,34 +119,53 @@ fn leads_to_safe(product: &mut Product<'_>, state: &State, event: EventName, wal
             after = after.into_iter().flat_map(|state| product.react(state, number, id)).collect();
         }
     }
-    after.iter().all(|state| walk.leads(product, state))
+    // What nobody waits for anywhere is no move.
+    let at = product.outside.iter().position(|name| *name == event).and_then(|at| u16::try_from(at).ok());
+    let mut walk = Walk { good, begins: usize::from(at.is_some()), way: Vec::new() };
+    for after in after {
+        let begins = at.map(|at| (state.clone(), Next::plain(Move::Event(at), after.clone(), Failed::Nothing)));
+        walk.way.extend(begins);
+        if !walk.leads(product, &after) {
+            return Some(walk.way);
+        }
+        walk.way.clear();
+    }
+    None
 }
 
 /// Ways on which nothing comes from outside.
-struct Walk {
-    good: FxHashSet<State>,
-    on_the_way: Vec<State>,
+struct Walk<'g> {
+    good: &'g mut FxHashSet<State>,
+    /// So many moves come from outside, at the beginning.
+    begins: usize,
+    /// The moves so far, each with the state before it.
+    way: Vec<(State, Next)>,
 }
 
-impl Walk {
-    /// Whether every way from here comes to a safe configuration.
+impl Walk<'_> {
+    /// Whether every way from here comes to a safe configuration; else `way` is one that does not.
     fn leads(&mut self, product: &mut Product<'_>, state: &State) -> bool {
         if is_asked(product, state) || self.good.contains(state) {
             return true;
         }
         // Round and round, or too far to be an answer to an emergency.
-        if self.on_the_way.len() >= limits::CHECK_CIRCLE || self.on_the_way.contains(state) {
+        if self.way.len() > limits::CHECK_CIRCLE || self.way.iter().skip(self.begins).any(|(before, _)| before == state)
+        {
             return false;
         }
         let own = |by: &Move| matches!(by, Move::Answer | Move::Taken(..) | Move::Time(..));
-        let next: Vec<State> =
-            product.nexts(state).all.into_iter().filter(|next| own(&next.by)).map(|next| next.state).collect();
-        self.on_the_way.push(state.clone());
-        let leads = !next.is_empty() && next.iter().all(|next| self.leads(product, next));
-        self.on_the_way.pop();
-        if leads {
-            self.good.insert(state.clone());
+        let nexts: Vec<Next> = product.nexts(state).all.into_iter().filter(|next| own(&next.by)).collect();
+        if nexts.is_empty() {
+            return false;
         }
-        leads
+        for next in nexts {
+            self.way.push((state.clone(), next.clone()));
+            if !self.leads(product, &next.state) {
+                return false;
+            }
+            self.way.pop();
+        }
+        self.good.insert(state.clone());
+        true
     }
 }

@@ -59,7 +59,7 @@ pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> FxHashSet<ConfigId>
 pub fn never(deployment: &Deployment, configuration: &Configuration, system: &System) -> Option<Finding> {
     let holds = configuration.holds.as_ref()?;
     let patience = configuration.timeout.unwrap_or(deployment.limits.step_timeout);
-    if comes_true(&favoured(holds, true), system, patience) {
+    if comes_true(&favoured(holds, true), system, patience).is_some() {
         return None;
     }
     let mut named: BTreeSet<ComponentName> = BTreeSet::new();
@@ -82,8 +82,8 @@ pub fn never(deployment: &Deployment, configuration: &Configuration, system: &Sy
     )
 }
 
-/// Whether a condition becomes true within that time, nothing changing.
-fn comes_true(condition: &Condition, system: &System, patience: Duration) -> bool {
+/// After what time a condition is true, nothing changing; none: not within so long.
+fn comes_true(condition: &Condition, system: &System, patience: Duration) -> Option<Duration> {
     let mut now = Time::default();
     let until = now + patience;
     let mut bank = Bank::alone(condition, now);
@@ -104,15 +104,15 @@ fn comes_true(condition: &Condition, system: &System, patience: Duration) -> boo
     for _ in 0..limits::CHECK_STANDS {
         bank.step(now, &mut |input| samples[input], &mut |_, _| {});
         if bank.is_true(0) == Some(true) {
-            return true;
+            return Some(now.since(Time::default()));
         }
         match bank.next_wake() {
             Some(wake) if wake <= until => now = wake.max(now + Duration::from_nanos(1)),
-            _ => return false,
+            _ => return None,
         }
     }
     // Nobody knows.
-    true
+    Some(Duration::ZERO)
 }
 
 /// The condition where what is not known speaks for it (or, `so` being false, against it).
@@ -142,14 +142,14 @@ fn favoured(condition: &Condition, so: bool) -> Condition {
     Condition { kind, origin: condition.origin }
 }
 
-/// Whether time must pass before what a configuration stands for can be true.
-pub fn takes_time(configuration: &Configuration) -> bool {
-    use ConditionKind as K;
-    let mut takes = false;
-    let over_time =
-        |kind: &K| matches!(kind, K::Once { .. } | K::Historically { .. } | K::Since { .. } | K::ForAtLeast { .. });
-    configuration.holds.iter().for_each(|holds| holds.for_each(&mut |part| takes |= over_time(&part.kind)));
-    takes
+/// How long after its last step a configuration stands on the simulated platform, in a system as it has left it; none: it does
+/// not. What the platform does not show counts as true.
+pub fn stands_after(deployment: &Deployment, configuration: &Configuration, system: &System) -> Option<Duration> {
+    let Some(holds) = &configuration.holds else { return Some(Duration::ZERO) };
+    if !is_known(holds) {
+        return Some(Duration::ZERO);
+    }
+    comes_true(holds, system, configuration.timeout.unwrap_or(deployment.limits.step_timeout))
 }
 
 /// Whether it rests on run states alone.
@@ -181,7 +181,8 @@ mod tests {
         let both = |a, b| of(K::All(vec![a, b]));
         let implies = |a, b| of(K::Implies(Box::new(a), Box::new(b)));
         let system = System::new(Arc::new(Catalogue::default()));
-        let may = |condition: &Condition| comes_true(&favoured(condition, true), &system, Duration::from_secs(1));
+        let may =
+            |condition: &Condition| comes_true(&favoured(condition, true), &system, Duration::from_secs(1)).is_some();
         for open in [port(), no(port()), implies(port(), runs()), no(both(port(), no(runs()))), implies(runs(), runs())]
         {
             assert!(may(&open), "{open:?}");

@@ -193,6 +193,8 @@ pub struct Nexts {
     pub all: Vec<Next>,
     /// What is wrong.
     pub troubles: Vec<Trouble>,
+    /// What planning warns of.
+    pub warnings: Vec<Rc<Findings>>,
     /// Events were heard here and not followed, since too many requests wait.
     pub cut: bool,
 }

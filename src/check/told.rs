@@ -1,9 +1,11 @@
 //! Moves and places as they are told.
 
+use super::arrive::is_for_somebody;
 use super::product::Product;
 use super::state::{Move, Next, State};
-use super::trace::{Answered, Happened, Place};
-use crate::model::Ask;
+use super::trace::{Answered, Happened, Hears, Place};
+use crate::model::{Ask, EventName, Verdict};
+use crate::statechart::EventId;
 
 impl Product<'_> {
     /// Where all coordinators are.
@@ -30,6 +32,51 @@ impl Product<'_> {
         };
         let places = self.places(state).into_iter().enumerate().filter(|(number, _)| numbers.contains(number));
         places.map(|(_, place)| told(place)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// What coordinators hear with a move, in order. Where several hear of one thing, each hears it when it takes it.
+    pub fn hears(&mut self, before: &State, next: &Next) -> Vec<Hears> {
+        let mut heard: Vec<(usize, EventId)> = Vec::new();
+        let all = |name: EventName| {
+            let charts = self.members.iter().map(|member| member.chart.event(name)).enumerate();
+            charts.filter(|(_, event)| *event != EventId::OTHER).collect::<Vec<_>>()
+        };
+        // Of what lies in inboxes each hears when it takes it.
+        let lies = |name: EventName| {
+            let is = |(to, event): &(u8, EventId)| self.members[usize::from(*to)].name_of(*event) == Some(name);
+            next.state.inbox.iter().any(is)
+        };
+        let at_once = |name: EventName| if lies(name) { Vec::new() } else { all(name) };
+        match next.by {
+            Move::Event(at) | Move::Dropped(at) => heard = at_once(self.outside[usize::from(at)]),
+            Move::Lost(id) => heard = at_once(Verdict::Lost.event(Ask::Apply(id))),
+            Move::Time(number, event) | Move::Taken(number, event) => heard.push((usize::from(number), event)),
+            Move::Answer => {
+                // Whose state is left by what is heard before hears no more.
+                let mut leaves = before.leaves.clone();
+                let mut left: Vec<(usize, u64)> = Vec::new();
+                for (request, verdict) in &next.answers {
+                    let Some(number) = self.member(request.requester) else { continue };
+                    let event = self.members[number].chart.event(verdict.event(request.ask));
+                    let owner = request.tag.0.checked_sub(1);
+                    let gone = owner.is_some_and(|owner| left.contains(&(number, owner)));
+                    if gone || !is_for_somebody(request) || event == EventId::OTHER {
+                        continue;
+                    }
+                    let reaction = self.members[number].react(leaves[number], event);
+                    leaves[number] = reaction.leaf;
+                    left.extend(reaction.left.iter().map(|node| (number, node.index() as u64)));
+                    heard.push((number, event));
+                }
+            }
+            _ => {}
+        }
+        let several = self.members.len() > 1;
+        let told = |(number, event): (usize, EventId)| Hears {
+            coordinator: several.then(|| self.members[number].name.to_string()),
+            event: self.members[number].chart.event_text(event),
+        };
+        heard.into_iter().map(told).collect()
     }
 
     /// A move as it is told.

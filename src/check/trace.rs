@@ -1,9 +1,10 @@
 //! Ways: how the deployment comes from its start to what a finding is about.
 
-use super::replay::Replay;
-use crate::model::Verdict;
+use crate::model::{Ask, ComponentName, EventName, FaultKind, Verdict};
 use serde::Serialize;
+use smallvec::SmallVec;
 use std::fmt;
+use std::time::Duration;
 
 /// One thing that happens on a way.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -13,6 +14,9 @@ pub struct TraceStep {
     pub what: Happened,
     /// The innermost states of the coordinators then, in the order of the deployment.
     pub states: Vec<Place>,
+    /// What coordinators hear then, in order: each is stepped alone by that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hears: Vec<Hears>,
     /// What a script does to bring it about.
     #[serde(skip)]
     pub replay: Replay,
@@ -26,6 +30,16 @@ pub struct Place {
     pub coordinator: Option<String>,
     /// The full name of its innermost state.
     pub state: String,
+}
+
+/// What a coordinator hears.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Hears {
+    /// The coordinator; none: there is only this one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinator: Option<String>,
+    /// The event; a time event comes by itself.
+    pub event: String,
 }
 
 /// What can happen on a way.
@@ -93,6 +107,61 @@ pub struct Answered {
     pub answer: String,
     /// How it ended.
     pub verdict: Verdict,
+}
+
+/// What a move of a way needs.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Replay {
+    /// When it happens, from the beginning.
+    pub at: Duration,
+    /// What is armed before it: the text of a step, how it goes, and how long it takes.
+    pub arms: Vec<(String, FaultKind, Duration)>,
+    /// What is to be done for it.
+    pub does: Does,
+    /// At the end of a way: an answer that comes there within that time, without being part of it.
+    pub then: Option<(EventName, Duration)>,
+    /// At the end of a way: what is asked for there has nothing to do, so that it goes on from there at once.
+    pub passes: bool,
+    /// Answers that may be others, and lead to the same: what was given up and has nothing to do may be through before.
+    pub either: SmallVec<[EventName; 1]>,
+    /// A circle is gone round.
+    pub again: Option<Again>,
+    /// For which coordinators alone something is raised; or where those that are not followed with these are to be, each with
+    /// its name before it.
+    pub others: Vec<String>,
+}
+
+/// A circle that is gone round again and again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Again {
+    /// So many times.
+    pub times: usize,
+    /// Of so many moves.
+    pub round: usize,
+    /// The moves of the first rounds, [`REPLAY_ROUNDS`](crate::limits::REPLAY_ROUNDS) at most.
+    pub steps: Vec<TraceStep>,
+}
+
+/// What is to be done for a move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Does {
+    /// It comes by itself.
+    #[default]
+    Nothing,
+    /// This event is raised.
+    Raise(EventName),
+    /// This event is raised for some coordinators alone: others hear of it at another time.
+    RaiseTo(EventName),
+    /// An operator asks for this.
+    Ask(Ask),
+    /// A component fails by itself, and this is told.
+    Fail(ComponentName, EventName),
+    /// Nothing: it comes by itself that this is told.
+    Hear(EventName),
+    /// The coordinators that are not followed with these have come to *down* too, since the event that ends the deployment.
+    OthersDown,
+    /// No script brings it about, and why.
+    Cannot(&'static str),
 }
 
 impl TraceStep {

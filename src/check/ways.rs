@@ -3,9 +3,8 @@
 use super::drive::{self, Way};
 use super::judge::Traced;
 use super::product::Product;
-use super::replay::Replay;
 use super::state::{Next, State};
-use super::trace::{Happened, TraceStep};
+use super::trace::TraceStep;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::{Code, Coordinator, Finding, Severity};
 use crate::system::View;
@@ -47,7 +46,7 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
 }
 
 /// The ways one after the other, as a trace from the start.
-fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
+fn trace(product: &mut Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
     let mut steps = Vec::new();
     let mut pairs: Vec<(&State, &Next)> = Vec::new();
     for way in ways {
@@ -58,15 +57,10 @@ fn trace(product: &Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
         }
     }
     if let Some(first) = ways.first() {
-        let states = product.places(&first.from);
-        steps.push(TraceStep { what: Happened::Start, states, replay: Replay::default() });
+        steps.push(product.begins(&first.from));
     }
     let replays = product.replay(&pairs);
-    steps.extend(pairs.iter().zip(replays).map(|((_, next), replay)| TraceStep {
-        what: product.told(next),
-        states: product.places(&next.state),
-        replay,
-    }));
+    steps.extend(pairs.iter().zip(replays).map(|((before, next), replay)| product.step(before, next, replay)));
     let refused = ways.last().and_then(|way| way.refused.as_ref());
     if let (Some(last), Some((request, reasons))) = (steps.last_mut(), refused) {
         let within = product.fails_within(request.ask, reasons);

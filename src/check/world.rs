@@ -11,7 +11,7 @@ use super::alike::{hash_system, same_system};
 use super::outcome::{Beside, Comes, Held, SafeComes, Went, WorldId};
 use super::shape::{Counted, Shapes, Undone};
 use crate::limits;
-use crate::model::{Ask, Catalogue, Code, ConfigId, Configuration, Deployment, Findings, RequestId};
+use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{Context, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{Effort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
@@ -64,9 +64,6 @@ pub struct Worlds<'a> {
     pub(super) asked: FxHashSet<ConfigId>,
     /// Configurations of which it can be told whether what they stand for is true.
     pub(super) judged: FxHashSet<ConfigId>,
-    /// Warnings of plans, each once.
-    pub warnings: Findings,
-    pub(super) warned: FxHashSet<(Code, u32, String, String)>,
 }
 
 /// Requests without what means nothing to what they come to.
@@ -97,8 +94,6 @@ impl<'a> Worlds<'a> {
             helds: FxHashMap::default(),
             asked: FxHashSet::default(),
             judged: FxHashSet::default(),
-            warnings: Vec::new(),
-            warned: FxHashSet::default(),
         };
         let system = System::new(Arc::new(catalogue.clone()));
         worlds.intern(World::new(system, Stack::new(deployment.limits.stack)));

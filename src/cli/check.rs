@@ -3,11 +3,12 @@
 use super::exit::Exit;
 use super::input::Input;
 use super::output::Style;
-use super::{Answer, Context, Run, replay};
-use crate::check::{self, Explored, Report, TraceStep, Verdict};
+use super::{Answer, Context, Failure, Run, replay};
+use crate::check::{self, Explored, Report, TraceStep, Verdict, why_no_way};
 use crate::diagnostics::{SourceMap, to_json};
 use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS};
-use crate::model::{Finding, Severity};
+use crate::model::codes::CLI_WHICH_COORDINATOR;
+use crate::model::{Deployment, Finding, Severity};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -19,7 +20,8 @@ use std::path::PathBuf;
 /// not *sound*); 2 a file is missing or does not parse.
 ///
 /// `--trace N` shows the shortest way to the N-th finding, and with `--as way.lua` writes a script that goes it:
-/// `davit run way.lua --clock simulated --platform simulated`.
+/// `davit run way.lua --clock simulated --platform simulated`. With a name that ends in `.events` it writes what the
+/// coordinator hears on that way, for `davit sim FILE --events way.events`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -36,9 +38,13 @@ pub struct Args {
     /// Show the shortest way to the N-th finding, and nothing else.
     #[arg(long, value_name = "N", conflicts_with_all = ["json", "notes"])]
     trace: Option<usize>,
-    /// With `--trace`: write a script to this file that goes that way on the simulated platform.
+    /// With `--trace`: write a script to this file that goes that way on the simulated platform; to `NAME.events` what the
+    /// coordinator hears on it, for `davit sim`.
     #[arg(long = "as", value_name = "SCRIPT", requires = "trace")]
     script: Option<PathBuf>,
+    /// With `--as NAME.events`: which coordinator, of a deployment with several.
+    #[arg(long, value_name = "NAME", requires = "script")]
+    of: Option<String>,
 }
 
 impl Run for Args {
@@ -81,7 +87,7 @@ impl Run for Args {
         }
         let out = &context.out;
         if let Some(number) = self.trace {
-            return self.way(context, &report, number, exit);
+            return self.way(context, &read.deployment, &report, number, exit);
         }
         // Errors come first, notes last.
         let notes = report.findings.iter().position(|f| f.severity == Severity::Info).filter(|_| !self.notes);
@@ -126,7 +132,7 @@ impl Run for Args {
 
 impl Args {
     /// The way to the N-th finding, counted from 1, shown or as a script.
-    fn way(&self, context: &Context, report: &Report, number: usize, exit: Exit) -> Answer {
+    fn way(&self, context: &Context, deployment: &Deployment, report: &Report, number: usize, exit: Exit) -> Answer {
         let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
         let Some((finding, trace)) = found else {
             let there = report.findings.len();
@@ -135,7 +141,12 @@ impl Args {
         };
         let Some(to) = &self.script else { return Ok(show_way(context, finding, trace, exit)) };
         let file = std::fs::canonicalize(&self.input.file).unwrap_or_else(|_| self.input.file.clone());
-        let text = match replay::script(&file, finding, trace) {
+        let alone = to.extension().is_some_and(|ending| ending == "events");
+        let text = match alone {
+            true => replay::events(finding, trace, self.alone(deployment)?),
+            false => replay::script(&file, finding, trace),
+        };
+        let text = match text {
             Ok(text) => text,
             Err(why) => {
                 context.out.error(format!("finding {number}: {why}\n"));
@@ -146,15 +157,37 @@ impl Args {
             context.out.error(format!("{}: {e}\n", to.display()));
             return Ok(Exit::Usage);
         }
-        context.out.line(format!("{}: davit run {0} --clock simulated --platform simulated", to.display()));
+        let of = self.of.iter().map(|of| format!(" --of {of}")).collect::<String>();
+        context.out.line(match alone {
+            true => format!("{}: davit sim {}{of} --events {0}", to.display(), self.input.file.display()),
+            false => format!("{}: davit run {0} --clock simulated --platform simulated", to.display()),
+        });
         Ok(exit)
+    }
+
+    /// Which coordinator is stepped alone; none: there is only one.
+    fn alone(&self, deployment: &Deployment) -> Result<Option<&str>, Failure> {
+        let names: Vec<&str> = deployment.coordinators.iter().map(|c| c.name.as_str()).collect();
+        let several = names.len() > 1;
+        match self.of.as_deref() {
+            Some(of) if names.contains(&of) => Ok(several.then_some(of)),
+            None if !several => Ok(None),
+            of => Err(Failure::usage(
+                CLI_WHICH_COORDINATOR,
+                match of {
+                    Some(of) => format!("there is no coordinator `{of}`"),
+                    None => "the deployment has several coordinators, and each is stepped alone".to_owned(),
+                },
+                format!("say which one with `--of`: {}", names.join(", ")),
+            )),
+        }
     }
 }
 
 fn show_way(context: &Context, finding: &Finding, trace: &[TraceStep], exit: Exit) -> Exit {
     context.out.line(format!("{}: {}", finding.code, finding.message));
     if trace.is_empty() {
-        context.out.line("  it stands in the text: no way leads to it");
+        context.out.line(format!("  {}", why_no_way(finding.code)));
     }
     trace.iter().for_each(|step| context.out.line(format!("  {step}")));
     exit

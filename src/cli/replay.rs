@@ -1,7 +1,6 @@
 //! A script that goes the way to a finding of `davit check`.
 
-use crate::check::TraceStep;
-use crate::check::replay::Does;
+use crate::check::{Again, Does, Happened, TraceStep, why_no_way};
 use crate::limits;
 use crate::model::{Ask, FaultKind, Finding};
 use std::fmt::Write as _;
@@ -14,58 +13,19 @@ use std::time::Duration;
 /// Why no script goes this way.
 pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<String, String> {
     if trace.is_empty() {
-        return Err("it stands in the text: no way leads to it".to_owned());
+        return Err(why_no_way(finding.code).to_owned());
     }
-    let mut out = Lines { text: String::new(), now: Duration::ZERO };
+    let mut out = Lines { text: String::new(), now: Duration::ZERO, within: "" };
     _ = writeln!(out.text, "-- {}: {}", finding.code, finding.message.replace('\n', " "));
     _ = writeln!(out.text, "-- Run it with `davit run FILE --clock simulated --platform simulated`.");
     _ = writeln!(out.text, "deploy({}, {{ replay = true }})", quoted(&file.display().to_string()));
-    let half = limits::REPLAY_STEP / 2;
     for step in trace {
-        let replay = &step.replay;
-        if !replay.arms.is_empty() {
-            out.wait_until(replay.at.saturating_sub(half));
-        }
-        for (step, how, takes) in &replay.arms {
-            let (step, how, slow) = (quoted(step), quoted(how.word()), *how == FaultKind::Slow);
-            let takes = if slow { format!(", 1, {}", takes.as_secs_f64()) } else { String::new() };
-            _ = writeln!(out.text, "fault({step}, {how}{takes})");
-        }
-        match replay.does {
-            Does::Nothing => {}
-            Does::Cannot(why) => return Err(format!("no script goes this way: {why}")),
-            Does::Raise(event) => {
-                out.wait_until(replay.at);
-                _ = writeln!(out.text, "raise({})", quoted(event.as_str()));
-            }
-            Does::Ask(ask) => {
-                out.wait_until(replay.at);
-                _ = match ask {
-                    Ask::Apply(id) => writeln!(out.text, "apply({})", quoted(id.as_str())),
-                    Ask::UndoOf(id) => writeln!(out.text, "undo({})", quoted(id.as_str())),
-                    other => writeln!(out.text, "-- {other}"),
-                };
-            }
-        }
-        let answers = step.answers();
-        if !answers.is_empty() {
-            out.wait_until(replay.at + half / 2);
-        }
-        for answer in answers {
-            if replay.either.iter().any(|either| either.as_str() == answer) {
-                _ = writeln!(
-                    out.text,
-                    "-- Here `{answer}`, or it is through before it is given up, which leads to the same."
-                );
-                continue;
-            }
-            _ = writeln!(out.text, "wait_answer({}, 0)", quoted(answer));
-        }
+        out.step(step)?;
     }
     if let Some(last) = trace.last() {
-        out.wait_until(last.replay.at + half / 2);
+        out.wait_until(last.replay.at + HALF / 2);
         if let Some((then, within)) = last.replay.then {
-            _ = writeln!(out.text, "wait_answer({}, {})", quoted(then.as_str()), within.as_secs_f64());
+            out.line(format!("wait_answer({}, {})", quoted(then.as_str()), within.as_secs_f64()));
             return Ok(out.text);
         }
         for place in &last.states {
@@ -73,26 +33,191 @@ pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<Str
                 Some(name) => format!("{name}:{}", place.state),
                 None => place.state.clone(),
             };
-            _ = match last.replay.passes {
-                false => writeln!(out.text, "wait_state({}, 0)", quoted(&state)),
-                true => writeln!(out.text, "-- It has been in {state}, and goes on from there at once."),
-            };
+            out.line(match last.replay.passes {
+                false => format!("wait_state({}, 0)", quoted(&state)),
+                true => format!("-- It has been in {state}, and goes on from there at once."),
+            });
         }
     }
     Ok(out.text)
 }
 
+/// The lines by which `davit sim` steps a coordinator alone along a way; none is named where there is only one.
+///
+/// # Errors
+/// Why there are none.
+pub fn events(finding: &Finding, trace: &[TraceStep], coordinator: Option<&str>) -> Result<String, String> {
+    if trace.is_empty() {
+        return Err(why_no_way(finding.code).to_owned());
+    }
+    let mut alone = Alone { text: "run\n".to_owned(), now: Duration::ZERO, coordinator, timed: false };
+    alone.timed = trace.iter().any(|step| alone.is_own_time(step));
+    trace.iter().for_each(|step| alone.step(step));
+    Ok(alone.text)
+}
+
+/// A coordinator alone.
+struct Alone<'c> {
+    text: String,
+    now: Duration,
+    coordinator: Option<&'c str>,
+    /// Time passes for it on the way.
+    timed: bool,
+}
+
+impl Alone<'_> {
+    fn is_own_time(&self, step: &TraceStep) -> bool {
+        let own = matches!(step.what, Happened::Time { .. })
+            && step.hears.iter().any(|hears| hears.coordinator.as_deref() == self.coordinator);
+        let again = step.replay.again.as_ref();
+        own || again.is_some_and(|again| again.steps.iter().any(|step| self.is_own_time(step)))
+    }
+
+    fn step(&mut self, step: &TraceStep) {
+        if let Some(again) = &step.replay.again {
+            // The rounds after the second one are like it, later.
+            let rounds: Vec<&[TraceStep]> = again.steps.chunks(again.round.max(1)).collect();
+            let mut later = Duration::ZERO;
+            for number in 0..again.times {
+                let Some(round) = rounds.get(number.min(rounds.len() - 1)) else { return };
+                if number >= rounds.len() && rounds.len() > 1 {
+                    later += rounds[1][0].replay.at.saturating_sub(rounds[0][0].replay.at);
+                }
+                for step in *round {
+                    let at = step.replay.at + later;
+                    self.one(step, at);
+                }
+            }
+            return;
+        }
+        self.one(step, step.replay.at);
+    }
+
+    fn one(&mut self, step: &TraceStep, at: Duration) {
+        let own = step.hears.iter().filter(|hears| hears.coordinator.as_deref() == self.coordinator);
+        let events: Vec<&str> = own.map(|hears| hears.event.as_str()).collect();
+        if events.is_empty() {
+            return;
+        }
+        if let Some(passes) = at.checked_sub(self.now).filter(|passes| self.timed && !passes.is_zero()) {
+            _ = writeln!(self.text, "advance {}", passes.as_secs_f64());
+            self.now = at;
+        }
+        for event in events {
+            match step.what {
+                Happened::Time { .. } => self.text.push_str("run\n"),
+                _ => _ = writeln!(self.text, "{event}\nrun"),
+            }
+        }
+    }
+}
+
+/// What is armed for a move is so long before it.
+const HALF: Duration = Duration::from_micros(limits::REPLAY_STEP.as_micros() as u64 / 2);
+
 struct Lines {
     text: String,
     now: Duration,
+    within: &'static str,
 }
 
 impl Lines {
+    fn line(&mut self, line: impl std::fmt::Display) {
+        _ = writeln!(self.text, "{}{line}", self.within);
+    }
+
     fn wait_until(&mut self, at: Duration) {
         if let Some(left) = at.checked_sub(self.now).filter(|left| !left.is_zero()) {
-            _ = writeln!(self.text, "wait({})", left.as_secs_f64());
+            self.line(format!("wait({})", left.as_secs_f64()));
             self.now = at;
         }
+    }
+
+    /// One move.
+    fn step(&mut self, step: &TraceStep) -> Result<(), String> {
+        let replay = &step.replay;
+        if let Some(again) = &replay.again {
+            return self.again(again);
+        }
+        if !replay.arms.is_empty() {
+            self.wait_until(replay.at.saturating_sub(HALF));
+        }
+        for (step, how, takes) in &replay.arms {
+            let (step, how, slow) = (quoted(step), quoted(how.word()), *how == FaultKind::Slow);
+            let takes = if slow { format!(", 1, {}", takes.as_secs_f64()) } else { String::new() };
+            self.line(format!("fault({step}, {how}{takes})"));
+        }
+        match replay.does {
+            Does::Nothing => {}
+            Does::Cannot(why) => return Err(format!("no script goes this way: {why}")),
+            Does::Raise(event) => {
+                self.wait_until(replay.at);
+                self.line(format!("raise({})", quoted(event.as_str())));
+            }
+            Does::RaiseTo(event) => {
+                self.wait_until(replay.at);
+                let to = replay.others.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+                self.line(format!("raise({}, {{ to = {{ {to} }} }})", quoted(event.as_str())));
+            }
+            Does::Ask(ask) => {
+                self.wait_until(replay.at);
+                self.line(match ask {
+                    Ask::Apply(id) => format!("apply({})", quoted(id.as_str())),
+                    Ask::UndoOf(id) => format!("undo({})", quoted(id.as_str())),
+                    other => format!("-- {other}"),
+                });
+            }
+            Does::Fail(component, told) => {
+                self.wait_until(replay.at);
+                self.line(format!("fail({})", quoted(component.as_str())));
+                self.told(replay.at, told.as_str());
+            }
+            Does::Hear(told) => self.told(replay.at, told.as_str()),
+            Does::OthersDown => {
+                self.wait_until(replay.at);
+                for other in &replay.others {
+                    self.line(format!("wait_state({}, 0)", quoted(other)));
+                }
+            }
+        }
+        for answer in step.answers() {
+            if replay.either.iter().any(|either| either.as_str() == answer) {
+                self.wait_until(replay.at + HALF / 2);
+                self.line(format!(
+                    "-- Here `{answer}`, or it is through before it is given up, which leads to the same."
+                ));
+                continue;
+            }
+            self.told(replay.at, answer);
+        }
+        Ok(())
+    }
+
+    /// This is told at that time.
+    fn told(&mut self, at: Duration, event: &str) {
+        self.wait_until(at + HALF / 2);
+        self.line(format!("wait_answer({}, 0)", quoted(event)));
+    }
+
+    /// A circle, again and again: the rounds between the first and the last one are all like the second.
+    fn again(&mut self, again: &Again) -> Result<(), String> {
+        let last = again.steps.len() / again.round.max(1);
+        for (number, steps) in again.steps.chunks(again.round.max(1)).enumerate() {
+            let times = again.times.saturating_sub(2);
+            let repeated = number == 1 && last == limits::REPLAY_ROUNDS && times > 1;
+            if repeated {
+                self.line(format!("for _ = 1, {times} do"));
+                self.within = "  ";
+            }
+            for step in steps {
+                self.step(step)?;
+            }
+            if repeated {
+                self.within = "";
+                self.line("end");
+            }
+        }
+        Ok(())
     }
 }
 

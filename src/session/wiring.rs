@@ -15,7 +15,7 @@ use crate::configurator::{
 use crate::coordinator::{Class, Dropped, Refused};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, RequestId, Snapshot};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Ident, RequestId, Snapshot};
 use crate::platform::Platform;
 use crate::statechart::{Chart, NodeId};
 use crate::time::{Clock, Time, lock};
@@ -181,24 +181,37 @@ impl Session {
     /// # Errors
     /// [`Refused::Full`]: a coordinator that may hear it does not keep up. Nobody was told of the event.
     pub fn offer(&self, event: EventName, from: &str) -> Result<(), Refused> {
-        self.deliver(event, from, 0)
+        self.deliver(event, from, 0, |_| true)
     }
 
-    /// The same; [`Hub::was_heard`] says with the number that this answers what became of it, until it is
+    /// The same to these coordinators alone: each hears of one event in its own time, and this is how that is tried.
+    ///
+    /// # Errors
+    /// As [`Session::offer`].
+    pub fn offer_to(&self, event: EventName, to: &[Ident], from: &str) -> Result<(), Refused> {
+        self.deliver(event, from, 0, |name| to.contains(&name))
+    }
+
+    /// The names of the coordinators.
+    pub fn coordinators(&self) -> Vec<Ident> {
+        self.parts.iter().map(|part| part.name).collect()
+    }
+
+    /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
     /// [forgotten](Hub::forget).
     ///
     /// # Errors
     /// As [`Session::offer`].
     pub fn offer_watched(&self, event: EventName, from: &str) -> Result<u64, Refused> {
         let ticket = self.hub.ticket(self.parts.len());
-        self.deliver(event, from, ticket).map(|()| ticket).inspect_err(|_| self.hub.forget(ticket))
+        self.deliver(event, from, ticket, |_| true).map(|()| ticket).inspect_err(|_| self.hub.forget(ticket))
     }
 
-    fn deliver(&self, event: EventName, from: &str, ticket: u64) -> Result<(), Refused> {
+    fn deliver(&self, event: EventName, from: &str, ticket: u64, to: impl Fn(Ident) -> bool) -> Result<(), Refused> {
         let incoming = self.junction.incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts.len()), false);
-        for part in &self.parts {
+        for part in self.parts.iter().filter(|part| to(part.name)) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),
                 Err(Refused::Full) if part.may_hear(event) => {

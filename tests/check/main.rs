@@ -11,5 +11,6 @@ mod circles;
 mod demands;
 mod follow;
 mod product;
+mod shown;
 mod support;
 mod verdicts;

@@ -208,3 +208,30 @@ fn what_simulated_components_raise_is_raised_there() {
     let ran = demo.run(&["run", "script.lua", "--clock", "simulated"]);
     assert_eq!(ran.code, 1, "there nobody raises it: {}{}", ran.out, ran.err);
 }
+
+#[test]
+fn a_component_fails_by_itself_and_what_cannot_fail_is_told() {
+    for (script, says) in [
+        ("fail('source')", "nothing is deployed"),
+        ("deploy('deployment.yaml') fail('sourc')", "did you mean `source`?"),
+        ("deploy('deployment.yaml') fail('not a name')", "there is no component `not a name`"),
+        ("deploy('deployment.yaml', {replay = true}) fail('source')", "`source` is not there now"),
+        ("deploy('deployment.yaml') raise('e_fast', { to = 'dem' })", "did you mean `demo`?"),
+        ("deploy('deployment.yaml') raise('e_fast', { to = { 1 } })", "`to` is a name or a list of names"),
+        ("deploy('deployment.yaml') raise('e_fast', { too = 'demo' })", "did you mean `to`?"),
+    ] {
+        let demo = Demo::new();
+        demo.write("script.lua", script);
+        let platform = ["run", "script.lua", "--clock", "simulated", "--platform", "simulated"];
+        let ran = demo.run(&platform);
+        let said = ran.err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(ran.code == 1 && said.contains(says), "{script}: {said}");
+    }
+    let demo = Demo::new();
+    let raised =
+        "raise('e_fast', { to = {} }) wait(1) assert(property('source.k') == 1) raise('e_fast', { to = 'demo' })
+        wait_answer('fast.ok', 1)";
+    demo.write("script.lua", &format!("deploy('deployment.yaml') wait_answer('slow.ok', 1) {raised} fail('source') wait(6) assert_state('source', 'faulted')"));
+    let ran = demo.run(&["run", "script.lua", "--clock", "simulated"]);
+    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
+}

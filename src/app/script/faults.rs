@@ -6,8 +6,9 @@ use crate::app::start::rule;
 use crate::check;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Direction, FaultKind, Ident, Origin, StepFault, TypeName};
+use crate::model::{ChangeKind, ComponentName, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
 use crate::platform::simulated::Simulated;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// What a script lets go wrong.
@@ -53,6 +54,30 @@ impl Faults {
             }
         }
         Ok(())
+    }
+
+    /// A component of the deployment that is up fails by itself.
+    pub(super) fn fail(&self, component: &str) -> mlua::Result<()> {
+        let Some((checked, Some(simulated))) = &self.up else {
+            return Err(error(
+                "only components of the simulated platform fail when they are told to: run the script with `--platform \
+                 simulated`",
+            ));
+        };
+        let name = ComponentName::new(component).ok();
+        if name.is_some_and(|name| simulated.fault(name, "the script lets it fail")) {
+            return Ok(());
+        }
+        let created = checked.deployment.configurations.iter().flat_map(|c| &c.changes).filter_map(|c| match &c.kind {
+            ChangeKind::Create { component, .. } => Some(*component),
+            _ => None,
+        });
+        let known: BTreeSet<ComponentName> = created.collect();
+        if name.is_some_and(|name| known.contains(&name)) {
+            return Err(error(format!("`{component}` is not there now, and cannot fail")));
+        }
+        let help = did_you_mean(component, "components", known.iter().map(ComponentName::as_str));
+        Err(error(format!("there is no component `{component}`: {help}")))
     }
 
     /// Whether what waits for this deployment can go wrong in it.

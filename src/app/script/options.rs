@@ -25,3 +25,32 @@ pub(super) fn flag(options: Option<Table>, name: &'static str) -> mlua::Result<b
     }
     Ok(set)
 }
+
+/// The names under the one option that there is: one name, or a list of them; none: it is not given.
+pub(super) fn names(options: Option<Table>, name: &'static str) -> mlua::Result<Option<Vec<String>>> {
+    let Some(options) = options else { return Ok(None) };
+    let wrong = |value: &mlua::Value| {
+        let kind = value.type_name();
+        error(format!("`{name}` is a name or a list of names, and this is of the type {kind}"))
+    };
+    let mut names = None;
+    for pair in options.pairs::<mlua::Value, mlua::Value>() {
+        let (key, value) = pair?;
+        let key = key.to_string()?;
+        if key != name {
+            let help = did_you_mean(&key, "options", [name]);
+            return Err(error(format!("there is no option `{key}`: {help}")));
+        }
+        let text = |value: mlua::Value| match value {
+            mlua::Value::String(text) => Ok(text.to_string_lossy()),
+            other => Err(wrong(&other)),
+        };
+        names = Some(match value {
+            mlua::Value::Table(list) => {
+                list.sequence_values::<mlua::Value>().map(|value| text(value?)).collect::<mlua::Result<_>>()?
+            }
+            one => vec![text(one)?],
+        });
+    }
+    Ok(names)
+}

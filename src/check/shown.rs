@@ -1,0 +1,108 @@
+//! Every code that `check` can give, and whether a way leads to it: the only list of them.
+
+use crate::model::Code;
+use crate::model::codes::*;
+
+/// Found by following the coordinators: such a finding has its own way from the start, which a script goes. (What is wrong with
+/// a configuration wherever it is applied is found by looking at it, and has none.)
+pub const FOLLOWED: &[Code] = &[
+    // What coordinators come to.
+    COORD_REQUEST_REFUSED,
+    COORD_REFUSED_BY_OTHER,
+    COORD_STACK_GROWS,
+    COORD_LOST_UNHEARD,
+    COORD_REVERTED_UNHEARD,
+    COORD_ENDLESS,
+    COORD_STUCK,
+    COORD_LEFTOVERS,
+    COORD_NO_WAY_DOWN,
+    COORD_SAFETY_UNHEARD,
+    // The bring-up and the shutdown.
+    DEPLOY_NEVER_UP,
+    DEPLOY_NEVER_DOWN,
+    DEPLOY_LEFTOVERS,
+    // Why a request is refused, or can only fail.
+    CONF_HOLDS_NEVER,
+    STACK_GROUP,
+    CLASH,
+    PRE_ON_CREATED,
+    POST_ON_DESTROYED,
+    TOUCHES_DESTROYED,
+    UNKNOWN_COMPONENT,
+    COMPONENT_EXISTS,
+    STILL_CONNECTED,
+    ALREADY_CONNECTED,
+    NOT_CONNECTED,
+    DATA_ALONE,
+    NOT_TUNABLE,
+    PORT_DRIVEN,
+    // The same, where a component is of one of several types then.
+    UNKNOWN_PORT,
+    UNKNOWN_PROPERTY,
+    UNKNOWN_OPERATION,
+    NOT_AN_OUT_PORT,
+    NOT_AN_IN_PORT,
+    PORT_TYPES,
+    PORT_UNITS,
+    NEEDS_BUFFER,
+    BAD_VALUE,
+    PORT_NOT_WRITABLE,
+    BAD_ARGUMENTS,
+    // What planning warns of.
+    IRREVERSIBLE,
+    ACTUATOR_BY_DEFAULT,
+];
+
+/// Found without following anything, and why no way leads there.
+pub const READ: &[(&str, &[Code])] = &[
+    (
+        "it is told of what the deployment says, wherever that is used: no way leads to it",
+        &[
+            UNKNOWN_TYPE,
+            UNKNOWN_ACTIVITY,
+            BUFFER_SIZE,
+            MISSING_PROPERTY,
+            TYPE_UNKNOWN_OPERATION,
+            TYPE_UNKNOWN_TYPE,
+            TYPE_WITHOUT_CODE,
+            TYPE_SETTLED_ELSEWHERE,
+            CONF_HOLDS_UNSEEN,
+            DEPLOY_SAFETY_ANSWER,
+            DEPLOY_UNKNOWN_CONFIGURATION,
+            DEPLOY_UNKNOWN_STATE,
+            DEPLOY_EVENT_UNHEARD,
+            MONITOR_EVENT_TAKEN,
+            MONITOR_NOT_A_NUMBER,
+            MONITOR_NOT_RUN,
+            MONITOR_NO_SUCH_PART,
+            MONITOR_UNHEARD,
+            SIMULATED_NOT_USED,
+            SIMULATED_UNHEARD,
+            SIMULATED_UNKNOWN_STEP,
+        ],
+    ),
+    (
+        "it is told of all states and transitions of the coordinator together: no way leads to it",
+        &[
+            COORD_UNKNOWN_REQUEST,
+            COORD_UNKNOWN_ANSWER,
+            COORD_ANSWER_NEVER_COMES,
+            COORD_NEVER_EMITTED,
+            COORD_NEAR_EVENT,
+            COORD_FAILURE_UNHANDLED,
+            COORD_NOT_PURE,
+        ],
+    ),
+    ("it is told of all that two coordinators ask for together: no way leads to it", &[COORD_SHARED]),
+    ("it is told as the reason why a request is refused, with the way to that", &[STACK_FULL]),
+    (
+        "what is planned leads through all run states on its way: only a component that has failed meets it",
+        &[ILLEGAL_TRANSITION, NOT_UNCONFIGURED],
+    ),
+];
+
+/// Why no way leads to a finding that has none.
+pub fn why_no_way(code: Code) -> &'static str {
+    let known = READ.iter().find(|(_, codes)| codes.contains(&code));
+    known.map_or("it stands in the text: no way leads to it", |(why, _)| *why)
+}

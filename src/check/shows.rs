@@ -1,0 +1,139 @@
+//! Which moves of a way a script can bring about, as far as each of them tells by itself: one thing happens at a time, and what
+//! comes by itself comes as soon as it can.
+
+use super::product::Product;
+use super::state::{Move, Next, State};
+use crate::model::Verdict;
+use crate::stack::{Request, Why};
+use smallvec::SmallVec;
+
+/// What a state lets a script bring about next.
+pub struct Shows {
+    /// Nothing: something is on its way that a script cannot hold up.
+    nothing: bool,
+    /// Only what takes no time: what is under way has nothing to do.
+    at_once: bool,
+    /// Only answers: what was interrupted goes back.
+    answers: bool,
+    /// Nothing is known any more, and what is answered is up to the platform.
+    unknown: bool,
+    /// Somebody has not heard yet what came before.
+    unheard: bool,
+    /// The numbers of batches under way that have nothing to do.
+    idle: SmallVec<[u32; 2]>,
+}
+
+impl Product<'_> {
+    /// What a state lets a script bring about next.
+    pub fn shows(&mut self, state: &State) -> Shows {
+        let mut idle: SmallVec<[u32; 2]> = SmallVec::new();
+        let unknown = self.worlds.top(state.world).is_some();
+        if state.safe.is_empty() && !unknown {
+            let numbers: SmallVec<[u32; 4]> = state.desk.under_way().iter().map(|turn| turn.number).collect();
+            for number in numbers.into_iter().filter(|number| !state.is_stopped(*number)) {
+                let requests = state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default();
+                if !self.comes(state, number, &requests).can_fail.contains(&true) {
+                    idle.push(number);
+                }
+            }
+        }
+        let waits = state.desk.waiting().next().is_some();
+        Shows {
+            nothing: !state.flight.is_empty() || waits && too_late(state),
+            at_once: !idle.is_empty(),
+            answers: state.safe.is_empty() && !state.interrupted.is_empty(),
+            unknown,
+            unheard: self.is_told_between(state),
+            idle,
+        }
+    }
+}
+
+impl Shows {
+    /// Whether a script can bring this about.
+    pub fn shows(&self, product: &Product<'_>, before: &State, next: &Next) -> bool {
+        if self.nothing || !next.state.flight.is_empty() {
+            return false;
+        }
+        // Most states have nothing under way.
+        let goes_on = !before.desk.under_way().is_empty() || !before.safe.is_empty();
+        let races = || goes_on && races(before, next);
+        match next.by {
+            Move::Taken(..) => true,
+            Move::Answer => {
+                let idle = |(request, _): &(Request, Verdict)| {
+                    let turns = before.desk.under_way().iter();
+                    let mut own = turns.filter(|turn| turn.batch.requests.contains(request));
+                    !before.safe.contains(request) && own.all(|turn| self.idle.contains(&turn.number))
+                };
+                let own_time = (self.unheard || self.at_once) && !next.answers.iter().all(idle);
+                // What is taken back unconfirmed may have to wait for what is under way.
+                let waits =
+                    next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted) && !before.desk.is_empty();
+                // What is told behind an event that is held up would be heard before it.
+                let inbox = &next.state.inbox;
+                let behind = inbox.iter().enumerate().any(|(at, (to, _))| inbox[..at].iter().any(|(own, _)| own == to));
+                !self.unknown && !own_time && !waits && !behind && !races()
+            }
+            Move::Lost(id) if product.loss(before, id).is_none() => false,
+            _ => !self.at_once && !self.answers && !self.unheard && !races(),
+        }
+    }
+}
+
+/// The requests of each batch under way, and each safe configuration that is being applied.
+pub(super) fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
+    let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
+    batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
+}
+
+/// Whether an undo came too late to give up what is still under way: it waits for it.
+pub(super) fn too_late(state: &State) -> bool {
+    let waits = |undo: &Request| {
+        let of = |batch: SmallVec<[Request; 2]>| crate::stack::given_up_of(undo, &batch).is_some();
+        under_way(state).into_iter().any(of)
+    };
+    state.desk.waiting().flat_map(|batch| &batch.requests).any(waits)
+}
+
+/// Whether what is stopped is through all the same, or what was under way turns out not to have begun.
+pub(super) fn races(before: &State, next: &Next) -> bool {
+    let through = |(request, verdict): &(Request, Verdict)| {
+        let of = before.desk.under_way().iter().find(|turn| turn.batch.requests.contains(request));
+        verdict.is_success() && of.is_some_and(|turn| before.is_stopped(turn.number))
+    };
+    let back = |requests: &SmallVec<[Request; 2]>| {
+        let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
+        waits && !under_way(&next.state).iter().any(|other| same(other, requests))
+    };
+    // Or only some of it had begun: what is left of it begins anew.
+    let shrinks = |requests: &SmallVec<[Request; 2]>| {
+        let within = |other: &SmallVec<[Request; 2]>| {
+            let known = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
+            other.len() < requests.len() && other.iter().all(known)
+        };
+        next.answers.is_empty() && under_way(&next.state).iter().any(within)
+    };
+    // Or nothing of it had, and what came has cancelled it.
+    let cancelled = |requests: &SmallVec<[Request; 2]>| {
+        let of = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
+        let goes_on = under_way(&next.state).iter().flatten().any(of);
+        !goes_on && !next.answers.iter().any(|(request, _)| of(request)) && requests[0].why == Why::Asked
+    };
+    let stops = |requests| back(requests) || shrinks(requests) || cancelled(requests);
+    next.answers.iter().any(through) || under_way(before).iter().any(stops)
+}
+
+/// Whether a move answers all of a batch.
+pub(super) fn answered(next: &Next, batch: &[Request]) -> bool {
+    let is = |request: &Request| {
+        next.answers.iter().any(|(other, _)| (other.ask, other.requester) == (request.ask, request.requester))
+    };
+    batch.iter().all(is)
+}
+
+/// Whether two lists ask for the same.
+pub(super) fn same(a: &[Request], b: &[Request]) -> bool {
+    let what = |request: &Request| (request.ask, request.requester);
+    a.iter().map(what).eq(b.iter().map(what))
+}
