@@ -35,7 +35,7 @@ fn idle_connections_do_not_lock_the_operator_out() {
     assert_eq!(fast.code, 0, "{}{}", fast.out, fast.err);
     assert_eq!(refused(&["event", "e_slow"]), 1);
     assert_eq!(demo.run(&["status"]).code, 0);
-    assert_eq!(demo.run(&["shutdown", "--force"]).code, 0);
+    assert_eq!(demo.run(&["shutdown", "--force"]).code, 4);
     assert!(deployed.end().code().is_some());
     drop(crowd);
 }

@@ -332,7 +332,8 @@ fn while_it_is_stopped_others_are_refused_in_words() {
     });
     small.after(20.0, force);
     small.stop();
-    assert_eq!(refused.lock().unwrap().len(), 8, "{:?}", refused.lock().unwrap());
+    let told: Vec<&str> = refused.lock().unwrap().clone();
+    assert_eq!(told.len(), 8, "{told:?}");
     assert!(small.heard("soft.failed"), "{:?}", small.heard.lock().unwrap());
     assert!(!small.steps().iter().any(|step| step.contains("b.k")));
 }
