@@ -16,6 +16,7 @@ mod names;
 pub mod owner;
 mod parts;
 pub mod place;
+mod raising;
 mod recovery;
 mod routes;
 pub mod rpc;

@@ -6,13 +6,13 @@ use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
 use super::recovery::Difference;
-use super::routes::{Junction, make_safe, on_answer, on_platform, on_progress};
+use super::routes::{Junction, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use super::steps::Steps;
 use crate::configurator::{
     Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, View,
 };
-use crate::coordinator::{Class, Dropped, Refused};
+use crate::coordinator::Dropped;
 use crate::functions::Opener;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Ident, RequestId, Snapshot};
@@ -169,77 +169,13 @@ impl Session {
         self.parts.iter().flat_map(of).collect()
     }
 
-    /// Gives an event to all coordinators, in the name of `from`; where there is no room for it that is written down.
-    pub fn raise(&self, event: EventName, from: &str) {
-        if let Err(refused) = self.offer(event, from) {
-            self.hub.note(Happening::Forced { note: format!("`{event}` was not delivered: {refused}") });
-        }
-    }
-
-    /// The same, for those who can be told that there is no room.
-    ///
-    /// # Errors
-    /// [`Refused::Full`]: a coordinator that may hear it does not keep up. Nobody was told of the event.
-    pub fn offer(&self, event: EventName, from: &str) -> Result<(), Refused> {
-        self.deliver(event, from, 0, |_| true)
-    }
-
-    /// The same to these coordinators alone: each hears of one event in its own time, and this is how that is tried.
-    ///
-    /// # Errors
-    /// As [`Session::offer`].
-    pub fn offer_to(&self, event: EventName, to: &[Ident], from: &str) -> Result<(), Refused> {
-        self.deliver(event, from, 0, |name| to.contains(&name))
+    pub(super) fn junction(&self) -> &Junction {
+        &self.junction
     }
 
     /// The names of the coordinators.
     pub fn coordinators(&self) -> Vec<Ident> {
         self.parts.iter().map(|part| part.name).collect()
-    }
-
-    /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
-    /// [forgotten](Hub::forget).
-    ///
-    /// # Errors
-    /// As [`Session::offer`].
-    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<u64, Refused> {
-        let ticket = self.hub.ticket(self.parts.len());
-        self.deliver(event, from, ticket, |_| true).map(|()| ticket).inspect_err(|_| self.hub.forget(ticket))
-    }
-
-    fn deliver(&self, event: EventName, from: &str, ticket: u64, to: impl Fn(Ident) -> bool) -> Result<(), Refused> {
-        let incoming = self.junction.incoming(Class::Outside, event).watched(ticket);
-        // All of them have room, or none hears of it.
-        let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts.len()), false);
-        for part in self.parts.iter().filter(|part| to(part.name)) {
-            match part.coordinator.hold(incoming.class) {
-                Ok(()) => held.push(part),
-                Err(Refused::Full) if part.may_hear(event) => {
-                    held.iter().for_each(|part| part.coordinator.release(incoming.class));
-                    return Err(Refused::Full);
-                }
-                Err(Refused::Full) => {}
-                Err(Refused::Detached) => gone = true,
-            }
-        }
-        self.hub.note(Happening::Event { event: event.to_string(), from: from.to_owned() });
-        self.configurator.event(event);
-        make_safe(&self.hub, &self.configurator, event);
-        (held.len()..self.parts.len()).for_each(|_| self.hub.taken_up(ticket, false));
-        let mut unwatched = false;
-        for part in held {
-            match part.coordinator.deliver(incoming) {
-                Ok(_) => continue,
-                // It waits already, and too many want to know what becomes of it.
-                Err(Refused::Full) => unwatched = true,
-                Err(Refused::Detached) => gone = true,
-            }
-            self.hub.taken_up(ticket, false);
-        }
-        if gone {
-            self.hub.note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
-        }
-        if unwatched { Err(Refused::Full) } else { Ok(()) }
     }
 
     /// Makes a request in the name of an operator. `force`: also one that applies what is not listed, undoes a coordinator's
