@@ -57,7 +57,8 @@ impl Session {
     pub fn bring_up(&self) -> Result<(), NotUp> {
         let hub = self.hub();
         let bring_up = &self.deployment().deploy;
-        let deadline = self.clock().now() + bring_up.within;
+        let start = self.clock().now();
+        let mut deadline = start + bring_up.within;
         let began = hub.heard();
         hub.set_phase(Phase::Deploying);
         self.raise(bring_up.event, "deployment");
@@ -74,7 +75,12 @@ impl Session {
                 hub.set_phase(Phase::Up);
                 return Ok(());
             }
-            if self.clock().now() >= deadline {
+            // Stopped in an emergency: what stopping it would move, nobody has asked for.
+            let now = self.clock().now();
+            if now >= deadline && self.waits_for_people(start) {
+                deadline = now + bring_up.within;
+            }
+            if now >= deadline {
                 let waiting = hub.outstanding();
                 break (
                     format!(

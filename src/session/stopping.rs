@@ -149,7 +149,7 @@ impl Session {
             let now = self.clock().now();
             if now >= deadline {
                 // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when.
-                if !(self.made_safe_since(told.began) && self.attended.load(Ordering::Relaxed)) {
+                if !self.waits_for_people(told.began) {
                     break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
                 }
                 deadline = now + take_down.within;
@@ -230,8 +230,11 @@ impl Session {
         told.notes.extend(notes);
     }
 
-    /// Whether a safe configuration is in force that came since then.
-    fn made_safe_since(&self, began: Time) -> bool {
+    /// Whether a safe configuration is in force that came since then, and somebody is there to decide how to go on.
+    pub(super) fn waits_for_people(&self, began: Time) -> bool {
+        if !self.attended.load(Ordering::Relaxed) {
+            return false;
+        }
         let safe = |id: ConfigId| self.deployment().configurations.iter().any(|c| c.id == id && c.safe);
         self.frames().iter().any(|frame| frame.at >= began && safe(frame.configuration))
     }

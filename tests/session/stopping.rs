@@ -56,6 +56,7 @@ fn coordinator(leading: &str) -> String {
   trans {{ src = "lifting", tgt = "lowering", events = {{ "e_stop" }} }},
   trans {{ src = "up", tgt = "{leading}", events = {{ "e_stop" }} }},
   trans {{ src = "up", tgt = "safe", events = {{ "e_estop" }} }},
+  trans {{ src = "lifting", tgt = "safe", events = {{ "e_estop" }} }},
   trans {{ src = "lowering", tgt = "safe", events = {{ "e_estop" }} }},
   trans {{ src = "lowering", tgt = "removing", events = {{ "lift.undone" }} }},
   trans {{ src = "lowering", tgt = "failed", events = {{ "lift.undo.failed", "lift.undo.broken" }} }},
@@ -278,6 +279,20 @@ fn an_emergency_on_the_way_down_stops_the_time() {
     assert!((60.0..62.0).contains(&took), "{took}");
     assert!(ended.is_clean(), "{ended:?}");
     let calls = small.steps().iter().filter(|step| step.contains("operation_call")).count();
+    assert_eq!(calls, 1, "nothing moves after it: {:?}", small.heard.lock().unwrap());
+}
+
+/// An emergency while it comes up: late as it is then, nothing is lowered before somebody asks.
+#[test]
+fn an_emergency_on_the_way_up_stops_the_time() {
+    let small = Small::new("lowering", Vec::new());
+    small.after(1.0, |session| session.raise(event("e_estop"), "test"));
+    small.after(60.0, |session| force(session));
+    let began = small.clock.now();
+    let not_up = small.session.bring_up().unwrap_err();
+    let took = small.clock.now().since(began).as_secs_f64();
+    assert!(took >= 60.0 && not_up.interrupted, "{took}: {not_up:?}");
+    let calls = small.steps().iter().filter(|step| step.contains("a.raise")).count();
     assert_eq!(calls, 1, "nothing moves after it: {:?}", small.heard.lock().unwrap());
 }
 
