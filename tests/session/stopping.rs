@@ -287,7 +287,7 @@ fn an_emergency_on_the_way_down_stops_the_time() {
 fn an_emergency_on_the_way_up_stops_the_time() {
     let small = Small::new("lowering", Vec::new());
     small.after(1.0, |session| session.raise(event("e_estop"), "test"));
-    small.after(60.0, |session| force(session));
+    small.after(60.0, force);
     let began = small.clock.now();
     let not_up = small.session.bring_up().unwrap_err();
     let took = small.clock.now().since(began).as_secs_f64();
