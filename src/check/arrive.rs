@@ -307,6 +307,10 @@ impl Product<'_> {
 
     /// A batch under way begins, or the rest of it: a push takes its place on the stack then, or finds none.
     pub(super) fn takes_place(&mut self, state: &mut State, number: u32) {
+        // What is over, however that came, has no place, and its number is another's.
+        let State { placed, joined, desk, .. } = &mut *state;
+        placed.retain(|of| *of != number && desk.turn_of(*of).is_some());
+        joined.retain(|of| desk.turn_of(*of).is_some());
         let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
         let Some(requests) = turn.map(|turn| turn.batch.requests.clone()) else { return };
         if self.worlds.is_tight(state.world, &requests)

@@ -103,7 +103,8 @@ impl Engine {
         frames.rev().filter(|frame| self.came_since(frame)).find(moved).map(|frame| frame.configuration)
     }
 
-    /// Pops frame after frame, newest first; what cannot be popped stays, with what it blocks.
+    /// Pops frame after frame, newest first; what cannot be popped stays, with every older frame that shares a component with
+    /// it: what holds an arm up is not taken from under it. So does what is safe, also what became so meanwhile.
     fn pop_all(&mut self, down: &mut TakenDown, deadline: Time) {
         let from = self.world.stack.next();
         let mut kept: BTreeSet<FrameId> = BTreeSet::new();
@@ -112,6 +113,16 @@ impl Engine {
             let stays = |frame: &Frame| frame.safe || frame.id >= from || kept.contains(&frame.id);
             let next = self.world.stack.frames().iter().rev().find(|frame| !stays(frame) && !self.came_since(frame));
             let Some(frame) = next.cloned() else { break };
+            let own = crate::stack::components(&frame.footprint);
+            let holds = |other: &Arc<Frame>| {
+                let above = other.id > frame.id && (other.safe || kept.contains(&other.id));
+                above && crate::stack::components(&other.footprint).iter().any(|component| own.contains(component))
+            };
+            if self.world.stack.frames().iter().any(holds) {
+                kept.insert(frame.id);
+                down.kept.push(frame.configuration);
+                continue;
+            }
             match self.pop(&frame, deadline) {
                 Ok(()) => down.popped.push(frame.configuration),
                 Err(reason) => {

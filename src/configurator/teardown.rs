@@ -7,7 +7,7 @@ use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlannedStep, Stage};
-use crate::stack::{Broken, Effort, Part, Planned, Requester, Residual, Why, effort};
+use crate::stack::{Broken, Effort, FrameId, Part, Planned, Requester, Residual, Why, effort};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, Spec, Transaction};
@@ -58,20 +58,30 @@ impl Engine {
         self.forget_standings();
         // Not after what is out has come in: now.
         self.break_off();
+        let since = self.world.stack.next();
         let Force { safe, rest } = self.given.force.clone();
         // What a safe configuration held still before stopping began is not moved any more.
         let held = match self.began {
             Some(_) => self.is_held(),
             None => self.world.stack.safe().next().is_some(),
         };
-        self.apply_all(&safe, true, &mut down);
+        self.apply_all(&safe, None, &mut down);
         if !held {
-            self.apply_all(&rest, false, &mut down);
+            self.apply_all(&rest, Some(since), &mut down);
             down.rest = rest;
         }
         down.safe = safe;
         self.end_running();
         self.refuse_waiting();
+        // An emergency meanwhile: nothing is taken away from under what it holds, before somebody asks once more.
+        if self.became_safe(since) {
+            self.see_left(&mut down);
+            down.still = true;
+            down.in_time = self.given.clock.now() <= deadline;
+            self.taking_down = false;
+            self.changed();
+            return down;
+        }
         self.remove_all(&mut down, deadline);
         self.world.stack.discard();
         self.world.broken.clear();
@@ -134,8 +144,16 @@ impl Engine {
         }
     }
 
-    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out.
-    fn apply_all(&mut self, ids: &[ConfigId], safe: bool, down: &mut TakenDown) {
+    /// Whether a safe configuration has come since this frame would have been the next.
+    fn became_safe(&self, since: FrameId) -> bool {
+        self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since)
+    }
+
+    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out. `since`: they bring it to
+    /// rest, where no safe configuration has come since then; what moves is done where somebody has asked for force, or none is
+    /// in force.
+    fn apply_all(&mut self, ids: &[ConfigId], since: Option<FrameId>, down: &mut TakenDown) {
+        let safe = since.is_none();
         let configurations = self.given.configurations.clone();
         for id in ids {
             let Some(configuration) = configurations.get(id) else { continue };
@@ -144,7 +162,9 @@ impl Engine {
             let Effort { planned, troubles, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
             // A safe configuration that somebody asked for keeps everything still.
+            let asked = self.is_hurried() && since.is_some_and(|since| !self.became_safe(since));
             if !safe
+                && !asked
                 && self.world.stack.safe().next().is_some()
                 && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
             {
@@ -154,10 +174,12 @@ impl Engine {
             }
             // What brings it to rest may take the time that it gives itself.
             let patience = configuration.timeout.unwrap_or_default().max(self.given.limits.step_timeout);
+            let steps = planned.steps.len();
             let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
             let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
+            let broken_off = done.done_so_far().count() < steps;
             let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
-            if !troubles.is_empty() {
+            if broken_off || !troubles.is_empty() {
                 down.partly.push(*id);
             }
             down.troubles.extend(troubles);

@@ -60,7 +60,10 @@ pub fn first(force: bool, leads: bool) -> Stage {
 /// there to decide about it.
 pub fn next(stage: Stage, came: &Came, held: bool) -> Next {
     match (stage, came) {
-        (_, Came::Empty) | (Stage::Forced, _) => Next::Over,
+        (_, Came::Empty) => Next::Over,
+        // An emergency while it was forced.
+        (Stage::Forced, Came::Left(_)) if held => Next::Held,
+        (Stage::Forced, _) => Next::Over,
         (_, Came::Hurried) => Next::Stage(Stage::Forced),
         (Stage::Led, Came::Left(_)) => Next::Stage(Stage::TakenBack),
         (Stage::TakenBack, Came::Left(_)) if held => Next::Held,
@@ -80,10 +83,11 @@ mod tests {
                 assert_eq!(next(stage, &Came::Empty, held), Next::Over);
             }
             assert_eq!(next(Stage::Led, &left(), held), Next::Stage(Stage::TakenBack));
-            assert_eq!(next(Stage::Forced, &left(), held), Next::Over, "nothing comes after force");
             assert_eq!(next(Stage::Led, &Came::Hurried, held), Next::Stage(Stage::Forced));
             assert_eq!(next(Stage::TakenBack, &Came::Hurried, held), Next::Stage(Stage::Forced));
         }
+        assert_eq!(next(Stage::Forced, &left(), false), Next::Over, "nothing comes after force");
+        assert_eq!(next(Stage::Forced, &left(), true), Next::Held, "an emergency meanwhile");
         assert_eq!(next(Stage::TakenBack, &left(), false), Next::Stage(Stage::Forced));
         assert_eq!(
             next(Stage::TakenBack, &left(), true),

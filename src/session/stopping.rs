@@ -62,7 +62,7 @@ impl Session {
             let (came, held) = match stage {
                 Stage::Led => (self.lead_down(&told), false),
                 Stage::TakenBack => self.take_all_back(&mut told),
-                Stage::Forced => (self.force_all(&mut told), false),
+                Stage::Forced => self.force_all(&mut told),
             };
             let came_to = next(stage, &came, held && self.attended.load(Ordering::Relaxed));
             why = match came {
@@ -198,12 +198,17 @@ impl Session {
     }
 
     /// The third stage.
-    fn force_all(&self, told: &mut Told) -> Came {
+    fn force_all(&self, told: &mut Told) -> (Came, bool) {
         let deadline = self.clock().now() + self.deployment().shutdown.within;
-        let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
+        let Some(mut down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             told.notes.push("the configurator did not answer".to_owned());
-            return Came::Left("the configurator did not answer".to_owned());
+            return (Came::Left("the configurator did not answer".to_owned()), false);
         };
+        // Nobody is there who could ask once more.
+        if down.still && !self.attended.load(Ordering::Relaxed) {
+            let deadline = self.clock().now() + self.deployment().shutdown.within;
+            down = self.stage_of(self.configurator().force_down(deadline), deadline).unwrap_or(down);
+        }
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
         let applied = applied.chain(down.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
         let done = |id: &ConfigId| if down.partly.contains(id) { "applied as far as it went" } else { "applied" };
@@ -211,7 +216,10 @@ impl Session {
         notes.extend(forced(&down.forced));
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
-        if down.is_clean() { Came::Empty } else { Came::Left("something is left".to_owned()) }
+        match down.is_clean() {
+            true => (Came::Empty, false),
+            false => (Came::Left("something is left".to_owned()), down.still),
+        }
     }
 
     /// What the configurator answers. What does not keep its time is broken off.

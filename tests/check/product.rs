@@ -332,3 +332,22 @@ fn what_cannot_be_taken_back_unconfirmed_is_told_with_its_way() {
     });
     assert!(script.is_some());
 }
+
+/// Up and down again while it goes down, with a stack that is full all the time: what waits for its place is forgotten when it
+/// is over, whatever became of it.
+#[test]
+fn a_full_stack_has_no_more_states_than_there_are() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, one = Configuration { property_set(\"a.gain\", 3.0) },";
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state { entry = \"one\" }, leaving = state { entry = \"base.undo\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"building\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },
+        trans { src = \"leaving\", tgt = \"building\", events = { \"e_start\" } },";
+    let small = Small::new(configurations, states, "limits: { stack: 2 }\n");
+    let json = small.demo.run(&["check", "small.yaml", "--json"]).json();
+    assert!(json["explored"]["states"].as_u64().unwrap() < 2000, "{:#}", json["explored"]);
+}

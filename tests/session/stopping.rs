@@ -296,6 +296,21 @@ fn an_emergency_on_the_way_up_stops_the_time() {
     assert_eq!(calls, 1, "nothing moves after it: {:?}", small.heard.lock().unwrap());
 }
 
+/// An emergency while force brings it to rest: nothing is taken away before somebody asks once more, and then it comes to rest.
+#[test]
+fn an_emergency_while_it_is_forced_waits_for_people() {
+    let small = Small::up("lowering");
+    small.after(1.0, |session| session.raise(event("e_estop"), "test"));
+    small.after(30.0, force);
+    let began = small.clock.now();
+    let ended = small.session.take_down(true);
+    let took = small.clock.now().since(began).as_secs_f64();
+    assert!((32.0..33.0).contains(&took), "{took}: {ended:?}");
+    let calls = small.steps().iter().filter(|step| step.contains("a.lower")).count();
+    assert_eq!(calls, 2, "broken off, and once more: {:?}", small.heard.lock().unwrap());
+    small.is_empty();
+}
+
 /// When no coordinator hears it any more, a safety event acts by itself: the call under way is given up, and nothing moves.
 #[test]
 fn a_safety_event_acts_by_itself_once_nobody_leads() {

@@ -104,11 +104,11 @@ fn every_deployment_is_followed_within_the_bounds() {
         assert!(told.is_empty(), "{name}: {told:#?}");
         assert!(report.explored.unfollowed == 0, "{name}: {:?}", report.explored);
         let bounds = [
-            "batch of a coordinator",
+            "behind an undo that failed",
             "batches of one coordinator",
             "an operator's safe configuration",
             "2 frames of one configuration",
-            "rounds on which frames pile up",
+            "each round leaves a frame more",
             "where frames have been squashed",
         ];
         let named = |line: &String| bounds.iter().any(|bound| line.contains(bound));
