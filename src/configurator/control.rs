@@ -67,6 +67,8 @@ pub(super) struct Began {
     pub next: FrameId,
     /// When.
     pub at: Time,
+    /// The number of the next frame when its coordinators were left out.
+    pub led: Option<FrameId>,
 }
 
 /// What a stage of stopping came to.

@@ -22,7 +22,7 @@ impl Engine {
         if self.began.is_some() {
             return;
         }
-        self.began = Some(Began { next: self.world.stack.next(), at: self.given.clock.now() });
+        self.began = Some(Began { next: self.world.stack.next(), at: self.given.clock.now(), led: None });
         let operators = |request: &Request| request.why == Why::Asked && request.requester == Requester::Operator;
         for request in self.desk.cancel_waiting(operators) {
             self.refuse(request);
@@ -55,6 +55,7 @@ impl Engine {
     pub(super) fn take_all_back(&mut self, deadline: Time) -> TakenDown {
         let mut down = TakenDown::default();
         self.taking_down = true;
+        self.nobody_leads();
         self.glance();
         self.confirmations.clear();
         self.forget_standings();
@@ -79,6 +80,12 @@ impl Engine {
         self.taking_down = false;
         self.changed();
         down
+    }
+
+    /// The coordinators are left out; answers the number of the next frame when they were.
+    pub(super) fn nobody_leads(&mut self) -> FrameId {
+        let next = self.world.stack.next();
+        self.began.as_mut().map_or(next, |began| *began.led.get_or_insert(next))
     }
 
     /// Whether a safe configuration was in force before stopping began, and nobody let it go.

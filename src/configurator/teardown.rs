@@ -58,7 +58,7 @@ impl Engine {
         self.forget_standings();
         // Not after what is out has come in: now.
         self.break_off();
-        let since = self.world.stack.next();
+        let (led, since) = (self.nobody_leads(), self.world.stack.next());
         let Force { safe, rest } = self.given.force.clone();
         // What a safe configuration held still before stopping began is not moved any more.
         let held = match self.began {
@@ -67,7 +67,7 @@ impl Engine {
         };
         self.apply_all(&safe, None, &mut down);
         if !held {
-            self.apply_all(&rest, Some(since), &mut down);
+            self.apply_all(&rest, Some(led), &mut down);
             down.rest = rest;
         }
         down.safe = safe;
@@ -149,11 +149,11 @@ impl Engine {
         self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since)
     }
 
-    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out. `since`: they bring it to
-    /// rest, where no safe configuration has come since then; what moves is done where somebody has asked for force, or none is
-    /// in force.
-    fn apply_all(&mut self, ids: &[ConfigId], since: Option<FrameId>, down: &mut TakenDown) {
-        let safe = since.is_none();
+    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out. `led`: they bring it to
+    /// rest; what moves is done where no safe configuration is in force, or where somebody has asked for force and none has come
+    /// since nobody leads.
+    fn apply_all(&mut self, ids: &[ConfigId], led: Option<FrameId>, down: &mut TakenDown) {
+        let safe = led.is_none();
         let configurations = self.given.configurations.clone();
         for id in ids {
             let Some(configuration) = configurations.get(id) else { continue };
@@ -162,7 +162,7 @@ impl Engine {
             let Effort { planned, troubles, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
             // A safe configuration that somebody asked for keeps everything still.
-            let asked = self.is_hurried() && since.is_some_and(|since| !self.became_safe(since));
+            let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led));
             if !safe
                 && !asked
                 && self.world.stack.safe().next().is_some()
