@@ -1,5 +1,8 @@
 //! Every bound of the system, with its unit and its reason.
 
+mod kept;
+
+pub use kept::*;
 use std::time::Duration;
 
 /// Frames on a stack before the oldest are squashed into one. Enough for every switch of a session to be undone singly,
@@ -443,7 +446,7 @@ pub const CHECK_DRIVEN: usize = 10_000;
 /// How soon a safety event that nobody leads after acts again by itself: a component may raise it in each update.
 pub const SAFETY_AGAIN: Duration = Duration::from_secs(1);
 
-/// How often what is there is taken away by force, where something is left of it: once more for what failed by chance, and
+/// How often what is there is brought to rest and taken away by force, where something is left of it: once more for what failed by chance, and
 /// once for what that uncovers.
 pub const FORCE_ROUNDS: usize = 3;
 

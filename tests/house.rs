@@ -361,7 +361,7 @@ fn time_is_read_in_one_room() {
 }
 
 /// Files that may write to a stream: all else of the program hands its words to one of them.
-const WRITERS: &[&str] = &["src/cli/output.rs", "src/cli/detach.rs", "src/cli/progress.rs"];
+const WRITERS: &[&str] = &["src/cli/output.rs", "src/cli/detach.rs", "src/cli/printed.rs", "src/cli/progress.rs"];
 
 #[test]
 fn nothing_is_written_and_nothing_observes_in_a_thread_that_acts() {

@@ -1,5 +1,5 @@
-//! A program with components of its own, one of which starts a thread that panics: whoever panics does not wait for a
-//! terminal that was stopped, and what it had to say comes when that goes on.
+//! A program with components of its own, one of which prints and starts a thread that panics. Whoever panics does not wait for a
+//! terminal that was stopped, and what it had to say comes when that goes on; in the background what is printed is kept.
 //!
 //! Without a harness: the program starts itself.
 
@@ -12,6 +12,7 @@ use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 use std::process::{Command, ExitCode, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
+use tempfile::TempDir;
 
 const LIMIT: Duration = Duration::from_secs(90);
 const PROGRAM: &str = "DAVIT_TEST_OWN_PROGRAM";
@@ -55,6 +56,7 @@ struct Careless;
 impl Component for Careless {
     fn new(b: &mut Builder<Self>) -> Self {
         b.on_start(|_, _| {
+            println!("on my way");
             let _ = std::thread::spawn(panics).join();
             Ok(())
         });
@@ -88,15 +90,60 @@ fn main() -> ExitCode {
     if std::env::var_os(PROGRAM).is_some() {
         return davit::cli::main(libraries::builtin().with(Library::new("own").with::<Careless>("own.Careless")));
     }
+    a_panic_does_not_wait_for_its_reader();
+    what_is_printed_in_the_background_is_kept();
+    ExitCode::SUCCESS
+}
+
+/// A directory with the deployment, and how the program is started in it.
+fn folder() -> (TempDir, impl Fn(&[&str]) -> Command) {
     let folder = tempfile::tempdir().expect("a directory");
     for (name, text) in [("d.yaml", DEPLOYMENT), ("c.yaml", CONFIGURATIONS), ("c.lua", COORDINATOR)] {
         std::fs::write(folder.path().join(name), text).expect("a written file");
     }
-    let program = |args: &[&str]| {
+    let path = folder.path().to_owned();
+    let program = move |args: &[&str]| {
         let mut command = Command::new(std::env::current_exe().expect("this program"));
-        command.args(args).current_dir(&folder).env(PROGRAM, "1").env("XDG_RUNTIME_DIR", folder.path());
+        command.args(args).current_dir(&path).env(PROGRAM, "1").env("XDG_RUNTIME_DIR", &path);
+        command.env("XDG_STATE_HOME", path.join("state"));
         command
     };
+    (folder, program)
+}
+
+/// Does something at the end, whatever the test found.
+struct Last<F: Fn()>(F);
+
+impl<F: Fn()> Drop for Last<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
+}
+
+fn what_is_printed_in_the_background_is_kept() {
+    let (_folder, program) = folder();
+    let _down = Last(|| drop(program(&["shutdown", "--force"]).output()));
+    let run = |args: &[&str]| {
+        let ran = program(args).output().expect("the program starts");
+        (ran.status.code(), String::from_utf8_lossy(&ran.stdout).into_owned() + &String::from_utf8_lossy(&ran.stderr))
+    };
+    let (code, up) = run(&["deploy", "d.yaml", "--detach"]);
+    assert_eq!(code, Some(0), "{up}");
+    let said = ["printed    on my way", "panicked at", "printed    careless"];
+    let (_, log) = run(&["log"]);
+    said.iter().for_each(|line| assert!(log.contains(line), "{line} while it runs: {log}"));
+    assert!(up.contains("on my way"), "and who started it sees it: {up}");
+    let (code, down) = run(&["shutdown"]);
+    assert_eq!(code, Some(0), "{down}");
+    let (code, log) = run(&["log", "own"]);
+    assert_eq!(code, Some(0), "{log}");
+    said.iter().for_each(|line| assert!(log.contains(line), "{line} after the end: {log}"));
+    assert!(log.contains("build.undone") && log.contains("ended      down"), "{log}");
+    println!("test what_is_printed_in_the_background_is_kept ... ok");
+}
+
+fn a_panic_does_not_wait_for_its_reader() {
+    let (_folder, program) = folder();
     let (mut read, write) = full_pipe();
     let mut command = program(&["deploy", "d.yaml"]);
     let mut child = command.stdout(Stdio::null()).stderr(write).spawn().expect("the program starts");
@@ -128,5 +175,4 @@ fn main() -> ExitCode {
     assert!(told.contains("panicked at") && told.contains("careless"), "{told}");
     assert_eq!(ended.code(), Some(0), "{told}");
     println!("test a_panic_does_not_wait_for_its_reader ... ok");
-    ExitCode::SUCCESS
 }

@@ -23,6 +23,7 @@ use crate::time::{Clock, Time};
 pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -116,7 +117,18 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         refused: None,
         ended: None,
     }));
-    let failure = execute(path, text.as_bytes(), &host).err();
+    let driven = catch_unwind(AssertUnwindSafe(|| execute(path, text.as_bytes(), &host)));
+    // What panicked may have it borrowed, and its Lua state may live on: the session is taken out either way.
+    let failure = match driven {
+        Ok(driven) => driven.err(),
+        Err(panic) => {
+            let session = host.try_borrow().ok().and_then(|host| host.session.clone());
+            if let Some(session) = session {
+                let _ = session.guarded(|| session.take_down(false));
+            }
+            resume_unwind(panic);
+        }
+    };
     let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
     if let Some(session) = host.session.take() {
         host.ended = Some(session.take_down(false));

@@ -1,6 +1,5 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
-use super::outcome::Beside;
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
@@ -178,7 +177,7 @@ impl Product<'_> {
             for Turn { number, batch, .. } in turns {
                 let planned = state.planned(number);
                 if self.worlds.top(planned).is_none() {
-                    let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+                    let beside = Self::as_begun(&state, number);
                     let takes = self.worlds.comes(planned, &batch.requests, &beside).takes();
                     begun.push((number, batch.requests.into_iter().take(takes).collect()));
                 }
@@ -234,7 +233,7 @@ impl Product<'_> {
             // Where nothing is known what stands behind may have begun with the first, or not.
             Some(_) => place == 0 || self.tells_all,
             None => {
-                let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+                let beside = Self::as_begun(state, number);
                 let comes = self.worlds.comes(planned, &requests, &beside);
                 // What was begun as one stays so, whatever of it is answered now.
                 if comes.takes() > 1 && !beside.joined {
@@ -276,12 +275,19 @@ impl Product<'_> {
         }
     }
 
+    /// The next batch that may begin.
+    fn turn(&self, state: &mut State) -> Option<Turn> {
+        let State { desk, world, leaving, .. } = state;
+        let alone = |batch: &Batch| *leaving && self.worlds.goes_alone(*world, batch);
+        desk.turn(&self.worlds.claims, alone).cloned()
+    }
+
     /// Whatever can begin does; nothing while a safe configuration is being applied.
     pub(super) fn begin(&mut self, state: &mut State) {
         if !state.safe.is_empty() {
             return;
         }
-        while let Some(turn) = state.desk.turn(&self.worlds.claims).cloned() {
+        while let Some(turn) = self.turn(state) {
             let first = turn.batch.requests[0];
             if first.why != Why::Down {
                 for request in &turn.batch.requests {
@@ -294,6 +300,7 @@ impl Product<'_> {
             if let Some(number) = self.member(first.requester) {
                 state.down |= 1 << number.min(63);
             }
+            state.leaving &= !self.all_down(state) || self.others;
             if self.all_down(state)
                 && !self.others
                 && let Some(world) = self.worlds.settle_down(state.world)

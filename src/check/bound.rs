@@ -32,6 +32,8 @@ pub enum Bound {
     Stopping,
     /// A coordinator could not be entered.
     Entered,
+    /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
+    Times,
 }
 
 impl Bound {
@@ -74,6 +76,11 @@ impl Bound {
                 "whether one event that ends the deployment leads all coordinators down was not followed".to_owned()
             }
             Self::Entered => "a coordinator could not be entered".to_owned(),
+            Self::Times => {
+                "whether one comes up, or down, in time was not followed: a way that was found lasts too long, and there are too many \
+                 to look for the shortest"
+                    .to_owned()
+            }
         };
         let behind = match failed {
             Failed::Nothing => "",

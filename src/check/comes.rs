@@ -26,7 +26,8 @@ impl Worlds<'_> {
 
     /// The first requests of a batch, as the stack decides.
     pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
-        let rules = Rules { held: &beside.held, joined: beside.joined, placed: beside.placed, ..self.rules() };
+        let Beside { held, joined, placed, alone } = beside;
+        let rules = Rules { held, joined: *joined, placed: *placed, alone: *alone, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 
@@ -113,8 +114,8 @@ impl Worlds<'_> {
     }
 
     /// The steps of a group, for who shows them.
-    pub fn steps(&self, id: WorldId, requests: &[Request]) -> Vec<PlannedStep> {
-        self.group(id, requests, &Beside::default())
+    pub fn steps(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Vec<PlannedStep> {
+        self.group(id, requests, beside)
             .and_then(|group| group.planned)
             .map_or_else(Vec::new, |planned| Arc::unwrap_or_clone(planned.steps))
     }

@@ -4,8 +4,8 @@
 use super::monitors;
 use super::universe::Universe;
 use crate::model::codes::{
-    CONF_HOLDS_UNSEEN, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION, NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE,
-    UNKNOWN_PROPERTY,
+    CONF_HOLDS_UNSEEN, DEPLOY_NO_REST, DEPLOY_ONE_EVENT, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION,
+    NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, SELF, SignalKind};
@@ -38,11 +38,44 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
             );
         }
     }
+    if deployment.deploy.event == deployment.shutdown.event {
+        let message = format!("`{}` both starts and ends the deployment", deployment.deploy.event);
+        findings.push(
+            Finding::error(DEPLOY_ONE_EVENT, message)
+                .at(deployment.key_origin("shutdown.event"))
+                .also(deployment.key_origin("deploy.event"), "starts it")
+                .path("shutdown.event")
+                .help("give it another one: `shutdown: { event: e_shutdown, … }`"),
+        );
+    }
     for (i, (id, at)) in deployment.shutdown.rest.iter().enumerate() {
         let wrong = configuration(deployment, *id, *at);
         findings.extend(wrong.map(|finding| finding.path(format!("shutdown.rest[{i}]"))));
     }
+    findings.extend(restless(deployment, universe));
     findings
+}
+
+/// That something moves, and nothing is named that brings it to rest by force.
+fn restless(deployment: &Deployment, universe: &Universe) -> Option<Finding> {
+    if !deployment.shutdown.rest.is_empty() {
+        return None;
+    }
+    let moves = |ty: &ComponentType| {
+        let operation = ty.operations.iter().find(|(_, operation)| operation.moves);
+        let starts = [(ty.moves.start, "starting it"), (ty.moves.stop, "stopping it")];
+        let starts = starts.into_iter().find(|(moves, _)| *moves).map(|(_, what)| what.to_owned());
+        operation.map(|(name, _)| format!("`{name}`")).or(starts)
+    };
+    let moving = universe.types().filter_map(|ty| Some((ty.name, moves(ty)?)));
+    let (ty, what) = moving.min_by_key(|(ty, _)| ty.as_str())?;
+    let message = format!("`{ty}` moves ({what}), and `shutdown.rest` names nothing that brings it to rest by force");
+    Some(
+        Finding::info(DEPLOY_NO_REST, message)
+            .at(deployment.key_origin("shutdown"))
+            .path("shutdown.rest")
+            .help("name the configurations that do, in their order: `shutdown: { rest: [park], … }`"),
+    )
 }
 
 /// What is wrong with what these configurations stand for.

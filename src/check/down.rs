@@ -1,15 +1,18 @@
 //! Whether every way leads down, and what it leaves behind.
 
 use super::bound::Bound;
-use super::explore::{Edge, Graph};
+use super::closed::still_comes;
+use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
+use super::members::Member;
 use super::product::Product;
-use super::state::{Failed, State};
+use super::state::{Failed, Move, State};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::VecDeque;
 
 impl Graph<'_, '_> {
     /// Ways down that leave something behind.
@@ -96,34 +99,94 @@ impl Graph<'_, '_> {
         reaches
     }
 
-    /// The event that ends the deployment is raised once: it must not take another one to come down.
+    /// The event that ends the deployment is raised once, and not all that leads on where it is not being stopped does then:
+    /// one finding, of what is the first of these in the way somewhere.
     fn once_down(&mut self, reaches: &[bool], found: &mut Traced) {
-        let once = self.reaching_down(|edge| !edge.again);
-        let again = |at: &u32| {
-            let state = &self.states[*at as usize];
-            state.stopping && state.is_at_rest() && reaches[*at as usize] && !once[*at as usize]
-        };
-        let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(again).collect();
-        let Some(at) = self.best_first(some).first().copied() else { return };
+        let mut before = reaches.to_vec();
+        for barred in [Barred::Again, Barred::Closed, Barred::Late, Barred::Reported] {
+            let told = self.product.never_down && matches!(barred, Barred::Closed | Barred::Late);
+            let after = self.reaching_down(|edge| edge.barred.is_none_or(|of| of > barred));
+            let lost = |at: &u32| {
+                let state = &self.states[*at as usize];
+                state.stopping && state.is_at_rest() && before[*at as usize] && !after[*at as usize]
+            };
+            let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
+            if let Some(at) = self.best_first(some).first().copied().filter(|_| !told) {
+                let finding = self.barred(at, barred, &before);
+                let trace = self.trace(at);
+                return found.push((finding, trace));
+            }
+            before = after;
+        }
+    }
+
+    /// Nothing but that leads down from a state in which it is being stopped. `reaches`: where it does.
+    fn barred(&self, at: u32, barred: Barred, reaches: &[bool]) -> Finding {
         let (deployment, state) = (self.product.deployment, &self.states[at as usize]);
-        let severity = if self.failed[at as usize] == Failed::Nothing { Severity::Warning } else { Severity::Info };
+        let severity = match self.failed[at as usize] {
+            Failed::Nothing if barred != Barred::Reported => Severity::Warning,
+            _ => Severity::Info,
+        };
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
-        let message = format!("from `{place}` only a second `{event}` leads down, and it is raised once");
-        // The one that is not down yet, and would be led on by the second one.
+        let by = self.led_on_by(at, barred, reaches);
+        let named = by.map(|by| self.product.named(by)).unwrap_or_default();
+        let message = match barred {
+            Barred::Again => format!("from `{place}` only a second `{event}` leads down, and it is raised once"),
+            Barred::Closed => {
+                format!("from `{place}` only `{named}` leads down, which is refused when `{event}` has been raised")
+            }
+            Barred::Late => format!(
+                "from `{place}` only a time of {} s leads down, and `shutdown.within_s` gives it {} s",
+                by.map(|by| self.product.takes(by)).unwrap_or_default().as_secs_f64(),
+                deployment.shutdown.within.as_secs_f64()
+            ),
+            Barred::Reported => format!(
+                "from `{place}` only `{named}` leads down: an operator cannot raise it when `{event}` has been raised, only a \
+                 component can"
+            ),
+        };
+        // The one that is not down yet, and would be led on.
+        let heard = |member: &Member<'_>| match by {
+            Some(Move::Event(at)) => member.chart.event(self.product.outside[usize::from(at)]) != EventId::OTHER,
+            Some(Move::Time(number, _)) => self.product.members[usize::from(number)].by == member.by,
+            _ => member.chart.event(event) != EventId::OTHER,
+        };
         let late = |number: &usize| {
             let member = &self.product.members[*number];
             let down = member.down.is_some_and(|down| member.chart.is_inside(state.leaves[*number], down));
-            !down && member.chart.event(event) != EventId::OTHER
+            !down && heard(member)
         };
         let late = (0..self.product.members.len()).find(late).unwrap_or(0);
-        let finding = Finding::new(severity, COORD_NO_WAY_DOWN, message)
+        let help = match barred {
+            Barred::Again => "let an answer or a time lead on from there".to_owned(),
+            Barred::Closed => still_comes(&named),
+            Barred::Late => "give it more time with `shutdown.within_s`, or let something lead on sooner".to_owned(),
+            Barred::Reported => "let an answer or a time lead on as well, where no component raises it".to_owned(),
+        };
+        Finding::new(severity, COORD_NO_WAY_DOWN, message)
             .at(self.product.members[late].chart.origin(state.leaves[late]))
             .path("shutdown.event")
-            .help(
-                "let an answer or a time lead on from there; else what is left is taken down without the coordinator",
-            );
-        let trace = self.trace(at);
-        found.push((finding, trace));
+            .help(format!("{help}; else what is left is taken down without the coordinator"))
+    }
+
+    /// The first move of that kind on the shortest way down.
+    fn led_on_by(&self, at: u32, barred: Barred, reaches: &[bool]) -> Option<Move> {
+        let mut out: FxHashMap<u32, Vec<&Edge>> = FxHashMap::default();
+        let counts = |edge: &&Edge| edge.barred.is_none_or(|of| of >= barred) && reaches[edge.to as usize];
+        self.edges.iter().filter(counts).for_each(|edge| out.entry(edge.from).or_default().push(edge));
+        let mut seen: FxHashSet<u32> = std::iter::once(at).collect();
+        let mut queue = VecDeque::from([at]);
+        while let Some(at) = queue.pop_front() {
+            for edge in out.get(&at).into_iter().flatten() {
+                if edge.barred == Some(barred) {
+                    return Some(edge.by);
+                }
+                if seen.insert(edge.to) {
+                    queue.push_back(edge.to);
+                }
+            }
+        }
+        None
     }
 }
 

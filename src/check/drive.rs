@@ -5,12 +5,16 @@
 //! to the goal.
 
 use super::beside;
+use super::closed::Raises;
+use super::lasts;
 use super::members::Member;
 use super::outcome::Held;
 use super::product::Product;
+use super::shows::goes;
 use super::state::{Move, Next, State};
+use super::tried::{Goal, Tried, Way};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Findings, Ident, Snapshot};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
@@ -74,24 +78,6 @@ pub enum Until {
     Down,
 }
 
-/// A way: states with what leads to them.
-pub(super) struct Way {
-    pub(super) from: State,
-    pub(super) moves: Vec<Next>,
-    pub(super) reached: bool,
-    pub(super) refused: Option<(Request, Findings)>,
-}
-
-impl Way {
-    /// The state at the end.
-    pub(super) fn end(&self) -> &State {
-        self.moves.last().map_or(&self.from, |next| &next.state)
-    }
-}
-
-/// Which state of a coordinator is the goal.
-type Goal = fn(&Member<'_>) -> Option<NodeId>;
-
 impl Product<'_> {
     /// What happens next by itself when every request is answered *ok*; none: nothing does, or it is refused.
     fn by_itself(&mut self, state: &State) -> Result<Option<Next>, (Request, Findings)> {
@@ -116,46 +102,71 @@ impl Product<'_> {
     }
 
     /// Lets everything happen that does by itself, and appends it. Stops early where all are at the goal.
-    fn rest(&mut self, state: State, goal: Goal, moves: &mut Vec<Next>) -> Result<State, (Request, Findings)> {
+    pub(super) fn rest(
+        &mut self,
+        state: State,
+        goal: Goal,
+        moves: &mut Vec<Next>,
+    ) -> Result<State, (Request, Findings)> {
         let mut state = state;
         let mut seen: FxHashSet<State> = FxHashSet::default();
-        while !(state.is_at_rest() && self.all_in(&state, goal))
-            && state.waiting() <= limits::CHECK_PILED
-            && seen.len() < limits::CHECK_DRIVEN
-            && seen.insert(state.clone())
-        {
-            let Some(next) = self.by_itself(&state)? else { break };
+        for _ in 0..limits::CHECK_DRIVEN {
+            if state.is_at_rest() && self.all_in(&state, goal) || state.waiting() > limits::CHECK_PILED {
+                break;
+            }
+            // Where answers go round for ever the others come to what lies in their inboxes all the same.
+            let next = match seen.insert(state.clone()) {
+                true => self.by_itself(&state)?,
+                false => {
+                    seen.clear();
+                    self.goes_on(&state).all.into_iter().find(|next| matches!(next.by, Move::Taken(..)))
+                }
+            };
+            let Some(next) = next else { break };
             state = next.state.clone();
             moves.push(next);
         }
         Ok(state)
     }
 
-    /// What comes when this event does, or none of these is heard.
-    fn outside_moves(&mut self, state: &State, only: Option<EventName>, never: EventName) -> Vec<Next> {
-        let outside = self.outside.clone();
+    /// What comes first, or later.
+    pub(super) fn outside_moves(&mut self, state: &State, tried: &Tried, first: bool) -> Vec<Next> {
+        let all = self.nexts(state).all;
         let fits = |next: &Next| match next.by {
             Move::Event(at) => {
-                let name = outside[usize::from(at)];
-                only.is_none_or(|only| only == name) && name != never
+                let name = self.outside[usize::from(at)];
+                (!first || name == tried.first) && name != tried.never
             }
-            Move::Time(..) | Move::Confirmed(_) => only.is_none(),
+            Move::Time(..) | Move::Confirmed(_) => !first,
             _ => false,
         };
-        self.nexts(state).all.into_iter().filter(fits).collect()
+        let comes = |next: &Next| !tried.stopping || self.raises_while_stopping(next.by) > Raises::Nobody;
+        all.into_iter().filter(|next| fits(next) && comes(next)).collect()
     }
 }
 
-/// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*, that
-/// begins with `first` and has `never` nowhere. When there is none, the way to where it stops.
-fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventName, goal: Goal) -> Way {
+/// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*; where that
+/// has too little time, the one that lasts shortest. When there is none, the way to where it stops.
+fn way(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
+    let mut way = shortest(product, from, tried, goal);
+    if way.reached
+        && product.lasts(&way.from, &way.moves).0 >= tried.within
+        && let Some(moves) = lasts::soonest(product, &way, tried, goal)
+    {
+        way.moves = moves;
+        way.late = Some(product.lasts(&way.from, &way.moves)).filter(|(lasts, _)| *lasts >= tried.within);
+    }
+    way
+}
+
+fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
     let mut states: Vec<(State, Option<usize>, Vec<Next>)> = Vec::new();
     let mut index: FxHashSet<State> = FxHashSet::default();
     let mut queue: VecDeque<usize> = VecDeque::new();
     let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
     states.push((from.clone(), None, Vec::new()));
     queue.push_back(0);
-    let (mut last, mut reached) = (0, None);
+    let (mut last, mut reached, mut round) = (0, None, None);
     while let Some(at) = queue.pop_front() {
         let state = states[at].0.clone();
         if at > 0 && state.is_at_rest() && product.all_in(&state, goal) {
@@ -166,11 +177,13 @@ fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventNam
             break;
         }
         last = at;
-        for next in product.outside_moves(&state, (at == 0).then_some(first), never) {
+        for next in product.outside_moves(&state, tried, at == 0) {
             let mut moves = vec![next.clone()];
             match product.rest(next.state, goal, &mut moves) {
                 Ok(rest) => {
                     if index.insert(rest.clone()) {
+                        // Where answers go round for ever is what keeps it from coming anywhere.
+                        round = round.or((!rest.is_at_rest()).then_some(states.len()));
                         queue.push_back(states.len());
                         states.push((rest, Some(at), moves));
                     }
@@ -182,7 +195,7 @@ fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventNam
     let (mut at, mut moves) = match (reached, &refused) {
         (Some(at), _) => (at, Vec::new()),
         (None, Some((at, moves, _))) => (*at, moves.clone()),
-        (None, None) => (last, Vec::new()),
+        (None, None) => (round.unwrap_or(last), Vec::new()),
     };
     while let Some(before) = states[at].1 {
         let mut way = states[at].2.clone();
@@ -191,7 +204,7 @@ fn way(product: &mut Product<'_>, from: State, first: EventName, never: EventNam
         at = before;
     }
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
-    Way { from, moves, reached: reached.is_some(), refused }
+    Way { from, moves, reached: reached.is_some(), refused, late: None }
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round
@@ -233,7 +246,8 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let mut moves = settled(product, &start);
     let ready = moves.last().map_or(&start, |next| &next.state).clone();
     let (deploy, shutdown) = (deployment.deploy.event, deployment.shutdown.event);
-    let mut rise = way(product, ready, deploy, shutdown, |member| member.up);
+    let tried = Tried { first: deploy, never: shutdown, stopping: false, within: deployment.deploy.within };
+    let mut rise = way(product, ready, &tried, |member| member.up);
     // From the start, not from where it was ready.
     moves.append(&mut rise.moves);
     let rise = Way { from: start, moves, ..rise };
@@ -241,7 +255,8 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
         return Some((rise, None));
     }
     let top = rise.end().clone();
-    let fall = way(product, top, shutdown, deploy, |member| member.down);
+    let tried = Tried { first: shutdown, never: deploy, stopping: true, within: deployment.shutdown.within };
+    let fall = way(product, top, &tried, |member| member.down);
     Some((rise, Some(fall)))
 }
 
@@ -302,7 +317,7 @@ fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
                     happenings.push(Happening::Applied {
                         coordinator: product.members[member].name,
                         asks: requests.iter().map(|request| request.ask).collect(),
-                        steps: product.worlds.steps(before.world, &requests),
+                        steps: product.worlds.steps(before.world, &requests, &goes(before, &requests)),
                         result: world.system.snapshot(),
                         state: state(member),
                     });

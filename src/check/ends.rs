@@ -1,6 +1,6 @@
 //! How what is under way may end.
 
-use super::outcome::{Beside, Comes, Went, WorldId};
+use super::outcome::{Comes, Went, WorldId};
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, Unconfirmed};
 use super::world::Top;
@@ -232,7 +232,7 @@ impl Product<'_> {
         given_up: &[usize],
         nexts: &mut Nexts,
     ) {
-        let beside = Beside { joined: state.joined.contains(&number), ..Beside::default() };
+        let beside = Self::as_begun(state, number);
         let comes = self.worlds.comes(planned, requests, &beside);
         let parts = comes.group.places.iter().enumerate();
         let given_up: SmallVec<[usize; 2]> =

@@ -28,16 +28,31 @@ pub struct Edge {
     pub to: u32,
     /// Its place among the moves from there; none: so many rounds of a circle.
     pub place: Option<u32>,
+    /// What leads there.
+    pub by: Move,
     /// What failed in it.
     pub failed: Failed,
     /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
     pub quiet: bool,
-    /// The event that ends the deployment comes once more, or somebody wants it up again.
-    pub again: bool,
+    /// What does not come by itself, or not in time, where the deployment is being stopped.
+    pub barred: Option<Barred>,
     /// It comes, and nobody hears it.
     pub dropped: bool,
     /// As far as this move alone tells, a script can bring it about.
     pub shown: bool,
+}
+
+/// Why a way down by a move is none for a deployment that is being stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Barred {
+    /// The event that ends the deployment comes once more, or somebody wants it up again.
+    Again,
+    /// An event that is refused then.
+    Closed,
+    /// A time event that lasts as long as the shutdown may.
+    Late,
+    /// An event that only a component may raise then, if one does.
+    Reported,
 }
 
 /// Everything that was followed.
@@ -246,14 +261,15 @@ impl Graph<'_, '_> {
             }
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
-            let again = state.stopping && self.product.is_first_or_last(next.by);
+            let barred = state.stopping.then(|| self.product.barred(next.by)).flatten();
             let dropped = matches!(next.by, Move::Dropped(_));
             let shown = shows.shows(self.product, &state, &next);
+            let by = next.by;
             let (mut next, class) = self.abstracted(next, so_far);
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
-            self.edges.push(Edge { from: at, to, place, failed: class, quiet, again, dropped, shown });
+            self.edges.push(Edge { from: at, to, place, by, failed: class, quiet, barred, dropped, shown });
         }
     }
 

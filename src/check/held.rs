@@ -4,17 +4,17 @@
 use super::outcome::{Beside, Held, Went, WorldId};
 use super::world::{Worlds, plain};
 use crate::model::ConfigId;
-use crate::stack::{Frame, FrameId, Request, Requester, Stack, held};
+use crate::stack::{Batch, Frame, FrameId, Request, Requester, Stack, held};
 use smallvec::SmallVec;
 
 impl Worlds<'_> {
     /// The frames that a batch under way pops or hands over to.
-    pub fn held_by(&mut self, id: WorldId, requests: &[Request], joined: bool) -> Held {
-        let key = (id, plain(requests), joined);
+    pub fn held_by(&mut self, id: WorldId, requests: &[Request], begun: &Beside) -> Held {
+        let key = (id, plain(requests), begun.clone());
         if let Some(known) = self.helds.get(&key) {
             return known.clone();
         }
-        let group = self.group(id, &key.1, &Beside { joined, ..Beside::default() });
+        let group = self.group(id, &key.1, begun);
         let planned = group.and_then(|group| group.planned);
         let held: Held = planned.iter().flat_map(held).collect();
         self.helds.insert(key, held.clone());
@@ -22,8 +22,8 @@ impl Worlds<'_> {
     }
 
     /// The frames that undos of a batch under way are about and that stay, since these are refused.
-    pub fn staying(&self, id: WorldId, requests: &[Request], joined: bool) -> Held {
-        let group = self.group(id, &plain(requests), &Beside { joined, ..Beside::default() });
+    pub fn staying(&self, id: WorldId, requests: &[Request], begun: &Beside) -> Held {
+        let group = self.group(id, &plain(requests), begun);
         group.iter().flat_map(|group| &group.stay).map(|(_, frame)| *frame).collect()
     }
 
@@ -91,6 +91,11 @@ impl Worlds<'_> {
     /// Whether a frame of this configuration is in force, in whatever shape.
     pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
         self.get(id).is_some_and(|world| world.stack.is_in_force(configuration))
+    }
+
+    /// Whether a batch would go alone while everything is led down.
+    pub fn goes_alone(&self, id: WorldId, batch: &Batch) -> bool {
+        self.get(id).is_some_and(|world| world.stack.goes_alone(batch))
     }
 
     /// Whether an operator has a frame in force, and of what.

@@ -5,6 +5,7 @@ use super::explore::Graph;
 use super::reactions::triggers;
 use super::state::{Failed, Move, Next, State, Trouble};
 use super::trace::TraceStep;
+use crate::limits;
 use crate::model::codes::{
     COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD, COORD_STACK_GROWS,
     COORD_STUCK, STACK_FULL,
@@ -84,7 +85,8 @@ impl Graph<'_, '_> {
             said.insert(told, finding.severity);
             let mut trace = self.trace(at);
             if let Some(last) = trace.last_mut() {
-                let within = self.runs_out(at, &request).unwrap_or_default();
+                // Beside what it is carried out with it is answered when that is.
+                let within = self.runs_out(at, &request).unwrap_or_default().max(limits::REPLAY_STEP * 2);
                 last.replay.then = Some((request.ask.failed().event(request.ask), within));
             }
             // The reasons are findings of their own, each at its place.
@@ -229,8 +231,12 @@ impl Graph<'_, '_> {
     fn blamed(&self, state: &State, request: &Request) -> Vec<Requester> {
         let Some(world) = self.product.worlds.get(state.world) else { return Vec::new() };
         let strange = |requester: &Requester| *requester != request.requester;
+        // What a state brings with it, and nobody asks for else.
+        let stays = |id: ConfigId| self.is_scoped(id) && !self.is_asked_plainly(id);
+        let batch = state.desk.under_way().iter().map(|turn| &turn.batch.requests);
+        let own = batch.into_iter().find_map(|all| Some(&all[..all.iter().position(|other| other == request)?]));
         if !world.stack.frames().iter().any(|frame| strange(&frame.requester))
-            || self.product.worlds.is_refused_alone(state.world, request)
+            || self.product.worlds.is_refused_alone(state.world, own.unwrap_or_default(), request, stays)
         {
             return Vec::new();
         }
@@ -345,6 +351,11 @@ impl Graph<'_, '_> {
     /// Whether some state of a coordinator has it as its `config`.
     fn is_scoped(&self, id: ConfigId) -> bool {
         let of = |site: &RaiseSite| site.scoped && site.name.as_str() == id.as_str();
+        self.product.members.iter().any(|member| member.chart.raises().iter().any(of))
+    }
+
+    fn is_asked_plainly(&self, id: ConfigId) -> bool {
+        let of = |site: &RaiseSite| !site.scoped && site.name.as_str() == id.as_str();
         self.product.members.iter().any(|member| member.chart.raises().iter().any(of))
     }
 

@@ -46,6 +46,8 @@ pub struct Beside {
     pub joined: bool,
     /// Its pushes have taken their place.
     pub placed: bool,
+    /// It has begun alone, while everything is led down.
+    pub alone: bool,
 }
 
 /// What the first requests of a batch come to.

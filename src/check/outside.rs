@@ -46,6 +46,7 @@ impl Product<'_> {
         {
             let mut next = state.clone();
             next.world = world;
+            next.leaving = false;
             next.unconfirmed.clear();
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
@@ -80,9 +81,15 @@ impl Product<'_> {
         if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {
             return;
         }
-        let next = State { stopping: true, ..state.clone() };
+        let leaving = state.leaving || self.minds_operators();
+        let next = State { stopping: true, leaving, ..state.clone() };
         let by = Move::Dropped(u16::try_from(at).unwrap_or(u16::MAX));
         nexts.all.push(Next::plain(by, next, Failed::Nothing));
+    }
+
+    /// Whether an operator may have a frame in force.
+    fn minds_operators(&self) -> bool {
+        self.tells_all || !self.operator.is_empty()
     }
 
     /// An event comes to all that wait for it.
@@ -91,6 +98,8 @@ impl Product<'_> {
         next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping;
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
+        next.leaving |= name == self.deployment.shutdown.event && self.minds_operators();
+        next.leaving &= name != self.deployment.deploy.event;
         self.confirm(&mut next, name);
         self.spread(&mut next, name, None);
         // If one alone hears it, there is nothing to wait for.

@@ -58,6 +58,10 @@ pub struct Product<'a> {
     pub minds_stopping: bool,
     /// What an operator's safe configuration leads to is followed: only where that is easy.
     pub follows_by_hand: bool,
+    /// It is said already that the shutdown does not reach *down*.
+    pub never_down: bool,
+    /// There were too many ways up or down to find the one that lasts shortest.
+    pub untimed: bool,
 }
 
 impl<'a> Product<'a> {
@@ -99,6 +103,8 @@ impl<'a> Product<'a> {
             tells_all: false,
             minds_stopping,
             follows_by_hand: false,
+            never_down: false,
+            untimed: false,
         };
         product.worlds.judged = super::stands::judged(deployment, charts);
         product.alike = product.alike_events();
@@ -136,6 +142,7 @@ impl<'a> Product<'a> {
             lost: SmallVec::new(),
             down: 0,
             stopping: false,
+            leaving: false,
             flight: Vec::new(),
         };
         let mut states = vec![state];
@@ -260,18 +267,24 @@ impl<'a> Product<'a> {
 
     /// What stands beside a batch under way (none: beside what does not wait) in the state's world.
     pub(super) fn beside(&mut self, state: &State, number: Option<u32>) -> Beside {
-        let joined = |number: u32| state.joined.contains(&number);
         let mut held = Held::new();
         for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
             let planned = state.planned(turn.number);
-            let own = self.worlds.held_by(planned, &turn.batch.requests, joined(turn.number));
+            let own = self.worlds.held_by(planned, &turn.batch.requests, &Self::as_begun(state, turn.number));
             held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
         held.sort_unstable();
         held.dedup();
         let placed = number.is_some_and(|number| state.placed.contains(&number));
-        Beside { held, joined: number.is_some_and(joined), placed }
+        let begun = number.map(|number| Self::as_begun(state, number)).unwrap_or_default();
+        Beside { held, placed, ..begun }
+    }
+
+    /// How a batch under way has begun.
+    pub(super) fn as_begun(state: &State, number: u32) -> Beside {
+        let alone = state.desk.turn_of(number).is_some_and(|turn| turn.alone);
+        Beside { joined: state.joined.contains(&number), alone, ..Beside::default() }
     }
 
     /// Frames that undos under way are about, also those of which it is known that they stay: no later undo by leaving the
@@ -280,8 +293,7 @@ impl<'a> Product<'a> {
         let mut left = self.beside(state, None).held;
         for turn in state.desk.under_way() {
             let planned = state.planned(turn.number);
-            let joined = state.joined.contains(&turn.number);
-            let stay = self.worlds.staying(planned, &turn.batch.requests, joined);
+            let stay = self.worlds.staying(planned, &turn.batch.requests, &Self::as_begun(state, turn.number));
             left.extend(stay.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         left

@@ -8,7 +8,7 @@
 use super::loss::Loss;
 use super::outcome::Beside;
 use super::product::Product;
-use super::shows::{answered, races, same, too_late, under_way};
+use super::shows::{AT_ONCE, answered, goes, goes_back, races, same, too_late, under_way};
 use super::stands::stands_after;
 use super::state::{Move, Next, State};
 use super::trace::{Does, Replay};
@@ -16,31 +16,31 @@ use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
 use crate::stack::Request;
-use crate::statechart::EventId;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::time::Duration;
 
 /// For moves of a way: what is raised with them, for which coordinators alone, and whether that is later than what comes before.
-type Split = FxHashMap<usize, (EventName, Vec<String>, bool)>;
+pub(super) type Split = FxHashMap<usize, (EventName, Vec<String>, bool)>;
 
 /// A batch that begins on a way.
-struct Begun {
+pub(super) struct Begun {
     /// At which move.
-    at: usize,
-    requests: SmallVec<[Request; 2]>,
+    pub(super) at: usize,
+    pub(super) requests: SmallVec<[Request; 2]>,
     /// At which move it is over; none: it is still under way at the end.
-    over: Option<usize>,
+    pub(super) over: Option<usize>,
     /// It has no step to do: it is answered at once.
-    idle: bool,
+    pub(super) idle: bool,
 }
 
 impl Product<'_> {
     /// What each move of a way needs. `way` has the state before each move.
-    pub fn replay(&self, way: &[(&State, &Next)]) -> Vec<Replay> {
+    pub fn replay(&mut self, way: &[(&State, &Next)]) -> Vec<Replay> {
+        let entries = self.entries(way);
         let begun = self.begun(way);
         let split = self.split(way);
-        let times = self.times(way, &begun, &split);
+        let times = self.times(way, &begun, &split, &entries);
         let mut all: Vec<Replay> = (way.iter().zip(&times))
             .enumerate()
             .map(|(k, ((before, next), at))| Replay {
@@ -55,16 +55,18 @@ impl Product<'_> {
             if too_late(before) || races(before, next) {
                 all[k].does = Does::Cannot("an answer comes while what would stop it is on its way");
             }
-            if before.safe.is_empty() && !before.interrupted.is_empty() && next.by != Move::Answer {
-                all[k].does = Does::Cannot("what was interrupted goes back at once");
+            let own = next.by == Move::Answer || before.interrupted.is_empty() && matches!(next.by, Move::Taken(..));
+            if before.safe.is_empty() && goes_back(before) && !own {
+                all[k].does = Does::Cannot("what was interrupted or given up goes back at once");
+            }
+            if own_time(k) && self.shows(before).is_at_once() {
+                all[k].does = Does::Cannot(AT_ONCE);
             }
             let reverted = next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted);
             if reverted && !before.desk.is_empty() {
                 all[k].does = Does::Cannot("what is taken back unconfirmed may have to wait for what is under way");
             }
-            if let Move::Time(number, event) = next.by
-                && self.time_due(&way[..k], &times, usize::from(number), event) < times[k]
-            {
+            if self.is_overdue(way, k, &times, &entries) {
                 all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
             }
             if self.stands_after(next).is_none() {
@@ -83,6 +85,9 @@ impl Product<'_> {
             all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
         }
         for (k, (event, to, later)) in split {
+            if matches!(all[k].does, Does::Cannot(_)) {
+                continue;
+            }
             if let (Move::Taken(number, _), true) = (way[k].1.by, later)
                 && way[k].0.inbox.iter().filter(|(to, _)| *to == number).count() > 1
             {
@@ -92,6 +97,11 @@ impl Product<'_> {
             all[k].does = if to.is_empty() { Does::Nothing } else { Does::RaiseTo(event) };
             all[k].others = to;
         }
+        if way.last().is_some_and(|(_, next)| self.never_rests(&next.state)) {
+            all.last_mut()
+                .into_iter()
+                .for_each(|end| end.does = Does::Cannot("from there on it goes round for ever at once"));
+        }
         if let Some(end) = all.last_mut() {
             end.passes = begun.iter().any(|batch| batch.idle && batch.over.is_none());
         }
@@ -100,13 +110,16 @@ impl Product<'_> {
             let until = batch.over.map_or(last, |at| times[at]);
             let answers = batch.over.map_or(&[][..], |at| &way[at].1.answers);
             if batch.idle && until > times[batch.at] && batch.over.is_some() {
-                all[batch.at].does = Does::Cannot("what has nothing to do is answered at once");
+                all[batch.at].does = Does::Cannot(AT_ONCE);
+            }
+            if self.finds_all_done(way, batch, &times) {
+                all[batch.at].does = Does::Cannot(AT_ONCE);
             }
             for (request, verdict) in answers.iter().filter(|(r, v)| batch.idle && cancels(batch, r, *v)) {
                 let replay = &mut all[batch.over.unwrap_or(batch.at)];
                 match self.leads_to_the_same(batch, request) {
                     true => replay.either.push(verdict.event(request.ask)),
-                    false => replay.does = Does::Cannot("what has nothing to do is answered at once"),
+                    false => replay.does = Does::Cannot(AT_ONCE),
                 }
             }
             // At the end of the way it may have become one that is refused.
@@ -124,6 +137,19 @@ impl Product<'_> {
             }
         }
         all
+    }
+
+    /// Whether a safe configuration waits for another one that does all that it is about, and would be under way for longer.
+    fn finds_all_done(&self, way: &[(&State, &Next)], batch: &Begun, times: &[Duration]) -> bool {
+        let begins = &way[batch.at].1.state;
+        let own = |request: &Request| same(std::slice::from_ref(request), &batch.requests);
+        if begins.safe.len() < 2 || !begins.safe.iter().any(own) {
+            return false;
+        }
+        let over = batch.over.unwrap_or(way.len() - 1);
+        let Some(alone) = (batch.at + 1..over).find(|k| way[*k].1.state.safe.len() == 1) else { return false };
+        let group = self.worlds.group(way[alone].1.state.world, &batch.requests, &Beside::default());
+        times[over] > times[alone] && group.is_some_and(|g| g.planned.is_none_or(|planned| planned.steps.is_empty()))
     }
 
     /// Whether it makes no difference that a request which is given up, and has nothing to do, is through before that: nobody
@@ -180,69 +206,22 @@ impl Product<'_> {
         split
     }
 
-    /// When each move happens.
-    fn times(&self, way: &[(&State, &Next)], begun: &[Begun], split: &Split) -> Vec<Duration> {
-        let mut times: Vec<Duration> = Vec::with_capacity(way.len());
-        for (k, (_, next)) in way.iter().enumerate() {
-            let before = times.last().copied().unwrap_or_default();
-            let of = |request: &Request| begun.iter().find(|b| b.over == Some(k) && b.requests.contains(request));
-            let at_once = match next.by {
-                Move::Taken(..) => split.get(&k).is_none_or(|(_, _, later)| !later),
-                Move::Answer => next.answers.iter().all(|(request, _)| of(request).is_none_or(|batch| batch.idle)),
-                _ => false,
-            };
-            let mut at = if at_once { before } else { before + limits::REPLAY_STEP };
-            for (request, verdict) in &next.answers {
-                let stands = self.stands_after(next).filter(|stands| !stands.is_zero());
-                let since = match verdict {
-                    Verdict::Ok => of(request).and_then(|b| Some(*times.get(b.at)? + stands?)),
-                    Verdict::Reverted => self.applied_at(way, &times, k, request.ask),
-                    // Nobody knows what became of a call until its time is over.
-                    Verdict::Broken | Verdict::UndoBroken => {
-                        of(request).and_then(|b| times.get(b.at)).map(|at| *at + self.patience(request.ask))
-                    }
-                    _ => None,
-                };
-                at = at.max(since.map_or(at, |since| since + limits::REPLAY_STEP));
-            }
-            if let Move::Lost(id) = next.by
-                && self.loss(way[k].0, id) == Some(Loss::Lie)
-            {
-                at += limits::OBSERVE_EVERY;
-            }
-            if let Move::Time(number, event) = next.by {
-                at = at.max(self.time_due(&way[..k], &times, usize::from(number), event));
-            }
-            times.push(at);
-        }
-        times
-    }
-
-    /// When a time event comes after these moves: so long after its state was entered.
-    fn time_due(&self, way: &[(&State, &Next)], times: &[Duration], number: usize, event: EventId) -> Duration {
-        let chart = self.members[number].chart;
-        let takes = chart.time_of(event).unwrap_or_default();
-        let owner = chart.nodes().find(|node| chart.time_event(*node) == Some(event));
-        let inside = |state: &State| owner.is_some_and(|owner| chart.is_inside(state.leaves[number], owner));
-        let entered = way.iter().rposition(|(before, next)| inside(&next.state) && !inside(before));
-        entered.map_or(Duration::ZERO, |at| times[at]) + takes
-    }
-
     /// The batches that begin on a way, and safe configurations.
     fn begun(&self, way: &[(&State, &Next)]) -> Vec<Begun> {
         let mut all: Vec<Begun> = Vec::new();
         for (k, (before, next)) in way.iter().enumerate() {
             // One that is over may be followed at once by another of the same requests.
-            let known: Vec<_> = under_way(before).into_iter().filter(|batch| !answered(next, batch)).collect();
+            let known: Vec<_> = under_way(before).into_iter().filter(|batch| !answered(before, next, batch)).collect();
             for requests in under_way(&next.state) {
                 if known.iter().any(|other| same(other, &requests)) {
                     continue;
                 }
-                let gone = |next: &Next| {
-                    answered(next, &requests) || !under_way(&next.state).iter().any(|other| same(other, &requests))
+                let gone = |(before, next): &(&State, &Next)| {
+                    answered(before, next, &requests)
+                        || !under_way(&next.state).iter().any(|other| same(other, &requests))
                 };
-                let over = way[k + 1..].iter().position(|(_, next)| gone(next)).map(|after| k + 1 + after);
-                let group = self.worlds.group(next.state.world, &requests, &Beside::default());
+                let over = way[k + 1..].iter().position(gone).map(|after| k + 1 + after);
+                let group = self.worlds.group(next.state.world, &requests, &goes(&next.state, &requests));
                 let idle = group.is_some_and(|group| group.planned.is_none_or(|planned| planned.steps.is_empty()));
                 // As they are when they are answered: whoever asked may have left the state that hears it.
                 let requests = over.map_or(requests.clone(), |at| {
@@ -266,17 +245,11 @@ impl Product<'_> {
         takes: Duration,
     ) -> Result<Vec<(String, FaultKind, Duration)>, &'static str> {
         let mut arms = Vec::new();
-        let Some(group) = self.worlds.group(state.world, requests, &Beside::default()) else { return Ok(arms) };
+        let Some(group) = self.worlds.group(state.world, requests, &goes(state, requests)) else { return Ok(arms) };
         let Some(planned) = &group.planned else { return Ok(arms) };
         let text = |at: usize| pattern(&planned.steps[at].step);
+        let mut fails: Option<usize> = None;
         let broken = |(_, verdict): &(Request, Verdict)| matches!(verdict, Verdict::Broken | Verdict::UndoBroken);
-        // What hangs takes its time by itself.
-        if let Some(first) = planned.steps.first()
-            && !takes.is_zero()
-            && !answers.iter().any(broken)
-        {
-            arms.push((pattern(&first.step), FaultKind::Slow, takes));
-        }
         for (part, place) in group.places.iter().enumerate() {
             let request = requests[*place];
             let how = match answers.iter().find(|(r, _)| *r == request).map(|(_, verdict)| *verdict) {
@@ -293,13 +266,26 @@ impl Product<'_> {
             if first.is_none() && how == FaultKind::Hang && !planned.steps.is_empty() {
                 return Err("what only creates is left in between by nothing that a script can bring about");
             }
+            fails = fails.or(first);
             arms.extend(first.map(|at| (text(at), how, Duration::ZERO)));
         }
+        // What hangs takes its time by itself.
+        if takes.is_zero() || planned.steps.is_empty() || answers.iter().any(broken) {
+            return Ok(arms);
+        }
+        if requests.iter().any(|request| takes >= self.patience(request.ask)) {
+            return Err("what is under way on it all the time would not have so long");
+        }
+        // What is slow is what goes wrong, or else the last step: what follows it would meet what is armed for others
+        // meanwhile. Where it is given up nothing is to be done before.
+        let all_ok = !answers.is_empty() && answers.iter().all(|(_, verdict)| verdict.is_success());
+        let last = if all_ok { planned.steps.len() - 1 } else { 0 };
+        arms.insert(0, (text(fails.unwrap_or(last)), FaultKind::Slow, takes));
         Ok(arms)
     }
 
     /// How long after its last step what a move answers *ok* stands; none: it does not.
-    fn stands_after(&self, next: &Next) -> Option<Duration> {
+    pub(super) fn stands_after(&self, next: &Next) -> Option<Duration> {
         let mut after = Duration::ZERO;
         for (request, verdict) in &next.answers {
             if let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict)
@@ -328,7 +314,7 @@ impl Product<'_> {
             _ => None,
         };
         let id = (over + 1..way.len()).filter_map(lost).find(|id| ok(way[over].1, *id))?;
-        let group = self.worlds.group(state.world, &batch.requests, &Beside::default())?;
+        let group = self.worlds.group(state.world, &batch.requests, &goes(state, &batch.requests))?;
         let planned = group.planned.as_ref()?;
         let place = batch.requests.iter().position(|request| request.ask == Ask::Apply(id))?;
         let part = group.places.iter().position(|of| *of == place)?;
@@ -374,28 +360,10 @@ impl Product<'_> {
         last == Some(self.deployment.shutdown.event)
     }
 
-    /// When the frame whose confirmation did not come is taken back.
-    fn applied_at(&self, way: &[(&State, &Next)], times: &[Duration], before: usize, ask: Ask) -> Option<Duration> {
-        let Ask::Apply(id) = ask else { return None };
-        let within = self.worlds.configuration(id)?.confirm?.within;
-        let applied = |k: &usize| way[*k].1.answers.iter().any(|(r, verdict)| r.ask == ask && *verdict == Verdict::Ok);
-        (0..before).rev().find(applied).map(|k| times[k] + within)
-    }
-
     /// Within what time a request that is not carried out for these reasons is answered so.
     pub(super) fn fails_within(&self, ask: Ask, reasons: &[Finding]) -> Duration {
         let waits = reasons.first().is_some_and(|reason| reason.code == CONF_HOLDS_NEVER);
         if waits { self.patience(ask) + limits::REPLAY_STEP * 2 } else { Duration::ZERO }
-    }
-
-    /// How long a step of a request may take.
-    fn patience(&self, ask: Ask) -> Duration {
-        let of = |id: ConfigId| self.worlds.configuration(id).and_then(|c| c.timeout);
-        let own = match ask {
-            Ask::Apply(id) | Ask::UndoOf(id) => of(id),
-            _ => None,
-        };
-        own.unwrap_or(self.deployment.limits.step_timeout)
     }
 }
 

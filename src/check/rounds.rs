@@ -7,7 +7,7 @@
 use super::bound::Bound;
 use super::explore::{Edge, Graph, NOWHERE};
 use super::outcome::EMPTY;
-use super::state::Failed;
+use super::state::{Failed, Move};
 use crate::limits;
 use crate::stack::{Request, World};
 use petgraph::algo::kosaraju_scc;
@@ -181,7 +181,8 @@ impl Graph<'_, '_> {
         let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
         self.rounds.insert(number, circle.to_vec());
         let shown = circle.iter().all(|edge| self.edges[*edge as usize].shown);
-        let edge = Edge { from: at, to, place: None, failed: worst, quiet: false, again: false, dropped: false, shown };
+        let (place, by, barred) = (None, Move::Rounds, None);
+        let edge = Edge { from: at, to, place, by, failed: worst, quiet: false, barred, dropped: false, shown };
         self.edges.push(edge);
         true
     }

@@ -91,9 +91,13 @@ fn follow(
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
     let mut found = ways::ways(&mut product);
     let mut asked = product.worlds.asked().clone();
+    if product.untimed {
+        left.insert(Bound::Times.told(Failed::Nothing, 0));
+    }
     for numbers in beside::groups(deployment, charts) {
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
+        apart.iter_mut().for_each(|apart| apart.never_down = product.never_down);
         let product = apart.as_mut().unwrap_or(&mut product);
         let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);
         loop {

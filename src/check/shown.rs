@@ -71,6 +71,8 @@ pub const READ: &[(&str, &[Code])] = &[
             DEPLOY_UNKNOWN_CONFIGURATION,
             DEPLOY_UNKNOWN_STATE,
             DEPLOY_EVENT_UNHEARD,
+            DEPLOY_NO_REST,
+            DEPLOY_ONE_EVENT,
             MONITOR_EVENT_TAKEN,
             MONITOR_NOT_A_NUMBER,
             MONITOR_NOT_RUN,

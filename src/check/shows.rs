@@ -1,8 +1,10 @@
 //! Which moves of a way a script can bring about, as far as each of them tells by itself: one thing happens at a time, and what
 //! comes by itself comes as soon as it can.
 
+use super::outcome::Beside;
 use super::product::Product;
 use super::state::{Move, Next, State};
+use crate::limits;
 use crate::model::Verdict;
 use crate::stack::{Request, Why};
 use smallvec::SmallVec;
@@ -13,7 +15,7 @@ pub struct Shows {
     nothing: bool,
     /// Only what takes no time: what is under way has nothing to do.
     at_once: bool,
-    /// Only answers: what was interrupted goes back.
+    /// Only answers: what was interrupted, or given up, goes back.
     answers: bool,
     /// Nothing is known any more, and what is answered is up to the platform.
     unknown: bool,
@@ -22,6 +24,9 @@ pub struct Shows {
     /// The numbers of batches under way that have nothing to do.
     idle: SmallVec<[u32; 2]>,
 }
+
+/// What has nothing to do is answered at once.
+pub(super) const AT_ONCE: &str = "what has nothing to do is answered at once";
 
 impl Product<'_> {
     /// What a state lets a script bring about next.
@@ -41,7 +46,7 @@ impl Product<'_> {
         Shows {
             nothing: !state.flight.is_empty() || waits && too_late(state),
             at_once: !idle.is_empty(),
-            answers: state.safe.is_empty() && !state.interrupted.is_empty(),
+            answers: state.safe.is_empty() && goes_back(state),
             unknown,
             unheard: self.is_told_between(state),
             idle,
@@ -49,7 +54,41 @@ impl Product<'_> {
     }
 }
 
+impl Product<'_> {
+    /// Whether what is asked for, again and again, has nothing to do, so that no time ever passes from there on.
+    pub(super) fn never_rests(&mut self, state: &State) -> bool {
+        let mut seen: Vec<State> = Vec::new();
+        let mut at = state.clone();
+        while seen.len() <= limits::CHECK_CIRCLE {
+            if seen.contains(&at) {
+                return true;
+            }
+            let shows = self.shows(&at);
+            seen.push(at.clone());
+            let idle = |next: &Next| next.by == Move::Answer && shows.answers_idle(&at, next);
+            let Some(next) = self.goes_on(&at).all.into_iter().find(idle) else { return false };
+            at = next.state;
+        }
+        true
+    }
+}
+
 impl Shows {
+    /// Whether something under way has nothing to do.
+    pub(super) fn is_at_once(&self) -> bool {
+        self.at_once
+    }
+
+    /// Whether a move answers only what has nothing to do.
+    fn answers_idle(&self, before: &State, next: &Next) -> bool {
+        let idle = |(request, _): &(Request, Verdict)| {
+            let turns = before.desk.under_way().iter();
+            let mut own = turns.filter(|turn| turn.batch.requests.contains(request));
+            !before.safe.contains(request) && own.all(|turn| self.idle.contains(&turn.number))
+        };
+        next.answers.iter().all(idle)
+    }
+
     /// Whether a script can bring this about.
     pub fn shows(&self, product: &Product<'_>, before: &State, next: &Next) -> bool {
         if self.nothing || !next.state.flight.is_empty() {
@@ -61,12 +100,7 @@ impl Shows {
         match next.by {
             Move::Taken(..) => true,
             Move::Answer => {
-                let idle = |(request, _): &(Request, Verdict)| {
-                    let turns = before.desk.under_way().iter();
-                    let mut own = turns.filter(|turn| turn.batch.requests.contains(request));
-                    !before.safe.contains(request) && own.all(|turn| self.idle.contains(&turn.number))
-                };
-                let own_time = (self.unheard || self.at_once) && !next.answers.iter().all(idle);
+                let own_time = (self.unheard || self.at_once) && !self.answers_idle(before, next);
                 // What is taken back unconfirmed may have to wait for what is under way.
                 let waits =
                     next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted) && !before.desk.is_empty();
@@ -85,6 +119,19 @@ impl Shows {
 pub(super) fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
     let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
     batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
+}
+
+/// How a batch goes that a state has under way: alone, where it takes along what stands in its way.
+pub(super) fn goes(state: &State, requests: &[Request]) -> Beside {
+    let one =
+        |of: &Request| requests.iter().any(|request| same(std::slice::from_ref(of), std::slice::from_ref(request)));
+    let turn = state.desk.under_way().iter().find(|turn| turn.batch.requests.iter().any(one));
+    Beside { alone: turn.is_some_and(|turn| turn.alone), ..Beside::default() }
+}
+
+/// Whether something is under way that was interrupted, or given up.
+pub(super) fn goes_back(state: &State) -> bool {
+    !state.interrupted.is_empty() || state.undos().next().is_some()
 }
 
 /// Whether an undo came too late to give up what is still under way: it waits for it.
@@ -124,8 +171,11 @@ pub(super) fn races(before: &State, next: &Next) -> bool {
     next.answers.iter().any(through) || under_way(before).iter().any(stops)
 }
 
-/// Whether a move answers all of a batch.
-pub(super) fn answered(next: &Next, batch: &[Request]) -> bool {
+/// Whether a move answers all of a batch. An answer on its way is of something that has not begun, whoever asks for the same.
+pub(super) fn answered(before: &State, next: &Next, batch: &[Request]) -> bool {
+    if before.due.first().is_some_and(|due| next.answers[..] == [*due]) {
+        return false;
+    }
     let is = |request: &Request| {
         next.answers.iter().any(|(other, _)| (other.ask, other.requester) == (request.ask, request.requester))
     };

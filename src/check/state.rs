@@ -75,6 +75,9 @@ pub struct State {
     pub down: u64,
     /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.
     pub stopping: bool,
+    /// The same as the configurator knows it: until all coordinators have come to *down*. Kept only where an operator may have
+    /// put something in their way.
+    pub leaving: bool,
     /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
     pub flight: Vec<Batch>,
 }

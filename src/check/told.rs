@@ -5,7 +5,7 @@ use super::product::Product;
 use super::state::{Move, Next, State};
 use super::trace::{Answered, Happened, Hears, Place};
 use crate::model::{Ask, EventName, Verdict};
-use crate::statechart::EventId;
+use crate::statechart::{EventId, NodeId};
 
 impl Product<'_> {
     /// Where all coordinators are.
@@ -34,8 +34,30 @@ impl Product<'_> {
         places.map(|(_, place)| told(place)).collect::<Vec<_>>().join(", ")
     }
 
-    /// What coordinators hear with a move, in order. Where several hear of one thing, each hears it when it takes it.
+    /// What coordinators hear with a move, in order, as it is told.
     pub fn hears(&mut self, before: &State, next: &Next) -> Vec<Hears> {
+        let heard = self.heard(before, next);
+        let several = self.members.len() > 1;
+        let told = |(number, event): (usize, EventId)| Hears {
+            coordinator: several.then(|| self.members[number].name.to_string()),
+            event: self.members[number].chart.event_text(event),
+        };
+        heard.into_iter().map(told).collect()
+    }
+
+    /// The states that coordinators leave with a move.
+    pub(super) fn left_by(&mut self, before: &State, next: &Next) -> Vec<(usize, NodeId)> {
+        let (mut leaves, mut left) = (before.leaves.clone(), Vec::new());
+        for (number, event) in self.heard(before, next) {
+            let reaction = self.members[number].react(leaves[number], event);
+            leaves[number] = reaction.leaf;
+            left.extend(reaction.left.iter().map(|node| (number, *node)));
+        }
+        left
+    }
+
+    /// What coordinators hear with a move, in order. Where several hear of one thing, each hears it when it takes it.
+    fn heard(&mut self, before: &State, next: &Next) -> Vec<(usize, EventId)> {
         let mut heard: Vec<(usize, EventId)> = Vec::new();
         let all = |name: EventName| {
             let charts = self.members.iter().map(|member| member.chart.event(name)).enumerate();
@@ -71,12 +93,7 @@ impl Product<'_> {
             }
             _ => {}
         }
-        let several = self.members.len() > 1;
-        let told = |(number, event): (usize, EventId)| Hears {
-            coordinator: several.then(|| self.members[number].name.to_string()),
-            event: self.members[number].chart.event_text(event),
-        };
-        heard.into_iter().map(told).collect()
+        heard
     }
 
     /// A move as it is told.

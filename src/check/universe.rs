@@ -67,6 +67,11 @@ impl Universe {
         Self { components: std::iter::once((name, smallvec![creation])).collect(), types }
     }
 
+    /// The types of the components that there may be, as far as they are known.
+    pub fn types(&self) -> impl Iterator<Item = &ComponentType> {
+        self.components.values().flatten().filter_map(|creation| creation.description.as_deref())
+    }
+
     /// How a component of that name may have been created; empty when none creates it.
     pub fn of(&self, component: ComponentName) -> &[Creation] {
         self.components.get(&component).map_or(&[], SmallVec::as_slice)

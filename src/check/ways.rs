@@ -1,12 +1,15 @@
 //! Bring-up and shutdown must work when everything goes well.
 
-use super::drive::{self, Way};
+use super::closed::still_comes;
+use super::drive;
 use super::judge::Traced;
 use super::product::Product;
 use super::state::{Next, State};
 use super::trace::TraceStep;
+use super::tried::Way;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::{Code, Coordinator, Finding, Severity};
+use crate::statechart::{EventId, NodeId};
 use crate::system::View;
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
@@ -21,14 +24,17 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     if !rise.reached {
         up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"));
     }
+    up.extend(late(product, &rise, DEPLOY_NEVER_UP, "deploy.within_s", "the bring-up"));
     let mut down = fall.as_ref().map(reasons).unwrap_or_default();
     if let Some(fall) = &fall {
+        down.extend(late(product, fall, DEPLOY_NEVER_DOWN, "shutdown.within_s", "the shutdown"));
         if !fall.reached {
             down.push(stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"));
         } else if let Some(finding) = leftovers(product, fall.end()) {
             down.push(finding);
         }
     }
+    product.never_down = down.iter().any(|finding| finding.code == DEPLOY_NEVER_DOWN);
     let both: Vec<&Way> = std::iter::once(&rise).chain(&fall).collect();
     let mut found = Traced::new();
     for (findings, ways) in [(up, &both[..1]), (down, &both[..])] {
@@ -79,6 +85,7 @@ fn stops(
 ) -> Finding {
     let deployment = product.deployment;
     let at = product.place(way.end());
+    let rests = way.end().is_at_rest();
     let finding = match &way.refused {
         Some((request, reasons)) => {
             let why = reasons.first().map_or("", |f| f.message.as_str());
@@ -91,7 +98,8 @@ fn stops(
         }
         None => {
             let goals: Vec<String> = deployment.coordinators.iter().map(|c| format!("`{}`", goal(c))).collect();
-            let message = format!("{what} stops at `{at}` and never reaches {}", goals.join(", "));
+            let stops = if rests { "stops at" } else { "goes round for ever at" };
+            let message = format!("{what} {stops} `{at}` and never reaches {}", goals.join(", "));
             let mut finding = Finding::error(code, message);
             for (member, leaf) in product.members.iter().zip(&way.end().leaves) {
                 finding = finding.also(member.chart.origin(*leaf), "stops here, even if every request succeeds");
@@ -105,8 +113,45 @@ fn stops(
     } else {
         "the coordinator wait for at its end"
     };
-    let help = help.unwrap_or_else(|| format!("look at the trace: which event does {several}?"));
+    let closed = if code == DEPLOY_NEVER_DOWN { product.closed_at(way.end()) } else { Vec::new() };
+    let help = help.unwrap_or_else(|| match closed.first() {
+        Some(event) => still_comes(event.as_str()),
+        None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
+        None => format!("look at the trace: which event does {several}?"),
+    });
     finding.help(help).at(deployment.key_origin(key)).path(key)
+}
+
+/// A way that lasts longer than there is time for it, where none is shorter.
+fn late(product: &Product<'_>, way: &Way, code: Code, key: &str, what: &str) -> Option<Finding> {
+    let (lasts, times) = way.late.as_ref()?;
+    let deployment = product.deployment;
+    let within = if code == DEPLOY_NEVER_UP { deployment.deploy.within } else { deployment.shutdown.within };
+    let told = |(number, event): &(usize, EventId)| {
+        let chart = product.members[*number].chart;
+        let state = chart.nodes().find(|state| chart.time_event(*state) == Some(*event)).unwrap_or(NodeId::ROOT);
+        (
+            state,
+            chart,
+            format!("{} s in `{}`", chart.time_of(*event).unwrap_or_default().as_secs_f64(), chart.fqn(state)),
+        )
+    };
+    let told: Vec<_> = times.iter().map(told).collect();
+    let mut words: Vec<&str> = told.iter().map(|(_, _, words)| words.as_str()).collect();
+    let more = if words.len() > 4 { format!(" and {} more", words.len() - 4) } else { String::new() };
+    words.truncate(4);
+    let message = format!(
+        "{what} lasts {} s at least ({}{more}), and `{key}` gives it {} s",
+        lasts.as_secs_f64(),
+        words.join(", "),
+        within.as_secs_f64()
+    );
+    let mut finding = Finding::error(code, message);
+    for (state, chart, _) in told.iter().take(4) {
+        finding = finding.also(chart.origin(*state), "waits here, even if every request is answered at once");
+    }
+    let help = format!("give it more time with `{key}`, or let something lead on sooner");
+    Some(finding.help(help).at(deployment.key_origin(key)).path(key))
 }
 
 fn leftovers(product: &Product<'_>, end: &State) -> Option<Finding> {

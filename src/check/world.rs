@@ -60,7 +60,7 @@ pub struct Worlds<'a> {
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
-    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, bool), Held>,
+    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Held>,
     pub(super) asked: FxHashSet<ConfigId>,
     /// Configurations of which it can be told whether what they stand for is true.
     pub(super) judged: FxHashSet<ConfigId>,
@@ -176,6 +176,7 @@ impl<'a> Worlds<'a> {
             places: &[],
             joined: false,
             placed: false,
+            alone: false,
         }
     }
 
@@ -254,8 +255,15 @@ impl<'a> Worlds<'a> {
         fullest.map_or(Ok(()), |world| plan(&world.system, configuration, &self.context).map(|_| ()))
     }
 
-    /// Whether `request` would be refused if none but its requester had asked for anything.
-    pub fn is_refused_alone(&self, id: WorldId, request: &Request) -> bool {
+    /// Whether `request` would be refused if none but its requester had asked for anything; `before` stand before it in its
+    /// batch, and frames of such configurations are there only where their undo was refused.
+    pub fn is_refused_alone(
+        &self,
+        id: WorldId,
+        before: &[Request],
+        request: &Request,
+        stays: impl Fn(ConfigId) -> bool,
+    ) -> bool {
         let Some(world) = self.get(id) else { return false };
         let mut undone = world.clone();
         for frame in world.stack.frames().iter().rev().filter(|frame| frame.requester != request.requester) {
@@ -270,7 +278,16 @@ impl<'a> Worlds<'a> {
         for frame in undone.stack.frames().iter().filter(|frame| frame.requester == request.requester) {
             stack.push((**frame).clone());
         }
-        let alone = World::new(undone.system, stack);
+        let mut alone = World::new(undone.system, stack);
+        let own = alone.stack.frames().iter().rev().filter(|frame| frame.scope.is_none() && stays(frame.configuration));
+        let undo = |id: ConfigId| Request::new(RequestId(0), Ask::UndoOf(id), request.requester);
+        let left: Vec<Request> = own.map(|frame| undo(frame.configuration)).collect();
+        for request in left.iter().chain(before) {
+            let mut after = alone.clone();
+            if self.carry_out(&mut after, std::slice::from_ref(request)) {
+                alone = after;
+            }
+        }
         let group = take_up(&alone, std::slice::from_ref(request), &self.rules());
         group.told.iter().any(|told| told.reason.is_some())
     }

@@ -3,6 +3,7 @@
 use super::detach;
 use super::exit::Exit;
 use super::input::Input;
+use super::keep::Keep;
 use super::last_words;
 use super::output::{Output, Style};
 use super::progress::Progress;
@@ -15,6 +16,7 @@ use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session, Stage};
 use crate::time::Clock;
+use std::panic::resume_unwind;
 use std::sync::Arc;
 
 /// Bring a deployment up and stay in the foreground; Ctrl-C shuts it down in order.
@@ -25,6 +27,9 @@ use std::sync::Arc;
 ///
 /// Exit status: 0 shut down by its coordinator; 1 refused, or it did not come up; 4 shut down without its coordinator, by force,
 /// or incompletely.
+///
+/// What happens is kept under `$XDG_STATE_HOME/davit` (`~/.local/state/davit`), 8 MB at most, and so is what components print in
+/// the background: `davit log` shows it, also after the end.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -76,56 +81,78 @@ impl Run for Args {
         let checked = self.input.check(context)?;
         let clock = self.clock.make(self.pace);
         let progress = Progress::new(context.out, self.json, &clock).map_err(short)?;
-        let exit = foreground(context, &checked, &clock, &progress, self.in_background)?;
+        let exit = self.foreground(context, &checked, &clock, &progress)?;
         clock.shutdown();
         last_words::unread(progress.end());
         Ok(exit)
     }
 }
 
-fn foreground(
-    context: &Context,
-    checked: &Checked,
-    clock: &Clock,
-    progress: &Progress,
-    in_background: bool,
-) -> Result<Exit, Failure> {
-    let _participant = clock.enter();
-    let name = checked.deployment.name;
-    let session = app::start(checked, clock).map_err(|error| match error {
-        StartError::UnknownPlatform { name, help } => {
-            Failure::no(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
-        }
-        StartError::Functions { why } => Failure::no(
-            FUNCTIONS_NOT_OPENED,
-            format!("the coordinator's functions cannot be run: {why}"),
-            "the text ran when it was read: does it depend on time or chance?",
-        ),
-    })?;
-    let socket = open(&session)?;
-    let watch = watch(&session, &socket, progress, in_background)?;
-    session.hub().attach(progress.observer());
-    session.hub().attach(socket.observer(clock).map_err(short)?);
-    let exit = match session.bring_up() {
-        Err(not_up) => {
-            progress.finish();
-            tell_not_up(&context.out, progress, name.as_str(), &not_up, in_background)
-        }
-        Ok(()) => {
-            tell_up(&context.out, progress, &session, in_background);
-            if in_background {
-                progress.up_in_background();
+impl Args {
+    fn foreground(
+        &self,
+        context: &Context,
+        checked: &Checked,
+        clock: &Clock,
+        progress: &Progress,
+    ) -> Result<Exit, Failure> {
+        let _participant = clock.enter();
+        let (name, in_background) = (checked.deployment.name, self.in_background);
+        let session = app::start(checked, clock).map_err(|error| match error {
+            StartError::UnknownPlatform { name, help } => {
+                Failure::no(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
             }
-            let Command::Shutdown { force } = session.serve();
-            let ended = session.take_down(force);
-            progress.finish();
-            tell_ended(&context.out, progress, name.as_str(), &ended);
-            Exit::of_stop(&ended, Exit::Done)
-        }
-    };
-    drop(watch);
-    drop(socket);
-    Ok(exit)
+            StartError::Functions { why } => Failure::no(
+                FUNCTIONS_NOT_OPENED,
+                format!("the coordinator's functions cannot be run: {why}"),
+                "the text ran when it was read: does it depend on time or chance?",
+            ),
+        })?;
+        let socket = open(&session)?;
+        let keep = Keep::begin(&session, &self.input.file, clock, in_background)?;
+        let watch = watch(&session, &socket, progress, &keep, in_background)?;
+        session.hub().attach(progress.observer());
+        session.hub().attach(socket.observer(clock).map_err(short)?);
+        let driven = session.guarded(|| match session.bring_up() {
+            Err(not_up) => {
+                progress.finish();
+                (tell_not_up(&context.out, progress, name.as_str(), &not_up, in_background), Err(not_up))
+            }
+            Ok(()) => {
+                tell_up(&context.out, progress, &session, in_background);
+                if in_background {
+                    progress.up_in_background();
+                }
+                let Command::Shutdown { force } = session.serve();
+                let ended = session.take_down(force);
+                progress.finish();
+                tell_ended(&context.out, progress, name.as_str(), &ended);
+                (Exit::of_stop(&ended, Exit::Done), Ok(ended))
+            }
+        });
+        let driven = match driven {
+            Ok((exit, Ok(ended))) => {
+                keep.ended(&ended);
+                Ok(exit)
+            }
+            Ok((exit, Err(not_up))) => {
+                keep.not_up(&not_up);
+                Ok(exit)
+            }
+            Err((panic, ended)) => {
+                progress.finish();
+                if let Some(ended) = ended {
+                    tell_ended(&context.out, progress, name.as_str(), &ended);
+                    keep.ended(&ended);
+                }
+                Err(panic)
+            }
+        };
+        drop(watch);
+        drop(socket);
+        // It is stopped, as far as that went: the defect is told by whoever started this.
+        Ok(driven.unwrap_or_else(|panic| resume_unwind(panic)))
+    }
 }
 
 fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
@@ -159,6 +186,7 @@ fn watch(
     session: &Arc<Session>,
     socket: &ControlSocket,
     progress: &Progress,
+    keep: &Keep,
     in_background: bool,
 ) -> Result<Watch, Failure> {
     let stop = {
@@ -171,8 +199,11 @@ fn watch(
         }
     };
     let leave = {
-        let (leave, progress) = (socket.leave(), progress.clone());
+        let (leave, kept, progress) = (socket.leave(), keep.leave(), progress.clone());
         move || {
+            if let Some(kept) = kept {
+                kept();
+            }
             leave();
             progress.finish();
         }

@@ -4,28 +4,22 @@
 //! without that line says that it is not, and its exit status says why.
 
 use super::exit::Exit;
+use super::output::{self, Output};
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_SYSTEM;
-use std::io::{BufRead, BufReader, Write};
-use std::os::fd::AsRawFd;
+use std::io::{BufRead, BufReader};
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
 
 /// The line that says that the deployment is up. Not JSON and not a word anybody prints by chance.
 const UP: &str = "\u{1}davit up\u{1}";
 
-/// Says, in the process in the background, that the deployment is up. Nothing is written after it: nobody reads. Its
-/// streams are let go, so that a pipe that the command was typed with (`| tail`) ends with the command.
-pub fn tell_up() {
-    let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{UP}");
-    let _ = out.flush();
-    if let Ok(nowhere) = std::fs::OpenOptions::new().write(true).open("/dev/null") {
-        for stream in [libc::STDOUT_FILENO, libc::STDERR_FILENO] {
-            // SAFETY: both are open descriptors of this process, and nobody holds on to what they were.
-            let _ = unsafe { libc::dup2(nowhere.as_raw_fd(), stream) };
-        }
-    }
+/// Says, in the process in the background, that the deployment is up. Nobody reads after it: the streams of who started it
+/// are let go, so that a pipe that the command was typed with (`| tail`) ends with the command. What is said from now on is
+/// [printed](super::printed) like what components say.
+pub fn tell_up(out: Output) {
+    out.line(UP);
+    output::speak_to(None);
 }
 
 /// Starts the process in the background, passes its words on until it is up, and returns.

@@ -28,7 +28,7 @@ pub fn prepare() -> std::io::Result<()> {
     if WORDS.set(tap).is_ok() {
         std::panic::set_hook(Box::new(|info| {
             let text = told(info);
-            say(move || output::error(&text));
+            say(move || output::panic(&text));
         }));
     }
     Ok(())

@@ -1,16 +1,20 @@
 //! `davit log`
 
 use super::exit::Exit;
+use super::kept;
 use super::output::{Output, Style};
-use super::remote::{ASK, ask, connect, failure};
+use super::remote::{ASK, ask, failure};
 use super::status::text;
 use super::{Answer, Context, Failure, Run, output};
-use crate::model::codes::CLI_NO_ANSWER;
+use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING};
 use crate::session::Stage;
+use crate::session::client::{Client, ClientError};
+use crate::session::kept::entries;
 use crate::session::owner;
 use serde_json::{Value as Json, json};
 
-/// Show what happened: requests and their answers, events, states, faults, and how long each step took.
+/// Show what happened: requests and their answers, events, states, faults, and how long each step took; of a deployment in the
+/// background also what its components printed. Of one that does not run any more what was kept of it.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
@@ -41,7 +45,12 @@ impl Args {
         if self.follow {
             return self.follow(context);
         }
-        let log = ask(self.name.as_deref(), "log", &json!({ "last": self.last }), ASK)?;
+        let asked = Client::connect(self.name.as_deref())
+            .and_then(|mut client| client.call("log", &json!({ "last": self.last }), ASK));
+        let log = match asked {
+            Ok(log) => log,
+            Err(error) => self.kept(context, error)?,
+        };
         if self.json {
             context.out.json(&log);
             return Ok(Exit::Done);
@@ -52,22 +61,51 @@ impl Args {
         Ok(Exit::Done)
     }
 
+    /// What was kept of one that could not be asked since it does not run any more.
+    fn kept(&self, context: &Context, error: ClientError) -> Result<Json, Failure> {
+        let life = kept::meant(&error).ok_or_else(|| failure(error))?;
+        let mut entries = entries(&life.name).map_err(|why| {
+            Failure::no(
+                CLI_NOT_RUNNING,
+                format!("`{}` does not run, and its log cannot be read: {why}", life.name),
+                "`davit list` shows what runs",
+            )
+        })?;
+        entries.drain(..entries.len().saturating_sub(self.last.unwrap_or(usize::MAX)));
+        context.out.error(match life.died() {
+            true => format!("note: `{}` died: `davit status {0}` tells of it\n", life.name),
+            false => format!("note: `{}` does not run any more\n", life.name),
+        });
+        Ok(Json::Array(entries))
+    }
+
     /// Whether it prints one object a line.
     pub fn streams(&self) -> bool {
         self.follow
     }
 
+    fn print(&self, context: &Context, entry: &Json) {
+        match self.json {
+            true => context.out.json_line(entry),
+            false => context.out.text(line(&context.out, entry, self.steps)),
+        }
+    }
+
     fn follow(&self, context: &Context) -> Answer {
-        let mut client = connect(self.name.as_deref())?;
+        let mut client = match Client::connect(self.name.as_deref()) {
+            Ok(client) => client,
+            Err(error) => {
+                let kept = self.kept(context, error)?;
+                kept.as_array().into_iter().flatten().for_each(|entry| self.print(context, entry));
+                return Ok(Exit::Done);
+            }
+        };
         let name = client.name().to_owned();
         client.subscribe(ASK).map_err(failure)?;
         // Asked for behind the subscription: what happens in between is in both.
         let log = ask(Some(&name), "log", &json!({ "last": self.last }), ASK)?;
         let told = log.as_array().cloned().unwrap_or_default();
-        let print = |entry: &Json| match self.json {
-            true => context.out.json_line(entry),
-            false => context.out.text(line(&context.out, entry, self.steps)),
-        };
+        let print = |entry: &Json| self.print(context, entry);
         told.iter().for_each(&print);
         let mut overlap = Overlap(told);
         let mut phases = Phases::default();
@@ -174,6 +212,14 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             text(&entry["coordinator"]),
             entry["seconds"].as_f64().unwrap_or_default()
         ),
+        "printed" => format!("printed    {}", text(&entry["text"])),
+        "began" => format!("began      process {}, {}", entry["pid"], text(&entry["when"])),
+        "goes_on" => out.paint(Style::Dim, "goes on    what was before is not kept any more"),
+        "ended" => {
+            let why = entry["why"].as_str().map_or_else(String::new, |why| format!(": {why}"));
+            let phase = entry["ended"]["phase"].as_str().unwrap_or_default();
+            format!("ended      {}{why}, {}", out.paint(super::status::state_style(phase), phase), text(&entry["when"]))
+        }
         "said" => format!("{:<10} {}", text(&entry["by"]), text(&entry["text"])),
         "recovered" => {
             let number = entry["steps"].as_array().map_or(0, Vec::len);

@@ -15,12 +15,17 @@ pub mod exit;
 mod explain;
 mod graph;
 pub mod input;
+mod keep;
+mod kept;
 mod last_words;
+mod list;
 mod log;
+mod member;
 mod monitor;
 pub mod output;
 mod plan;
 mod plan_view;
+mod printed;
 mod progress;
 mod recover;
 mod remote;
@@ -35,6 +40,7 @@ mod sim_session;
 mod stack;
 mod status;
 mod types;
+mod watch;
 
 use crate::diagnostics::{SourceMap, to_json};
 use crate::model::codes::CLI_UNWRITABLE;
@@ -91,12 +97,16 @@ commands! {
     Deploy = deploy::Args,
     Run = run::Args,
     Shutdown = shutdown::Args,
+    List = list::Args,
     Status = status::Args,
+    Watch = watch::Args,
     Stack = stack::Args,
     Log = log::Args,
     Event = request::EventArgs,
     Apply = request::ApplyArgs,
     Undo = request::UndoArgs,
+    Get = member::GetArgs,
+    Set = member::SetArgs,
     Drift = drift::Args,
     Recover = recover::Args,
     Commit = request::CommitArgs,
@@ -208,6 +218,7 @@ pub fn main(libraries: Libraries) -> ExitCode {
     // Their help promises one object a line.
     let streams = match &cli.command {
         Command::Sim(_) | Command::Monitor(_) => true,
+        Command::Watch(_) => true,
         Command::Log(log) => log.streams(),
         _ => false,
     };

@@ -8,9 +8,10 @@ use crate::diagnostics::{SourceMap, render};
 use crate::model::Finding;
 use serde::Serialize;
 use std::fmt::Display;
+use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal, Write};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// When to use colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
@@ -84,12 +85,12 @@ impl Output {
 
     /// Text to stdout as it is.
     pub fn text(&self, text: impl AsRef<str>) {
-        put(&mut io::stdout().lock(), text.as_ref());
+        put(Stream::Out, text.as_ref());
     }
 
     /// A line to stdout.
     pub fn line(&self, line: impl Display) {
-        put(&mut io::stdout().lock(), &format!("{line}\n"));
+        put(Stream::Out, &format!("{line}\n"));
     }
 
     /// A value as JSON on stdout, indented, with a final newline.
@@ -119,7 +120,12 @@ impl Output {
 
 /// Text to stderr as it is.
 pub fn error(text: &str) {
-    put(&mut io::stderr().lock(), text);
+    put(Stream::Err, text);
+}
+
+/// A panic, which is nobody's own word: to stderr wherever that leads, so that it is kept with what components print.
+pub fn panic(text: &str) {
+    put(Stream::Process, text);
 }
 
 /// Why something could not be written, the first time that happened. A reader that went away is no such reason.
@@ -141,6 +147,11 @@ pub fn failed(error: &io::Error) {
     }
 }
 
+/// Whether stdout is a terminal.
+pub fn is_terminal() -> bool {
+    io::stdout().is_terminal()
+}
+
 /// Whether one of the streams went to a terminal when the command began.
 static ON_TERMINAL: AtomicBool = AtomicBool::new(false);
 
@@ -151,8 +162,33 @@ pub fn reader_is_gone() -> bool {
     READER_GONE.load(Ordering::Relaxed)
 }
 
-fn put(stream: &mut impl Write, text: &str) {
-    if let Err(error) = stream.write_all(text.as_bytes()).and_then(|()| stream.flush()) {
+#[derive(Clone, Copy)]
+enum Stream {
+    Out,
+    Err,
+    /// What stderr of the process is.
+    Process,
+}
+
+/// Where a command's own words go while what else is printed in its process (by components) goes somewhere else.
+static APART: Mutex<Option<Arc<[File; 2]>>> = Mutex::new(None);
+
+/// From now on a command's own words go to these two, and not to stdout and stderr; to those again with none.
+pub fn speak_to(streams: Option<[File; 2]>) {
+    *APART.lock().unwrap_or_else(PoisonError::into_inner) = streams.map(Arc::new);
+}
+
+fn put(stream: Stream, text: &str) {
+    let write = |to: &mut dyn Write| to.write_all(text.as_bytes()).and_then(|()| to.flush());
+    // Not held while something is written: one stream that stands still does not keep the other waiting.
+    let apart = APART.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let written = match (apart.as_deref(), stream) {
+        (Some([out, _]), Stream::Out) => write(&mut &*out),
+        (Some([_, err]), Stream::Err) => write(&mut &*err),
+        (None, Stream::Out) => write(&mut io::stdout().lock()),
+        (None, Stream::Err) | (_, Stream::Process) => write(&mut io::stderr().lock()),
+    };
+    if let Err(error) = written {
         failed(&error);
     }
 }

@@ -146,7 +146,7 @@ impl Screen {
             News::One(Told::UpInBackground) => {
                 self.bar.finish_and_clear();
                 self.quiet = true;
-                detach::tell_up();
+                detach::tell_up(self.out);
             }
             News::Missed(entries) if self.json => {
                 self.out.json_line(&json!({ "at": self.at, "what": "missed", "entries": entries }));
@@ -227,6 +227,7 @@ impl Screen {
                 let style = if *by == "info" { Style::Dim } else { Style::Care };
                 self.line(format!("{time}  {}  {text}", out.paint(style, by)));
             }
+            Happening::Printed { text } => self.line(format!("{time}  {}  {text}", out.paint(Style::Dim, ".."))),
             Happening::Phase { phase } => self.stopping |= *phase == Phase::ShuttingDown,
             Happening::Event { event, from } if self.stopping && !COMMANDERS.contains(&from.as_str()) => {
                 let before = self.reported.insert(event.clone(), entry.at);

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::exit::Exit;
+use super::kept;
 use crate::model::codes::{
     CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED,
 };
@@ -56,12 +57,13 @@ pub fn ask(name: Option<&str>, method: &str, params: &Json, limit: Duration) -> 
 
 /// Why there is no answer, as a finding.
 pub fn failure(error: ClientError) -> Failure {
+    let meant = kept::meant(&error);
     match error {
-        ClientError::None => Failure::no(
-            CLI_NOT_RUNNING,
-            "no deployment is running",
-            "start one with `davit deploy FILE`, or look whether XDG_RUNTIME_DIR is the same here and there",
-        ),
+        ClientError::None => {
+            let help = "start one with `davit deploy FILE`, or look whether XDG_RUNTIME_DIR is the same here and there";
+            let help = meant.map_or_else(|| help.to_owned(), |life| format!("{help}; {}", kept::ended(&life)));
+            Failure::no(CLI_NOT_RUNNING, "no deployment is running", help)
+        }
         ClientError::Several(names) => Failure {
             exit: Exit::Usage,
             ..Failure::usage(
@@ -71,6 +73,7 @@ pub fn failure(error: ClientError) -> Failure {
             )
         },
         ClientError::Unknown { name, help } => {
+            let help = meant.map_or(help, |life| kept::ended(&life));
             Failure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
         }
         ClientError::SocketGone { name, path } => Failure::no(

@@ -100,7 +100,9 @@ impl Alone<'_> {
             return;
         }
         if let Some(passes) = at.checked_sub(self.now).filter(|passes| self.timed && !passes.is_zero()) {
-            _ = writeln!(self.text, "advance {}", passes.as_secs_f64());
+            // A time event comes when more than its time has passed.
+            let more = Duration::from_nanos(u64::from(matches!(step.what, Happened::Time { .. })));
+            _ = writeln!(self.text, "advance {}", (passes + more).as_secs_f64());
             self.now = at;
         }
         for event in events {

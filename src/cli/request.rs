@@ -44,11 +44,21 @@ impl Run for EventArgs {
             .map_err(|failure| failure.as_json(self.json))?;
         let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
         let good = heard == self.wait_for.as_deref();
+        // Nobody leads any more: a safety event acts by itself.
+        let acted: Option<Vec<&str>> =
+            answer["acted"].as_array().map(|all| all.iter().filter_map(Json::as_str).collect());
+        let broke = acted.iter().flatten().any(|answer| answer.ends_with(".broken"));
         if self.json {
             context.out.json(&answer);
         } else if let Some(heard) = heard {
             let style = if good { Style::Good } else { Style::Bad };
             context.out.line(format!("{} after {}", context.out.paint(style, heard), self.event));
+        } else if let Some(acted) = acted {
+            let what = match acted.is_empty() {
+                true => "it has acted just before".to_owned(),
+                false => acted.join(", "),
+            };
+            context.out.line(format!("{} acted by itself, since no coordinator leads any more: {what}", self.event));
         } else if let Some(taken) = taken {
             let what = if taken { "heard" } else { "raised, and no transition heard it" };
             context.out.line(format!("{} {what}", self.event));
@@ -60,6 +70,7 @@ impl Run for EventArgs {
         }
         Ok(match heard {
             Some(heard) if heard.ends_with(".broken") && !good => Exit::Broken,
+            None if broke => Exit::Broken,
             _ if good && taken != Some(false) => Exit::Done,
             _ => Exit::No,
         })
@@ -154,7 +165,8 @@ fn limit(within: f64) -> Duration {
     Duration::from_secs_f64(within) + ASK
 }
 
-fn request(
+/// Asks, and tells the answer if it is waited for.
+pub(super) fn request(
     context: &Context,
     method: &str,
     mut params: Json,

@@ -86,10 +86,13 @@ fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
             clock.sleep(limits::SHUTDOWN_TOLD);
             let status = client.call("status", &json!({}), ASK).ok()?;
             let stopping: StoppingView = serde_json::from_value(status["stopping"].clone()).ok()?;
-            let what = match (stopping.held, stopping.waits_for.is_empty()) {
-                (true, _) => "a safe configuration holds what is left: `davit shutdown --force` lets go".to_owned(),
-                (false, true) => format!("{} in {}", stopping.stage.words(), place(&status)),
-                (false, false) => stopping.waits_for.join(", "),
+            let what = match (stopping.stands_still, stopping.held, stopping.waits_for.is_empty()) {
+                (Some(still), ..) => still.to_string(),
+                (None, true, _) => {
+                    "a safe configuration holds what is left: `davit shutdown --force` lets go".to_owned()
+                }
+                (None, false, true) => format!("{} in {}", stopping.stage.words(), place(&status)),
+                (None, false, false) => stopping.waits_for.join(", "),
             };
             if done.load(Ordering::Relaxed) {
                 return Some(());

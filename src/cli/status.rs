@@ -2,17 +2,26 @@
 
 use super::drift::listed;
 use super::exit::Exit;
+use super::kept::{self, Died};
+use super::list::Overview;
 use super::output::{Output, Style, Table};
-use super::remote::{ASK, ask};
+use super::remote::{ASK, failure};
 use super::{Answer, Context, Run};
 use crate::session::StoppingView;
+use crate::session::client::{Client, ClientError};
+use crate::session::kept::Life;
 use serde_json::{Value as Json, json};
 
-/// Show a running deployment: its phase, the coordinator's states, components, faults.
+/// Show a running deployment: its phase, the coordinator's states, components, faults. Of one that died: when, and how far it
+/// was. Of several, where none is named: a line each, as `davit list`.
+///
+/// Exit status: 0 it runs; 1 none runs; 3 it is broken; 4 it died: killed, crashed or cut off, and was not shut down. Of several the
+/// first of 3, 4, 1 and 0 that is so of one of them.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    name: Option<String>,
+    /// The deployments' names; not needed while only one runs.
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -20,14 +29,81 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let status =
-            ask(self.name.as_deref(), "status", &json!({}), ASK).map_err(|failure| failure.as_json(self.json))?;
-        if self.json {
-            context.out.json(&status);
-        } else {
-            print(&context.out, &status);
+        let out = &context.out;
+        let refused = |error| Err(failure(error).as_json(self.json));
+        match &self.names[..] {
+            [] => match look(None) {
+                Ok(Seen::Runs(status)) => {
+                    // Who runs has died before, if ever.
+                    let own = status["name"].as_str().unwrap_or_default().to_owned();
+                    let exit = show(out, &[Seen::Runs(status)], self.json);
+                    for died in kept::died().iter().filter(|died| died.name() != own) {
+                        out.error(format!("note: `{}` died: `davit status {0}` tells of it\n", died.name()));
+                    }
+                    Ok(exit)
+                }
+                Ok(died) => Ok(show(out, &[died], self.json)),
+                Err(ClientError::Several(_)) => {
+                    let overview = Overview::look();
+                    overview.show(out, self.json);
+                    Ok(overview.exit())
+                }
+                Err(error) => refused(error),
+            },
+            names => match names.iter().map(|name| look(Some(name))).collect::<Result<Vec<Seen>, _>>() {
+                Ok(seen) => Ok(show(out, &seen, self.json)),
+                Err(error) => refused(error),
+            },
         }
-        Ok(if status["phase"] == "broken" { Exit::Broken } else { Exit::Done })
+    }
+}
+
+/// What is seen of a deployment.
+enum Seen {
+    Runs(Json),
+    Died(Box<Died>),
+}
+
+fn look(name: Option<&str>) -> Result<Seen, ClientError> {
+    let asked = Client::connect(name).and_then(|mut client| client.call("status", &json!({}), ASK));
+    asked.map(Seen::Runs).or_else(|error| {
+        let died = match error {
+            ClientError::None => kept::died().into_iter().max_by(|a, b| a.seen().0.total_cmp(&b.seen().0)),
+            _ => kept::meant(&error).filter(Life::died).map(Died::of),
+        };
+        died.map(|died| Seen::Died(Box::new(died))).ok_or(error)
+    })
+}
+
+/// One as it is, several below each other or as an array.
+fn show(out: &Output, seen: &[Seen], json: bool) -> Exit {
+    if json {
+        let one = |seen: &Seen| match seen {
+            Seen::Runs(status) => status.clone(),
+            Seen::Died(died) => died.json(),
+        };
+        match seen {
+            [only] => out.json(&one(only)),
+            all => out.json(&all.iter().map(one).collect::<Vec<_>>()),
+        }
+    } else {
+        for (i, seen) in seen.iter().enumerate() {
+            if i > 0 {
+                out.line("");
+            }
+            match seen {
+                Seen::Runs(status) => print(out, status),
+                Seen::Died(died) => died.print(out),
+            }
+        }
+    }
+    let is = |what: fn(&Seen) -> bool| seen.iter().any(what);
+    if is(|seen| matches!(seen, Seen::Runs(status) if status["phase"] == "broken")) {
+        Exit::Broken
+    } else if is(|seen| matches!(seen, Seen::Died(_))) {
+        kept::EXIT
+    } else {
+        Exit::Done
     }
 }
 
@@ -76,9 +152,9 @@ fn print(out: &Output, status: &Json) {
     }
     if let Ok(stopping) = serde_json::from_value::<StoppingView>(status["stopping"].clone()) {
         let held = if stopping.held {
-            ": a safe configuration holds what is left, `davit shutdown --force` lets go"
+            ": a safe configuration holds what is left, `davit shutdown --force` lets go".to_owned()
         } else {
-            ""
+            stopping.stands_still.map(|still| format!(": stands still, {still}")).unwrap_or_default()
         };
         out.line(format!("stopping     {}{held}", stopping.stage.words()));
     }

@@ -1,7 +1,7 @@
 //! What the session asks of the configurator beside requests: how things stand, and to take everything down.
 
 use super::request::{Reason, Request, Residual};
-use crate::model::{ComponentName, ConfigId, RequestId, Snapshot, Step};
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, RequestId, Snapshot, Step};
 use crate::stack::{FrameId, Requester};
 use crate::time::{Sender, Time};
 use serde::Serialize;
@@ -26,6 +26,8 @@ pub struct FrameView {
     pub lost: bool,
     /// The platform does not show what its configuration stands for.
     pub unseen: bool,
+    /// It is of what was asked for since stopping began.
+    pub since_stopping: bool,
 }
 
 /// What is under way.
@@ -61,7 +63,7 @@ pub struct View {
 }
 
 /// What was in force when stopping began.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Began {
     /// The number that the next frame got.
     pub next: FrameId,
@@ -69,6 +71,8 @@ pub(super) struct Began {
     pub at: Time,
     /// The number of the next frame when its coordinators were left out.
     pub led: Option<FrameId>,
+    /// What was asked for and not answered then, and by whom: it counts as before, also where it begins at the same instant.
+    pub asked: Vec<(Ask, Requester)>,
 }
 
 /// What a stage of stopping came to.
@@ -155,8 +159,16 @@ pub(super) enum Command {
         direction: Recovery,
         reply: Sender<Result<(), Arc<Residual>>>,
     },
+    /// A configuration that an operator makes up, in the place of the one of that name; `listed`: it may be applied without force.
+    Define {
+        configuration: Box<Configuration>,
+        listed: bool,
+        reply: Sender<()>,
+    },
     /// Stopping begins: operators' requests are refused from now on.
     Stopping,
+    /// The event that ends the deployment came, or the one that begins it.
+    Leaving(bool),
     TakeBack {
         deadline: Time,
         reply: Sender<TakenDown>,

@@ -92,6 +92,8 @@ pub(super) struct Engine {
     pub taking_down: bool,
     /// When stopping began, and what was in force then.
     pub began: Option<Began>,
+    /// The event that ends the deployment came, and it is not down since.
+    pub leaving: bool,
     /// What takes its time has been broken off, since force is wanted.
     pub hurried: bool,
 }
@@ -124,6 +126,7 @@ impl Engine {
             stopping: false,
             taking_down: false,
             began: None,
+            leaving: false,
             hurried: false,
         }
     }
@@ -151,7 +154,7 @@ impl Engine {
             }
             let mut did = self.serve_safe();
             if !self.running.iter().any(Running::is_safe) {
-                while let Some(number) = self.desk.turn(&self.given.claims).map(|turn| turn.number) {
+                while let Some(number) = self.turn() {
                     did = true;
                     self.begin(number);
                     if self.urgent() {
@@ -186,6 +189,13 @@ impl Engine {
                 received => self.received(received),
             }
         }
+    }
+
+    /// The next batch that may begin, by its number.
+    pub fn turn(&mut self) -> Option<u32> {
+        let Self { desk, given, world, leaving, .. } = self;
+        let alone = |batch: &Batch| *leaving && world.stack.goes_alone(batch);
+        desk.turn(&given.claims, alone).map(|turn| turn.number)
     }
 
     /// Takes in what has come, waiting for something until `until`.
@@ -240,7 +250,12 @@ impl Engine {
                     Command::View { system, reply } => {
                         let _ = reply.try_send(self.view(system));
                     }
+                    Command::Define { configuration, listed, reply } => {
+                        self.given.define(*configuration, listed, &mut self.switches);
+                        let _ = reply.try_send(());
+                    }
                     Command::Stopping => self.stopping_begins(),
+                    Command::Leaving(leaving) => self.leaving = leaving,
                     Command::Hurry => {}
                     // Stands in its coordinator's queue like a request.
                     Command::Down(requester) => {

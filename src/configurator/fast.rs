@@ -124,7 +124,7 @@ impl Engine {
     /// A request that came alone is under way on the empty desk.
     fn takes_place(&mut self, request: Request) -> Option<u32> {
         let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
-        self.desk.turn(&self.given.claims).map(|turn| turn.number)
+        self.turn()
     }
 
     /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a

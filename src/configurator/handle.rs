@@ -179,9 +179,22 @@ impl ConfiguratorHandle {
         self.ask(deadline, |reply| Command::Recover { direction, reply })
     }
 
+    /// Takes in a configuration that an operator makes up, in the place of the one of that name, which must not be asked for
+    /// meanwhile. `listed`: it may be applied without force. Answers whether it was taken in by `deadline`.
+    pub fn define(&self, configuration: Configuration, listed: bool, deadline: Time) -> bool {
+        let configuration = Box::new(configuration);
+        self.ask(deadline, |reply| Command::Define { configuration, listed, reply }).is_some()
+    }
+
     /// Stopping begins: what is in force now is known apart from what comes since, and operators' requests are refused.
     pub fn stopping(&self) {
         self.inner.post.command(Command::Stopping);
+    }
+
+    /// The event that ends the deployment was raised: until it is down, or (`false`) the one that begins it is raised, an undo
+    /// of a coordinator takes along what operators have put in its way.
+    pub fn leaving(&self, leaving: bool) {
+        self.inner.post.leaving(leaving);
     }
 
     /// The second stage of stopping: what is under way is given up, and frames are popped, newest first, as far as that goes.

@@ -49,6 +49,10 @@ pub(super) struct Counts {
     pub truths: AtomicBool,
     /// Somebody wants force.
     pub hurried: AtomicBool,
+    /// The event that ends the deployment came, and it is not down since.
+    pub leaving: AtomicBool,
+    /// The same, as the configurator was told last.
+    pub told: AtomicBool,
     reports: AtomicUsize,
     commands: AtomicUsize,
     /// Reports did not fit: the platform must be looked at as a whole.
@@ -94,6 +98,7 @@ impl Post {
     #[allow(clippy::result_large_err)] // The batch is given back: it still has to be answered.
     /// Puts a batch in; `safe` of its requests ask for safe configurations. Gives it back when there is no room.
     pub fn batch(&self, batch: Batch, safe: usize) -> Result<(), Batch> {
+        self.tell_leaving();
         let plain = batch.requests.len() - safe;
         if plain > 0 && !reserve(&self.counts.requests, plain, limits::REQUEST_QUEUE) {
             return Err(batch);
@@ -144,6 +149,23 @@ impl Post {
     pub fn hurry(&self) {
         self.counts.hurried.store(true, Ordering::Release);
         self.command(super::control::Command::Hurry);
+    }
+
+    /// Says that the deployment is led down from now on, or that it is brought up. It is for the requests that come after this,
+    /// so it goes with the next of them: alone it would wake the configurator before that.
+    pub fn leaving(&self, leaving: bool) {
+        self.counts.leaving.store(leaving, Ordering::Release);
+    }
+
+    fn tell_leaving(&self) {
+        let Counts { leaving, told, .. } = &*self.counts;
+        let now = leaving.load(Ordering::Acquire);
+        if told.load(Ordering::Acquire) == now || told.swap(now, Ordering::AcqRel) == now {
+            return;
+        }
+        if !self.command(super::control::Command::Leaving(now)) {
+            told.store(!now, Ordering::Release);
+        }
     }
 
     /// Puts a worker's reply in: there is room for every call that is out. When the configurator has ended, nobody

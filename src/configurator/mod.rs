@@ -21,6 +21,7 @@ mod carry;
 pub mod conditions;
 mod confirmations;
 pub mod control;
+mod defining;
 mod engine;
 mod fast;
 mod handle;

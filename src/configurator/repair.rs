@@ -71,6 +71,8 @@ impl Engine {
                         frame: None,
                         instead: None,
                         expected: Snapshot::default(),
+                        gone: Edits::default(),
+                        also: Vec::new(),
                     }));
                 }
             }

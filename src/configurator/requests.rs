@@ -55,7 +55,7 @@ impl Engine {
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
             let Some(turn) = self.desk.turn_of(number) else { return };
-            let requests = turn.batch.requests.clone();
+            let (requests, alone) = (turn.batch.requests.clone(), turn.alone);
             // Given up together with one before it, of which it was to be taken up anew.
             if let Some(place) = turn.given_up.iter().map(|given_up| given_up.place).min() {
                 self.cancel_behind(number, place, requests[place]);
@@ -75,6 +75,7 @@ impl Engine {
                 places: &places,
                 joined: false,
                 placed: false,
+                alone,
             };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs
@@ -98,6 +99,11 @@ impl Engine {
             }
             if group.down {
                 self.down.insert(requests[0].requester);
+                if self.all_down() {
+                    self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
+                    self.counts.told.store(false, std::sync::atomic::Ordering::Release);
+                    self.leaving = false;
+                }
                 if self.all_down() && self.world.settle_down() {
                     self.confirmations.clear();
                     self.changed();
@@ -196,7 +202,10 @@ impl Engine {
             let pushed = self.world.take_over(edits, &endings, &busy);
             for (part, ended) in parts.into_iter().enumerate() {
                 let request = requests[group.places[part]];
-                reasons.push(ended.reason());
+                let with = &planned.parts[part].along;
+                let took = || Reason::TookAlong(with.iter().map(|along| along.frame.configuration).collect());
+                let whole = matches!(ended, PartEnd::Done) && !with.is_empty();
+                reasons.push(if whole { Some(took()) } else { ended.reason() });
                 let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
                 match (&ended, planned.parts[part].pushes) {
                     (PartEnd::Done, Some(id)) => self.applied(id, stood),
@@ -256,7 +265,13 @@ impl Engine {
 
     /// What is left of a request that ended *broken*: its partial frame, and what is not known.
     pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart, since: FrameId) {
-        let BrokenPart { residual, frame, instead, expected } = broken;
+        let BrokenPart { residual, frame, instead, expected, gone, also } = broken;
+        // What was to be undone with it has each its own.
+        self.world.stack.apply([&gone], &[]);
+        for frame in also {
+            self.partials.push((frame.id, residual.clone()));
+            self.world.stack.replace(frame);
+        }
         let frame = match (frame, instead) {
             (Some(frame), Some(of)) => {
                 self.world.stack.replace(Frame { id: of, ..frame });
@@ -401,6 +416,7 @@ impl Engine {
             partial: frame.partial,
             lost: self.is_lost(frame.configuration),
             unseen: self.is_unseen(frame.configuration),
+            since_stopping: self.came_since(frame),
         };
         self.world.stack.frames().iter().map(view).collect()
     }

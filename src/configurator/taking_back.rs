@@ -22,7 +22,10 @@ impl Engine {
         if self.began.is_some() {
             return;
         }
-        self.began = Some(Began { next: self.world.stack.next(), at: self.given.clock.now(), led: None });
+        let under_way = self.current.iter().map(|(request, _)| request).chain(&self.safety.waiting);
+        let asked = under_way.map(|request| (request.ask, request.requester)).collect();
+        let (next, at) = (self.world.stack.next(), self.given.clock.now());
+        self.began = Some(Began { next, at, led: None, asked });
         let operators = |request: &Request| request.why == Why::Asked && request.requester == Requester::Operator;
         for request in self.desk.cancel_waiting(operators) {
             self.refuse(request);
@@ -95,9 +98,11 @@ impl Engine {
     }
 
     /// Whether a frame is of what began since stopping did.
-    fn came_since(&self, frame: &Frame) -> bool {
+    pub(super) fn came_since(&self, frame: &Frame) -> bool {
         // What began before and ended since counts as before.
-        self.began.is_some_and(|began| frame.id >= began.next && frame.at >= began.at)
+        let asked = (Ask::Apply(frame.configuration), frame.requester);
+        let since = |began: &Began| frame.id >= began.next && frame.at >= began.at && !began.asked.contains(&asked);
+        self.began.as_ref().is_some_and(since)
     }
 
     /// What moved hardware since stopping began.

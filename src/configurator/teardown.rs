@@ -37,7 +37,7 @@ impl Engine {
                 let down = self.force(deadline);
                 let _ = reply.try_send(down);
             }
-            Command::Down(_) | Command::Stopping | Command::Hurry => {}
+            Command::Define { .. } | Command::Down(_) | Command::Stopping | Command::Leaving(_) | Command::Hurry => {}
             Command::DiscardStack => {
                 self.world.stack.discard();
                 self.confirmations.clear();
@@ -150,7 +150,7 @@ impl Engine {
     }
 
     /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out. `led`: they bring it to
-    /// rest; what moves is done where no safe configuration is in force, or where somebody has asked for force and none has come
+    /// rest, and what of that fails is tried again, as often as something is removed again; what moves is done where no safe configuration is in force, or where somebody has asked for force and none has come
     /// since nobody leads.
     fn apply_all(&mut self, ids: &[ConfigId], led: Option<FrameId>, down: &mut TakenDown) {
         let safe = led.is_none();
@@ -159,30 +159,38 @@ impl Engine {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
             let at = self.given.clock.now();
-            let Effort { planned, troubles, .. } =
+            let Effort { mut planned, troubles: left_out, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
-            // A safe configuration that somebody asked for keeps everything still.
-            let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led));
-            if !safe
-                && !asked
-                && self.world.stack.safe().next().is_some()
-                && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
-            {
-                down.partly.push(*id);
-                down.troubles.push(Reason::Moves(moving.step.clone()));
-                continue;
-            }
             // What brings it to rest may take the time that it gives itself.
             let patience = configuration.timeout.unwrap_or_default().max(self.given.limits.step_timeout);
-            let steps = planned.steps.len();
-            let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
-            let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
-            let broken_off = done.done_so_far().count() < steps;
-            let troubles: Vec<Reason> = troubles.into_iter().chain(troubles_of(done)).collect();
-            if broken_off || !troubles.is_empty() {
+            let (mut whole, mut troubles) = (false, Vec::new());
+            for _ in 0..limits::FORCE_ROUNDS {
+                // A safe configuration that somebody asked for keeps everything still.
+                let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led));
+                if !safe
+                    && !asked
+                    && self.world.stack.safe().next().is_some()
+                    && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
+                {
+                    troubles.push(Reason::Moves(moving.step.clone()));
+                    break;
+                }
+                let steps = planned.steps.len();
+                let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
+                let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
+                whole = done.done_so_far().count() == steps;
+                let failed: Vec<PlannedStep> = done.failed_steps().cloned().collect();
+                troubles = troubles_of(done);
+                // Not what nobody knows of: it may be moving.
+                if safe || failed.is_empty() || self.given.clock.now() >= at + patience {
+                    break;
+                }
+                planned = own_plan(one_by_one(failed), &self.world.system);
+            }
+            if !whole || !troubles.is_empty() || !left_out.is_empty() {
                 down.partly.push(*id);
             }
-            down.troubles.extend(troubles);
+            down.troubles.extend(left_out.into_iter().chain(troubles));
         }
     }
 
@@ -261,6 +269,14 @@ impl Engine {
     }
 }
 
+/// Steps one after the other.
+fn one_by_one(mut steps: Vec<PlannedStep>) -> Vec<PlannedStep> {
+    for (id, step) in (0u32..).zip(&mut steps) {
+        (step.id, step.wave, step.after) = (id, 0, id.checked_sub(1).into_iter().collect());
+    }
+    steps
+}
+
 /// What a best effort could not do.
 fn troubles_of(machine: Transaction) -> Vec<Reason> {
     machine.failures()
@@ -275,6 +291,7 @@ pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
         holds: false,
         on_failure: crate::model::OnFailure::Unset,
         frame: None,
+        along: Vec::new(),
     };
     Planned {
         steps: Arc::new(steps),

@@ -65,6 +65,12 @@ pub trait Listener {
         let _ = chart;
     }
 
+    /// Its thread has ended by itself, and why: its functions could not be opened, or something in it panicked. It leads nothing
+    /// any more, and nothing comes after this.
+    fn ended(&mut self, why: &str) {
+        let _ = why;
+    }
+
     /// The chart behaved badly.
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
         let _ = (chart, trouble);

@@ -6,7 +6,9 @@ use super::{Delivered, Tag};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
-use crate::time::{Clock, Join, JoinError, RecvError, Sender, Signal, Time, lock};
+use crate::time::clock::panic_text;
+use crate::time::{Clock, Join, JoinError, RecvError, Released, Sender, Signal, Time, lock};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 
@@ -268,11 +270,38 @@ impl Shared {
         self.grown.get().map_or_else(|| self.chart.clone(), |grown| lock(grown).clone())
     }
 
+    /// The life of the thread. However it ends, nobody waits for it any more; where nobody had detached it that is told at once.
     fn run<F: Hook>(&self, mut listener: impl Listener, open: impl FnOnce() -> Result<F, String>) {
-        let _ended = Ended(self);
+        let ended = catch_unwind(AssertUnwindSafe(|| self.lead(&mut listener, open)));
+        let by_itself = !self.detached.swap(true, Ordering::SeqCst);
+        self.since.store(0, Ordering::Relaxed);
+        lock(&self.inbox).clear();
+        lock(&self.waiting).all.clear();
+        match ended {
+            Ok(Err(why)) if by_itself => listener.ended(&why),
+            Err(panic) => {
+                if by_itself && !panic.is::<Released>() {
+                    // It may be its listener that panics.
+                    let why = format!("it panicked: {}", panic_text(&*panic));
+                    let _ = catch_unwind(AssertUnwindSafe(|| listener.ended(&why)));
+                }
+                resume_unwind(panic);
+            }
+            Ok(_) => {}
+        }
+    }
+
+    fn lead<F: Hook>(
+        &self,
+        listener: &mut impl Listener,
+        open: impl FnOnce() -> Result<F, String>,
+    ) -> Result<(), String> {
         let mut core = match open() {
             Ok(functions) => Core::with(self.chart.clone(), functions),
-            Err(text) => return listener.said(&Said { by: Printer::Err, text }),
+            Err(text) => {
+                listener.said(&Said { by: Printer::Err, text: text.clone() });
+                return Err(format!("its functions cannot be run: {text}"));
+            }
         };
         let mut listener = Told { shared: self, listener };
         let began = self.clock.now();
@@ -309,6 +338,7 @@ impl Shared {
                 self.bell.wait(core.next_deadline().unwrap_or(Time::NEVER));
             }
         }
+        Ok(())
     }
 
     fn next(&self, tickets: &mut Vec<u64>) -> Option<Incoming> {
@@ -354,22 +384,10 @@ impl Round {
     }
 }
 
-/// However the thread ends, nobody waits for it any more.
-struct Ended<'a>(&'a Shared);
-
-impl Drop for Ended<'_> {
-    fn drop(&mut self) {
-        self.0.detached.store(true, Ordering::SeqCst);
-        self.0.since.store(0, Ordering::Relaxed);
-        lock(&self.0.inbox).clear();
-        lock(&self.0.waiting).all.clear();
-    }
-}
-
 /// Between core and listener: publishes where the chart stands, and lets nothing through once detached.
 struct Told<'a, L> {
     shared: &'a Shared,
-    listener: L,
+    listener: &'a mut L,
 }
 
 impl<L> Told<'_, L> {
@@ -377,7 +395,7 @@ impl<L> Told<'_, L> {
     fn tell(&mut self, call: impl FnOnce(&mut L)) {
         let _telling = lock(&self.shared.telling);
         if !self.shared.detached.load(Ordering::SeqCst) {
-            call(&mut self.listener);
+            call(self.listener);
         }
     }
 }

@@ -174,15 +174,19 @@ codes! {
     DEPLOY_EVENT_UNHEARD = "deploy::event_unheard", "no transition waits for the event that starts or ends the deployment",
         "`deploy.event` starts the bring-up and `shutdown.event` the shutdown. The coordinator has no transition on the \
          event, so nothing would ever happen. Correct the event's name in the deployment or in the coordinator.";
-    DEPLOY_NEVER_UP = "deploy::never_up", "the bring-up does not reach the state that means up",
-        "The coordinator was driven with the deploy event and every request answered `ok`, and came to rest somewhere \
-         else than in `deploy.up`. A bring-up that fails when everything goes well cannot work: look at the trace for the \
-         place where it stops, and at the event it waits for there. Events of components were tried where nothing else \
-         could go on.";
-    DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down",
+    DEPLOY_ONE_EVENT = "deploy::one_event", "one event starts and ends the deployment",
+        "`deploy.event` and `shutdown.event` are the same. Raised while the bring-up is under way, or once more while it is being \
+         stopped, it would mean both, and nobody could tell which. Give the deployment an event for each.";
+    DEPLOY_NEVER_UP = "deploy::never_up", "the bring-up does not reach the state that means up, or not in time",
+        "The coordinator was driven with the deploy event and every request answered `ok` at once, and came to rest somewhere \
+         else than in `deploy.up`, or only after `deploy.within_s`, for it waits for times (`e_after`) that last longer. A bring-up \
+         that fails when everything goes well cannot work: look at the trace for the place where it stops, and at the event it \
+         waits for there. Events of components were tried where nothing else could go on.";
+    DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down, or not in time",
         "From the state that means up, the coordinator was driven with the shutdown event and every request answered \
-         `ok`, and did not reach `shutdown.down`. It would have to be stopped without its coordinator. Look at the trace for the place \
-         where it stops.";
+         `ok` at once, and did not reach `shutdown.down`, or only after `shutdown.within_s`. It would have to be stopped without its \
+         coordinator. Look at the trace for the place where it stops. An ordinary event from outside leads nowhere then where the \
+         deployment declares `safety`: it is refused while it is being stopped. What components and monitors report is not.";
     DEPLOY_LEFTOVERS = "deploy::leftovers", "the shutdown leaves components behind",
         "The coordinator reaches the state that means down, but components that the bring-up created are still there. \
          They would be taken away without the order that the coordinator knows (exit status 4). Let the coordinator undo what it \
@@ -333,6 +337,8 @@ codes! {
         "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped. Apply a configuration that leads to the wanted state instead.";
     STACK_SHARED = "stack::shared", "a frame above shares something with this one",
         "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
+    STACK_TAKEN_ALONG = "stack::taken_along", "an operator's frame was undone with a coordinator's",
+        "While a deployment is led down, what its coordinator undoes takes along the frames of operators that stand in its way: newest first, in one transaction, both or none. Not what is `safe`, nor what would move when it is undone: then the coordinator's undo is refused, and says so.";
     STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",
         "Configurations of one group are alternatives: applying one pops the frame of the other first. That frame cannot be popped, for the reason given, so the new configuration is refused and nothing has changed. Undo what stands in the way first.";
     STACK_FOREIGN = "stack::foreign", "the frame belongs to another coordinator",
@@ -494,6 +500,10 @@ codes! {
          to a state that asks for a safe configuration on its entry; a transition from the outermost state in which actuators \
          exist serves for all states inside. Where no coordinator waits for the event at all, that is a warning even without an \
          actuator: it is probably a slip.";
+    DEPLOY_NO_REST = "deploy::no_rest", "something moves, and nothing is named that brings it to rest by force",
+        "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
+         everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \
+         that, in their order. Name them, or see that it may stop where it is; this is only a note.";
     DEPLOY_SAFETY_ANSWER = "deploy::safety_answer", "an answer of the configurator is listed as a safety event",
         "`safety` lists events from outside that must lead to a `safe` configuration: what a component, a monitor or an operator \
          raises. An answer (`ID.ok`, `ID.failed`, …) comes only to who asked for something. Hear it with a transition of the \
@@ -683,7 +693,11 @@ codes! {
     CLI_NOT_RUNNING = "cli::not_running", "there is no such running deployment",
         "The command talks to a running deployment through its control socket, and none of that name (or none at all) \
          answers. Start one with `davit deploy FILE`. Sockets are looked for in $XDG_RUNTIME_DIR/davit: a deployment \
-         started by another user, or with another value of that variable, is not seen.";
+         started by another user, or with another value of that variable, is not seen. One that ended left its log: `davit log \
+         NAME`; of one that died without being shut down `davit status NAME` tells when, and how far it was.";
+    CLI_NOTHING_KEPT = "cli::nothing_kept", "nothing is kept of such a deployment",
+        "What `davit list --forget NAME` throws away is what is kept of a deployment that does not run any more: its log, how it \
+         ended, or that it died. There is none of that name, or it runs: `davit shutdown NAME` takes it down first.";
     CLI_SEVERAL_RUNNING = "cli::several_running", "several deployments are running",
         "The command was given no name and more than one deployment is running, so it is not known which is meant. \
          Give the name: `davit status NAME`, `davit event E --on NAME`.";

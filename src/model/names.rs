@@ -150,6 +150,12 @@ impl From<Ident> for ComponentName {
 }
 
 impl ConfigId {
+    /// The name of what sets this one property or port, as an operator asks for it. No configuration that is written can be
+    /// called so.
+    pub fn setting(member: MemberRef) -> Self {
+        Self(Ustr::from(&member.to_string()))
+    }
+
     /// The subsystem's path before the last `/`, empty at the top.
     pub fn prefix(&self) -> &'static str {
         self.as_str().rsplit_once('/').map_or("", |(prefix, _)| prefix)

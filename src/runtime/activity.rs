@@ -4,7 +4,8 @@
 //! components, and no lock.
 
 use super::call::{Call, Reply};
-use super::cell::{Cell, Closed};
+use super::cell::{Cell, Inside};
+use super::gate::Closed;
 use super::latest::Reader;
 use crate::limits;
 use crate::model::monitor::Counter;
@@ -109,7 +110,7 @@ impl Activity {
     pub(crate) fn stuck<'a>(&self, mut members: impl Iterator<Item = &'a Arc<Cell>>) -> Option<ComponentName> {
         let since = self.busy_since.load(Ordering::Acquire);
         (since != Time::NEVER.0 && self.clock.now().since(Time(since)) >= limits::ACTIVITY_STUCK)
-            .then(|| members.find(|cell| cell.is_busy()).map(|cell| cell.name))
+            .then(|| members.find(|cell| cell.gate.is_busy()).map(|cell| cell.name))
             .flatten()
     }
 
@@ -196,7 +197,7 @@ impl Activity {
             self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
             self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
             self.round(now, schedule, |cell| {
-                if let Some(inside) = cell.enter_running() {
+                if let Some(inside) = Inside::running(cell) {
                     self.update(cell, inside, now, release, period.as_secs_f64());
                 }
             });
@@ -225,7 +226,7 @@ impl Activity {
                 let pending = cell.beat.pending.load(Ordering::Acquire);
                 if !pending && wake_at > now {
                     next = next.min(wake_at);
-                } else if let Some(inside) = cell.enter_running() {
+                } else if let Some(inside) = Inside::running(cell) {
                     any = true;
                     // An exchange, not a store: what was written before the last poke must be seen by this update, and a
                     // poke after it must stay.
@@ -264,7 +265,7 @@ impl Activity {
     }
 
     #[inline]
-    fn update(&self, cell: &Arc<Cell>, mut inside: super::cell::Inside<'_>, now: Time, release: Time, first: f64) {
+    fn update(&self, cell: &Arc<Cell>, mut inside: Inside<'_>, now: Time, release: Time, first: f64) {
         let fault = inside.update(&self.clock, now, release, first).err();
         self.leave(cell, inside, fault);
     }
@@ -302,7 +303,7 @@ impl Activity {
             return;
         }
         self.busy_since.store(self.clock.now().0, Ordering::Release);
-        match cell.enter_for_operation(safe) {
+        match Inside::for_operation(&*cell, safe) {
             Ok(mut inside) => {
                 let mut ended = inside.operation(&self.clock, operation, &args, call);
                 progress.returned();
@@ -321,7 +322,7 @@ impl Activity {
     }
 
     #[inline]
-    fn leave(&self, cell: &Arc<Cell>, inside: super::cell::Inside<'_>, fault: Option<String>) {
+    fn leave(&self, cell: &Arc<Cell>, inside: Inside<'_>, fault: Option<String>) {
         let left = inside.leave(fault.is_some().then_some(RunState::Faulted));
         if left.ended_running {
             self.stopped(cell);

@@ -5,10 +5,8 @@
 //! (The crate `triple_buffer` does the same with every slot on cache lines of its own: 512 bytes a value. A deployment
 //! has one such cell per property and per connection, so ours is as small as its values.)
 
-use std::cell::UnsafeCell;
+use super::sync::{Arc, AtomicU8, Ordering, UnsafeCell};
 use std::marker::PhantomData;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Set in the middle slot's number when it holds what the reader has not seen.
 const NEW: u8 = 4;
@@ -64,7 +62,7 @@ impl<T> Writer<T> {
     /// nothing is published.
     pub fn write(&mut self, fill: impl FnOnce(&mut T)) {
         // SAFETY: the writer owns the slot `own`, and `&mut self` makes this the only use of it.
-        fill(unsafe { &mut *self.shared.slots[usize::from(self.own)].get() });
+        self.shared.slots[usize::from(self.own)].with_mut(|slot| fill(unsafe { &mut *slot }));
         self.own = self.shared.middle.swap(self.own | NEW, Ordering::AcqRel) & SLOT;
     }
 }
@@ -83,62 +81,6 @@ impl<T> Reader<T> {
     /// The value taken last.
     pub fn value(&self) -> &T {
         // SAFETY: the reader owns the slot `own`; `update` needs `&mut self`, so the slot stays its own meanwhile.
-        unsafe { &*self.shared.slots[usize::from(self.own)].get() }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_newest_value_is_read_and_told_once() {
-        let (mut writer, mut reader) = latest(0);
-        assert!(!reader.update());
-        assert_eq!(*reader.value(), 0);
-        for i in 1..5 {
-            writer.write(|slot| *slot = i);
-        }
-        assert!(reader.update());
-        assert_eq!(*reader.value(), 4);
-        assert!(!reader.update());
-        assert_eq!(*reader.value(), 4);
-    }
-
-    #[test]
-    fn no_value_is_torn_and_none_goes_backwards() {
-        let (mut writer, mut reader) = latest([0_u64; 16]);
-        const LAST: u64 = 200_000;
-        let thread = std::thread::spawn(move || {
-            for i in 1..=LAST {
-                writer.write(|slot| slot.fill(i));
-            }
-        });
-        let mut last = 0;
-        while last < LAST {
-            reader.update();
-            let value = *reader.value();
-            assert!(value.iter().all(|v| *v == value[0]), "torn: {value:?}");
-            assert!(value[0] >= last);
-            last = value[0];
-        }
-        thread.join().unwrap();
-    }
-
-    #[test]
-    fn a_panic_while_filling_publishes_nothing() {
-        let (mut writer, mut reader) = latest(1);
-        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            writer.write(|slot| {
-                *slot = 2;
-                std::panic::resume_unwind(Box::new(()));
-            });
-        }));
-        assert!(panicked.is_err());
-        assert!(!reader.update());
-        assert_eq!(*reader.value(), 1);
-        writer.write(|slot| *slot = 3);
-        assert!(reader.update());
-        assert_eq!(*reader.value(), 3);
+        self.shared.slots[usize::from(self.own)].with(|slot| unsafe { &*slot })
     }
 }

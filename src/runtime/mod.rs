@@ -13,6 +13,7 @@ pub mod builder;
 pub(crate) mod call;
 pub(crate) mod cell;
 pub mod component;
+pub(crate) mod gate;
 pub(crate) mod guard;
 pub mod latest;
 pub mod library;
@@ -22,6 +23,9 @@ pub mod probe;
 pub mod property;
 mod realtime;
 pub mod sight;
+mod sync;
+#[cfg(test)]
+mod tests;
 pub mod value;
 mod words;
 

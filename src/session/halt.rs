@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
 
 /// What stopping is at: part of what `status --json` prints.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoppingView {
     /// The stage.
     pub stage: Stage,
@@ -17,6 +17,30 @@ pub struct StoppingView {
     pub held: bool,
     /// What it waits for: requests that are not answered.
     pub waits_for: Vec<String>,
+    /// The time of the first stage stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stands_still: Option<StandsStill>,
+}
+
+/// Why the time of the first stage stands still: people decide how it goes on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StandsStill {
+    /// The safe configuration that has come since stopping began, and is in force.
+    pub safe: String,
+    /// Since when, in seconds of its clock.
+    pub since: f64,
+    /// What leads on from there.
+    pub leads_on: String,
+}
+
+impl std::fmt::Display for StandsStill {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "`{}` is in force since {:.3} s, and nothing goes on before somebody asks for it: {}",
+            self.safe, self.since, self.leads_on
+        )
+    }
 }
 
 /// Of one session.
@@ -75,16 +99,17 @@ impl Halt {
 
     /// An event came. What is to be applied since it is a safety event that nobody else acts on: again and again only after
     /// a while, however often it comes.
-    pub fn heed(&self, event: EventName, now: Time) -> &[ConfigId] {
-        if !self.safety.contains(&event) {
-            return &[];
-        }
+    /// None: it is no such event, or a coordinator acts on it.
+    pub fn heed(&self, event: EventName, now: Time) -> Option<&[ConfigId]> {
         let mut state = lock(&self.state);
-        if !state.alone || state.acted.is_some_and(|acted| now < acted + limits::SAFETY_AGAIN) {
-            return &[];
+        if !self.safety.contains(&event) || !state.alone {
+            return None;
+        }
+        if state.acted.is_some_and(|acted| now < acted + limits::SAFETY_AGAIN) {
+            return Some(&[]);
         }
         state.acted = Some(now);
-        &self.safe
+        Some(&self.safe)
     }
 
     /// A component raised an event.
@@ -105,6 +130,6 @@ impl Halt {
 
     pub fn view(&self, waits_for: Vec<String>) -> Option<StoppingView> {
         let state = lock(&self.state);
-        state.stage.map(|stage| StoppingView { stage, held: state.held, waits_for })
+        state.stage.map(|stage| StoppingView { stage, held: state.held, waits_for, stands_still: None })
     }
 }

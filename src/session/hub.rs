@@ -360,6 +360,11 @@ impl Hub {
         list.into_iter().map(|(_, o)| format!("{} by {}", o.ask, o.by)).collect()
     }
 
+    /// Whether this is asked for and not answered.
+    pub fn is_outstanding(&self, ask: Ask) -> bool {
+        self.lock().outstanding.values().any(|outstanding| outstanding.ask == ask)
+    }
+
     /// Whether every request raised so far has been answered.
     pub fn all_answered(&self) -> bool {
         self.lock().outstanding.is_empty()

@@ -1,14 +1,17 @@
 //! The life of a deployment: brought up, served, down (design §6). How it is stopped: [`stopping`](super::stopping).
 
-use super::log::Phase;
+use super::log::{Happening, Phase};
 use super::stages::Stage;
 use super::{Command, Session};
 use crate::model::Snapshot;
 use crate::time::Time;
-use serde::Serialize;
+use crate::time::clock::panic_text;
+use serde::{Deserialize, Serialize};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// How a deployment ended.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
     /// `down`, or `broken` when something is left.
     pub phase: Phase,
@@ -68,6 +71,9 @@ impl Session {
                 force = by_force;
                 break (format!("interrupted while deploying `{}`", self.deployment().name), true);
             }
+            if !self.leads() {
+                break ("a coordinator has ended".to_owned(), false);
+            }
             if let Some(state) = self.failed_state() {
                 break (format!("the coordinator is in `{state}`"), false);
             }
@@ -104,16 +110,39 @@ impl Session {
         Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })
     }
 
-    /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides.
+    /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides. One whose
+    /// coordinator has ended is led by nobody: that is the end too.
     pub fn serve(&self) -> Command {
         loop {
             if let Some(command) = self.pending_command() {
                 return command;
             }
+            if !self.leads() {
+                return Command::Shutdown { force: false };
+            }
             self.refresh_phase();
             self.tell_slow();
             self.hub().changed.wait(self.next_look(Time::NEVER));
         }
+    }
+
+    /// Drives it by `drive`. Where that panics it is stopped in its stages first, as far as that goes: a defect of whoever drives
+    /// it must not leave a robot up.
+    ///
+    /// # Errors
+    /// What `drive` panicked with, and how it ended; none: also stopping it has panicked.
+    pub fn guarded<T>(&self, drive: impl FnOnce() -> T) -> Result<T, (Box<dyn Any + Send>, Option<Ended>)> {
+        let panic = match catch_unwind(AssertUnwindSafe(drive)) {
+            Ok(driven) => return Ok(driven),
+            Err(panic) => panic,
+        };
+        let note = format!("what drives `{}` has panicked: {}", self.deployment().name, panic_text(&*panic));
+        let ended = survived(|| {
+            let _ = survived(|| self.hub().note(Happening::Forced { note }));
+            // Nothing is there any more that could be stopped.
+            self.ended().unwrap_or_else(|| self.stop(false, self.hub().phase() == Phase::Deploying))
+        });
+        Err((panic, ended.ok()))
     }
 
     pub(super) fn finish(&self, stage: Stage, forced: Vec<String>) -> Ended {
@@ -124,9 +153,14 @@ impl Session {
             self.stop_threads();
         }
         let phase = if left.is_empty() { Phase::Down } else { Phase::Broken };
-        self.hub().set_phase(phase);
+        let _ = survived(|| self.hub().set_phase(phase));
         Ended { phase, stage, forced, left, reported: self.hub().halt().reported() }
     }
+}
+
+/// What is done, or what it panicked with.
+pub(super) fn survived<T>(what: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(what)).map_err(|panic| panic_text(&*panic))
 }
 
 /// What is left of a system, one line each.

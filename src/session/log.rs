@@ -9,7 +9,7 @@ use crate::coordinator::Dropped;
 use crate::limits;
 use crate::model::Snapshot;
 use serde::ser::SerializeStruct;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -116,6 +116,11 @@ pub enum Happening {
         /// For how many seconds so far.
         seconds: f64,
     },
+    /// The process of a deployment in the background printed something: a component, a library, what is said of an error.
+    Printed {
+        /// One line of it.
+        text: String,
+    },
     /// A function of the coordinator printed something, or failed.
     Said {
         /// By which printer: `err`, `warn`, `info` or `dbg`.
@@ -181,7 +186,7 @@ impl Serialize for StepTime {
 }
 
 /// Where a deployment is in its life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
     /// Being brought up.

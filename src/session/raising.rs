@@ -5,7 +5,17 @@ use super::log::Happening;
 use super::parts::Part;
 use super::routes::make_safe;
 use crate::coordinator::{Class, Refused};
-use crate::model::{EventName, Ident};
+use crate::model::{EventName, Ident, RequestId};
+
+/// An event that was given to all coordinators.
+#[derive(Debug)]
+pub struct Offered {
+    /// To be asked with what became of it.
+    pub ticket: u64,
+    /// It is one of safety that acted by itself, since no coordinator leads any more: these requests; none where it had acted
+    /// just before.
+    pub acted: Option<Vec<RequestId>>,
+}
 
 impl Session {
     /// Gives an event to all coordinators, in the name of `from`; where there is no room for it that is written down.
@@ -20,7 +30,7 @@ impl Session {
     /// # Errors
     /// [`Refused::Full`]: a coordinator that may hear it does not keep up. Nobody was told of the event.
     pub fn offer(&self, event: EventName, from: &str) -> Result<(), Refused> {
-        self.deliver(event, from, 0, |_| true)
+        self.deliver(event, from, 0, |_| true).map(drop)
     }
 
     /// The same to these coordinators alone: each hears of one event in its own time, and this is how that is tried.
@@ -28,7 +38,7 @@ impl Session {
     /// # Errors
     /// As [`Session::offer`].
     pub fn offer_to(&self, event: EventName, to: &[Ident], from: &str) -> Result<(), Refused> {
-        self.deliver(event, from, 0, |name| to.contains(&name))
+        self.deliver(event, from, 0, |name| to.contains(&name)).map(drop)
     }
 
     /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
@@ -36,12 +46,19 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::offer`].
-    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<u64, Refused> {
+    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<Offered, Refused> {
         let ticket = self.hub().ticket(self.parts().len());
-        self.deliver(event, from, ticket, |_| true).map(|()| ticket).inspect_err(|_| self.hub().forget(ticket))
+        let acted = self.deliver(event, from, ticket, |_| true).inspect_err(|_| self.hub().forget(ticket))?;
+        Ok(Offered { ticket, acted })
     }
 
-    fn deliver(&self, event: EventName, from: &str, ticket: u64, to: impl Fn(Ident) -> bool) -> Result<(), Refused> {
+    fn deliver(
+        &self,
+        event: EventName,
+        from: &str,
+        ticket: u64,
+        to: impl Fn(Ident) -> bool,
+    ) -> Result<Option<Vec<RequestId>>, Refused> {
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts().len()), false);
@@ -58,7 +75,8 @@ impl Session {
         }
         self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator().event(event);
-        make_safe(self.hub(), self.configurator(), event);
+        self.junction().tell_leaving(self.configurator(), event);
+        let acted = make_safe(self.hub(), self.configurator(), event);
         (held.len()..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let mut unwatched = false;
         for part in held {
@@ -70,10 +88,10 @@ impl Session {
             }
             self.hub().taken_up(ticket, false);
         }
-        if gone {
+        if gone && acted.is_none() {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
-        if unwatched { Err(Refused::Full) } else { Ok(()) }
+        if unwatched { Err(Refused::Full) } else { Ok(acted) }
     }
 }

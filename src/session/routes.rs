@@ -6,7 +6,7 @@ use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
 use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
-use crate::model::{Ask, Deployment, EventName, RequestId, Verdict};
+use crate::model::{Ask, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
@@ -24,6 +24,8 @@ pub(super) struct Junction {
     /// Events that go before all others, whoever raises them: those declared under `safety`, and those that begin and end
     /// the deployment.
     urgent: FxHashSet<EventName>,
+    /// The events that begin and end the deployment.
+    ends: Option<(EventName, EventName)>,
 }
 
 impl Junction {
@@ -31,7 +33,16 @@ impl Junction {
     pub fn new(deployment: &Deployment) -> Self {
         let safety = deployment.safety.iter().map(|(event, _)| *event);
         let urgent = safety.chain([deployment.deploy.event, deployment.shutdown.event]).collect();
-        Self { urgent, ..Self::default() }
+        let ends = Some((deployment.deploy.event, deployment.shutdown.event));
+        Self { urgent, ends, ..Self::default() }
+    }
+
+    /// An event came from outside: from the one that ends the deployment on it is led down, until it is down or brought up.
+    pub fn tell_leaving(&self, configurator: &ConfiguratorHandle, event: EventName) {
+        let Some((begins, ends)) = self.ends else { return };
+        if event == ends || event == begins {
+            configurator.leaving(event != begins);
+        }
     }
 
     /// An event of a class, unless it is one that goes before all others.
@@ -138,6 +149,11 @@ impl Listener for ToConfigurator {
             Printer::Dbg => "dbg",
         };
         self.hub.note(Happening::Said { by, text: said.text.clone() });
+    }
+
+    fn ended(&mut self, why: &str) {
+        let note = format!("the coordinator `{}` has ended and leads no more: {why}", self.name);
+        self.hub.note(Happening::Forced { note });
     }
 
     fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
@@ -280,6 +296,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     hub.report(Happening::Event { event: event.to_string(), from });
     hub.halt().report(event);
     if let Some(configurator) = &configurator {
+        junction.tell_leaving(configurator, event);
         make_safe(hub, configurator, event);
     }
     for coordinator in junction.all() {
@@ -287,12 +304,16 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     }
 }
 
-/// A safety event that no coordinator hears any more acts by itself: everything safe is applied.
-pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName) {
-    for id in hub.halt().heed(event, hub.now()) {
+/// A safety event that no coordinator hears any more acts by itself: everything safe is applied. Answers these requests, of
+/// which there are none where it has acted just before.
+pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName) -> Option<Vec<RequestId>> {
+    let safe = hub.halt().heed(event, hub.now())?;
+    let make = |id: &ConfigId| {
         let ask = Ask::Apply(*id);
-        let request = Request::new(hub.request(ask, "a safety event"), ask, Requester::Operator);
+        let request = Request::new(hub.request(ask, &Requester::Safety.to_string()), ask, Requester::Safety);
         // A full queue has answered it already.
         let _ = configurator.submit(Batch::one(request));
-    }
+        request.id
+    };
+    Some(safe.iter().map(make).collect())
 }

@@ -2,13 +2,15 @@
 
 use super::hub::Hub;
 use super::log::Answered;
+use super::members::NoMember;
 use super::names::instead;
+use super::raising::Offered;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
 use super::{Command, NO_FORWARD, Session, recovery};
 use crate::coordinator::Refused;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, EventName};
+use crate::model::{Ask, ConfigId, EventName, RequestId};
 use serde_json::{Value as Json, json};
 use std::sync::Weak;
 use std::time::Duration;
@@ -25,6 +27,9 @@ pub const METHODS: &[(&str, &[&str])] = &[
     ("log", &["last"]),
     ("event", &["event", "wait", "wait_for", "within_s"]),
     ("apply", &["configuration", "force", "wait", "within_s"]),
+    ("look", &["within_s"]),
+    ("get", &["name", "within_s"]),
+    ("set", &["name", "value", "force", "wait", "within_s"]),
     ("undo", &["configuration", "to", "force", "wait", "within_s"]),
     ("drift", &["within_s"]),
     ("recover", &["direction", "within_s"]),
@@ -52,8 +57,13 @@ impl SessionService {
     }
 }
 
-fn within(params: &Json) -> Result<Duration, RpcError> {
-    let seconds: f64 = optional(params, "within_s")?.unwrap_or(10.0);
+/// How long an answer is waited for, in seconds, and what goes through a port.
+const WITHIN: f64 = 10.0;
+const GET_WITHIN: f64 = 2.0;
+const LOOK_WITHIN: f64 = 0.3;
+
+fn within(params: &Json, usual: f64) -> Result<Duration, RpcError> {
+    let seconds: f64 = optional(params, "within_s")?.unwrap_or(usual);
     if seconds.is_finite() && (0.0..=1e6).contains(&seconds) {
         Ok(Duration::from_secs_f64(seconds))
     } else {
@@ -114,7 +124,11 @@ impl Service for SessionService {
             "event" => event(&session, params, gone),
             "apply" => {
                 let name: String = param(params, "configuration")?;
-                request(&session, line, Ask::Apply(configuration(&session, &name)?), params, gone)
+                let id = configuration(&session, &name)?;
+                if session.setting(&name).is_some() {
+                    return Err(refused(format!("`{name}` is no configuration"), format!("`davit set {name} VALUE`")));
+                }
+                request(&session, line, Ask::Apply(id), params, gone)
             }
             "undo" => {
                 let ask = match (optional::<String>(params, "configuration")?, optional::<usize>(params, "to")?) {
@@ -126,6 +140,17 @@ impl Service for SessionService {
                     (None, None) => Ask::Undo,
                 };
                 request(&session, line, ask, params, gone)
+            }
+            "look" => Ok(view(&session.look(within(params, LOOK_WITHIN)?))),
+            "get" => {
+                let within = within(params, GET_WITHIN)?;
+                session.get(&param::<String>(params, "name")?, within).map(|seen| view(&seen)).map_err(no_member)
+            }
+            "set" => {
+                let (name, value): (String, Json) = (param(params, "name")?, param(params, "value")?);
+                within(params, WITHIN)?;
+                let request = session.set(line, &name, &value, forced(params)?).map_err(no_member)?;
+                answer_to(&session, request, &name, params, gone)
             }
             "drift" => drift(&session, params),
             "recover" => recover(&session, params),
@@ -154,9 +179,9 @@ impl Service for SessionService {
 fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Result<(), RpcError> {
     let what = match method {
         _ if !session.hub().is_stopping() => return Ok(()),
-        "apply" | "undo" | "commit" => format!("`{method}`"),
+        "apply" | "set" | "undo" | "commit" => format!("`{method}`"),
         "event" => match params.get("event").and_then(Json::as_str) {
-            Some(event) if session.stays_open(event) => return Ok(()),
+            Some(event) if session.deployment().stays_open(event) => return Ok(()),
             Some(event) => format!("`{event}`"),
             None => return Ok(()),
         },
@@ -173,9 +198,14 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
     })
 }
 
+fn no_member(why: NoMember) -> RpcError {
+    refused(why.message, why.help)
+}
+
+/// One of the deployment, or what an operator has set.
 fn configuration(session: &Session, name: &str) -> Result<ConfigId, RpcError> {
     let known = session.configurations();
-    known.iter().find(|id| id.as_str() == name).copied().ok_or_else(|| {
+    known.iter().find(|id| id.as_str() == name).copied().or_else(|| session.setting(name)).ok_or_else(|| {
         refused(
             format!("there is no configuration `{name}`"),
             did_you_mean(name, "configurations", known.iter().map(ConfigId::as_str)),
@@ -187,7 +217,7 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
     let name: String = param(params, "event")?;
     let wait_for: Option<String> = optional(params, "wait_for")?;
     let waits: bool = optional(params, "wait")?.unwrap_or(false);
-    let within = within(params)?;
+    let within = within(params, WITHIN)?;
     let known = session.events();
     let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
     let mut answer = json!({ "accepted": true });
@@ -207,7 +237,16 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
         let heard = wait(session, within, gone, || late, |hub| hub.first_heard(&ends, since))?;
         answer["heard"] = json!(heard);
     } else if waits {
-        let ticket = session.offer_watched(event, "operator").map_err(no_room)?;
+        let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(no_room)?;
+        if let Some(requests) = acted {
+            session.hub().forget(ticket);
+            let all = |hub: &Hub| requests.iter().map(|request| hub.answer(*request)).collect::<Option<Vec<_>>>();
+            let late = || format!("what `{name}` does by itself was not over in time");
+            let answers: Vec<Answered> = wait(session, within, gone, late, all)?;
+            answer["taken"] = json!(true);
+            answer["acted"] = json!(answers.iter().map(|answered| &answered.answer).collect::<Vec<_>>());
+            return Ok(answer);
+        }
         let late = || format!("`{name}` was not taken up in time; it may be yet");
         let taken = wait(session, within, gone, late, |hub| hub.was_heard(ticket));
         session.hub().forget(ticket);
@@ -224,7 +263,7 @@ fn no_room(why: Refused) -> RpcError {
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {
-    match session.drift(within(params)?) {
+    match session.drift(within(params, WITHIN)?) {
         Some(differences) => Ok(view(&differences)),
         None => Err(RpcError {
             code: TIMED_OUT,
@@ -243,7 +282,7 @@ fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
             RpcError::new(INVALID_PARAMS, "`direction` is `back` or `accept`")
         });
     };
-    let recovered = session.recover(how, "operator", within(params)?);
+    let recovered = session.recover(how, "operator", within(params, WITHIN)?);
     recovered.map(|recovered| view(&recovered)).ok_or_else(|| {
         let message = "the recovery was not over in time; it goes on".to_owned();
         RpcError {
@@ -259,13 +298,25 @@ fn forced(params: &Json) -> Result<bool, RpcError> {
 }
 
 fn request(session: &Session, line: u32, ask: Ask, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
-    let waits: bool = optional(params, "wait")?.unwrap_or(false);
-    let within = within(params)?;
+    within(params, WITHIN)?;
     let request = session.request_on(line, ask, "operator", forced(params)?);
+    answer_to(session, request, &ask.to_string(), params, gone)
+}
+
+/// The answer to a request, if it is waited for.
+fn answer_to(
+    session: &Session,
+    request: RequestId,
+    what: &str,
+    params: &Json,
+    gone: Gone<'_>,
+) -> Result<Json, RpcError> {
+    let waits: bool = optional(params, "wait")?.unwrap_or(false);
+    let within = within(params, WITHIN)?;
     if !waits {
         return Ok(json!({ "request": request }));
     }
-    let late = || format!("`{ask}` was not answered in time");
+    let late = || format!("`{what}` was not answered in time");
     let answer: Answered = wait(session, within, gone, late, |hub| hub.answer(request))?;
     Ok(view(&answer))
 }

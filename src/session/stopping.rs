@@ -1,14 +1,17 @@
 //! Stopping, stage by stage (design §6): what [`stages`](super::stages) decides is carried out.
 
-use super::life::Ended;
+use super::halt::StandsStill;
+use super::life::{Ended, survived};
 use super::log::{Happening, Phase};
 use super::stages::{Came, Next, Stage, first, next};
 use super::{Command, Session};
-use crate::configurator::TakenDown;
+use crate::configurator::{FrameView, TakenDown};
 use crate::limits;
-use crate::model::{ConfigId, Step};
+use crate::model::{ConfigId, EventName, Origin, Step};
+use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// What stopping has come to so far.
 struct Told {
@@ -18,8 +21,6 @@ struct Told {
     notes: Vec<String>,
     /// It is one that did not come up.
     coming_up: bool,
-    /// When stopping began.
-    began: Time,
 }
 
 impl Session {
@@ -28,15 +29,6 @@ impl Session {
     /// force, unless the session is [unattended](Self::unattended).
     pub fn take_down(&self, force: bool) -> Ended {
         self.stop(force, false)
-    }
-
-    /// Whether an event from outside is heard also while it is being stopped: those of safety, and the one that shuts down.
-    /// Where nobody has said which are those of safety, it may be any.
-    pub fn stays_open(&self, event: &str) -> bool {
-        let deployment = self.deployment();
-        deployment.safety.is_empty()
-            || deployment.shutdown.event.as_str() == event
-            || deployment.safety.iter().any(|(safety, _)| safety.as_str() == event)
     }
 
     /// Nobody is there who could ask for force: nothing waits for that.
@@ -49,8 +41,8 @@ impl Session {
         let hub = self.hub();
         hub.halt().begin();
         self.configurator().stopping();
-        hub.set_phase(Phase::ShuttingDown);
-        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up, began: self.clock().now() };
+        let _ = survived(|| hub.set_phase(Phase::ShuttingDown));
+        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up };
         let mut stage = first(force, self.leads());
         let mut why = match stage {
             Stage::Led => None,
@@ -58,12 +50,21 @@ impl Session {
             Stage::Forced => Some("as asked for".to_owned()),
         };
         loop {
-            self.begin_stage(stage, why.take(), &mut told);
-            let (came, held) = match stage {
-                Stage::Led => (self.lead_down(&told), false),
-                Stage::TakenBack => self.take_all_back(&mut told),
-                Stage::Forced => self.force_all(&mut told),
-            };
+            // What panics in one of them is a defect of ours, and leaves it to the next.
+            let began = survived(|| self.begin_stage(stage, why.take(), &mut told));
+            let (came, held) = began
+                .and_then(|()| {
+                    survived(|| match stage {
+                        Stage::Led => (self.lead_down(&told), false),
+                        Stage::TakenBack => self.take_all_back(&mut told),
+                        Stage::Forced => self.force_all(&mut told),
+                    })
+                })
+                .unwrap_or_else(|panic| {
+                    let why = format!("davit itself has panicked: {panic}");
+                    told.notes.push(why.clone());
+                    (Came::Left(why), false)
+                });
             let came_to = next(stage, &came, held && self.attended.load(Ordering::Relaxed));
             why = match came {
                 Came::Left(why) => Some(why),
@@ -100,11 +101,14 @@ impl Session {
             self.detach_coordinator();
         }
         hub.halt().stage(stage);
-        hub.note(Happening::Stopping { stage, why });
+        // Who only hears of it must not keep it from being done.
+        if let Err(panic) = survived(|| hub.note(Happening::Stopping { stage, why })) {
+            told.notes.push(format!("who hears of it has panicked: {panic}"));
+        }
     }
 
     /// Whether every coordinator is there.
-    fn leads(&self) -> bool {
+    pub(super) fn leads(&self) -> bool {
         self.parts().iter().all(|part| !part.coordinator.is_detached())
     }
 
@@ -124,15 +128,17 @@ impl Session {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
         let goal = self.deployment().down_states();
-        let mut deadline = self.clock().now() + take_down.within;
+        let (mut deadline, mut said) = (self.clock().now() + take_down.within, false);
         let ticket = self.offer_watched(take_down.event, "deployment");
         if let Err(refused) = &ticket {
             hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
         }
+        let ticket = ticket.map(|offered| offered.ticket);
         let unheard = || ticket.is_ok_and(|ticket| hub.was_heard(ticket) == Some(false));
         let came = loop {
             if self.is_down() {
-                break match self.is_empty() {
+                // As the platform shows it: it may have said that something is gone.
+                break match self.left_over().is_empty() {
                     true => Came::Empty,
                     false => Came::Left(format!("`{goal}` was reached with components left")),
                 };
@@ -149,8 +155,11 @@ impl Session {
             let now = self.clock().now();
             if now >= deadline {
                 // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when.
-                if !self.waits_for_people(told.began) {
+                let Some(still) = self.stands_still() else {
                     break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
+                };
+                if !std::mem::replace(&mut said, true) {
+                    hub.note(Happening::Forced { note: still.to_string() });
                 }
                 deadline = now + take_down.within;
             }
@@ -199,14 +208,19 @@ impl Session {
 
     /// The third stage.
     fn force_all(&self, told: &mut Told) -> (Came, bool) {
-        let deadline = self.clock().now() + self.deployment().shutdown.within;
+        // What brings it to rest takes nothing of the time in which everything is removed.
+        let rest = |(id, _): &(ConfigId, Origin)| self.deployment().configuration(*id).and_then(|c| c.timeout);
+        let step = self.deployment().limits.step_timeout;
+        let rest: Duration = self.deployment().shutdown.rest.iter().map(|of| rest(of).unwrap_or(step).max(step)).sum();
+        let within = self.deployment().shutdown.within + rest;
+        let deadline = self.clock().now() + within;
         let Some(mut down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             told.notes.push("the configurator did not answer".to_owned());
             return (Came::Left("the configurator did not answer".to_owned()), false);
         };
         // Nobody is there who could ask once more.
         if down.still && !self.attended.load(Ordering::Relaxed) {
-            let deadline = self.clock().now() + self.deployment().shutdown.within;
+            let deadline = self.clock().now() + within;
             down = self.stage_of(self.configurator().force_down(deadline), deadline).unwrap_or(down);
         }
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
@@ -240,11 +254,42 @@ impl Session {
 
     /// Whether a safe configuration is in force that came since then, and somebody is there to decide how to go on.
     pub(super) fn waits_for_people(&self, began: Time) -> bool {
-        if !self.attended.load(Ordering::Relaxed) {
-            return false;
-        }
-        let safe = |id: ConfigId| self.deployment().configurations.iter().any(|c| c.id == id && c.safe);
-        self.frames().iter().any(|frame| frame.at >= began && safe(frame.configuration))
+        let attended = self.attended.load(Ordering::Relaxed);
+        attended && self.frames().iter().any(|frame| frame.at >= began && self.is_safe(frame.configuration))
+    }
+
+    /// The first stage stands still where a safe configuration is in force that was asked for since stopping began, and somebody
+    /// is there to decide how to go on.
+    pub(super) fn stands_still(&self) -> Option<StandsStill> {
+        let frames = if self.attended.load(Ordering::Relaxed) { self.frames() } else { Vec::new() };
+        let holds = |frame: &&FrameView| frame.since_stopping && self.is_safe(frame.configuration);
+        let frame = frames.iter().find(holds).filter(|_| self.hub().halt().is_led())?;
+        let force = "`davit shutdown --force` takes everything away by force";
+        let shutdown = self.deployment().shutdown.event;
+        let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| self.hears(*event));
+        let leads_on = match (self.hears(shutdown), safety) {
+            (true, _) => {
+                format!("`davit shutdown` raises `{shutdown}` once more, which its coordinator hears there; {force}")
+            }
+            (false, Some(event)) => format!("its coordinator hears `davit event {event}` there; {force}"),
+            (false, None) => format!("its coordinator hears nothing there that is open now; {force}"),
+        };
+        Some(StandsStill { safe: frame.configuration.to_string(), since: frame.at.as_secs_f64(), leads_on })
+    }
+
+    fn is_safe(&self, id: ConfigId) -> bool {
+        self.deployment().configurations.iter().any(|c| c.id == id && c.safe)
+    }
+
+    /// Whether a coordinator hears an event where it is.
+    fn hears(&self, event: EventName) -> bool {
+        self.parts().iter().any(|part| {
+            let (chart, leaf) = (part.coordinator.chart(), part.coordinator.leaf());
+            let number = chart.event(event);
+            let mut inside = std::iter::successors(leaf, |node| chart.parent(*node));
+            let hears = |node: NodeId| chart.outgoing(node).any(|edge| chart.may_trigger(edge, number));
+            number != EventId::OTHER && inside.any(hears)
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! A session's parts and how they are joined.
 
 use super::Command;
+use super::halt::StoppingView;
 use super::hub::Hub;
 use super::life::{Ended, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
@@ -52,6 +53,8 @@ pub struct Session {
     configurator: ConfiguratorHandle,
     junction: Arc<Junction>,
     evaluator: Option<Arc<Evaluator>>,
+    /// What operators have set, as a configuration each.
+    settings: Mutex<BTreeSet<ConfigId>>,
     commands: Mutex<Vec<Command>>,
     /// Somebody is there who may ask for force.
     pub(super) attended: AtomicBool,
@@ -106,6 +109,7 @@ impl Session {
             configurator,
             junction,
             evaluator,
+            settings: Mutex::default(),
             commands: Mutex::new(Vec::new()),
             attended: AtomicBool::new(true),
             ended: Mutex::new(None),
@@ -125,6 +129,10 @@ impl Session {
     /// Where its components live.
     pub fn platform(&self) -> &Arc<dyn Platform> {
         &self.platform
+    }
+
+    pub(super) fn settings(&self) -> &Mutex<BTreeSet<ConfigId>> {
+        &self.settings
     }
 
     pub(super) fn configurator(&self) -> &ConfiguratorHandle {
@@ -287,7 +295,11 @@ impl Session {
             residual,
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
-            stopping: self.hub.halt().view(self.hub.outstanding()),
+            stopping: self
+                .hub
+                .halt()
+                .view(self.hub.outstanding())
+                .map(|view| StoppingView { stands_still: self.stands_still(), ..view }),
             slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
@@ -369,11 +381,6 @@ impl Session {
     /// Why requests failed since the deployment began to come up, one line each.
     pub(super) fn failures_since(&self, heard: u64) -> Vec<String> {
         self.hub.failures_since(heard)
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.view(true)
-            .is_some_and(|view| view.system.as_ref().is_some_and(|s| s.is_empty()) && view.quarantined.is_empty())
     }
 
     pub(super) fn detach_coordinator(&self) {

@@ -97,6 +97,8 @@ pub enum Reason {
     Panic(String),
     /// No frame to undo.
     NothingToUndo,
+    /// It was undone, and these frames of operators with it, which stood in its way.
+    TookAlong(Vec<ConfigId>),
     /// Everything is being taken down.
     TakenDown,
     /// The configurator has ended.
@@ -245,6 +247,7 @@ impl Reason {
             Self::NothingToUndo => {
                 Finding::error(codes::NOTHING_TO_UNDO, self.to_string()).help("`davit stack` shows the frames in force")
             }
+            Self::TookAlong(_) => Finding::info(codes::STACK_TAKEN_ALONG, self.to_string()),
             Self::TakenDown | Self::Ended => {
                 Finding::error(codes::ENDED, self.to_string()).help("deploy again before asking for configurations")
             }
@@ -293,6 +296,10 @@ impl fmt::Display for Reason {
             }
             Self::Panic(text) => write!(f, "the configurator itself failed: {text}"),
             Self::NothingToUndo => f.write_str("there is no frame to undo"),
+            Self::TookAlong(ids) => {
+                let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();
+                write!(f, "{} of an operator was undone with it, since it stood in its way", ids.join(", "))
+            }
             Self::TakenDown => f.write_str("the system is being taken down"),
             Self::Ended => f.write_str("the configurator has ended"),
         }

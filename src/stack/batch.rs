@@ -5,11 +5,12 @@
 //! fails, those before it stand, and those behind it are taken up anew. A request that is refused by itself is answered and
 //! left out, and the rest is planned anew.
 
+use super::leave::along;
 use super::work::{Op, Planned, Room, Work};
 use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
-use crate::plan::{Context, PlannedStep};
+use crate::plan::{Context, PlannedStep, Refusal};
 use crate::system::Overlay;
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -37,6 +38,8 @@ pub struct Rules<'a> {
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
     pub placed: bool,
+    /// It has begun alone, while everything is led down: what operators have put in the way of its undos goes with these.
+    pub alone: bool,
 }
 
 /// A request of a batch that is answered.
@@ -119,7 +122,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                         group.visits.push(visit);
                         return with_plan(world, requests, group, planned, rules);
                     }
-                    if let Err(refusal) = work.add(&op, context) {
+                    if let Err(refusal) = add(world, &mut work, request, &op, (rules, context), repairs.is_some()) {
                         refused.push(no(place, request, Reason::Refused(refusal.findings)));
                         continue 'anew;
                     }
@@ -147,6 +150,24 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             }
         }
         return told(world, requests, group);
+    }
+}
+
+/// Adds what a request comes to, with what it takes along.
+fn add(
+    world: &World,
+    work: &mut Work<'_, '_, '_>,
+    request: &Request,
+    op: &Op<'_>,
+    (rules, context): (&Rules<'_>, &Context),
+    repaired: bool,
+) -> Result<(), Refusal> {
+    match op {
+        Op::Undo(id) if rules.alone => {
+            let with = along(world, &work.frames, request, *id, repaired).map_err(|found| Refusal::one(*found))?;
+            work.add_undo(*id, &with)
+        }
+        op => work.add(op, context),
     }
 }
 

@@ -52,7 +52,8 @@ impl Claim {
 #[derive(Debug, Clone, Default)]
 pub struct Claims {
     of: FxHashMap<ConfigId, Claim>,
-    components: Vec<ComponentName>,
+    /// The components with their numbers.
+    numbers: FxHashMap<ComponentName, usize>,
 }
 
 impl Claims {
@@ -91,12 +92,22 @@ impl Claims {
                 claim.join(&groups[&group]);
             }
         }
-        Self { of, components: numbers.into_keys().collect() }
+        Self { of, numbers }
+    }
+
+    /// Adds one that names components only, and belongs to no group; in the place of one of that name.
+    pub fn add(&mut self, configuration: &Configuration) {
+        let mut claim = Claim::default();
+        for_each_named(configuration, &mut |component| {
+            let next = self.numbers.len();
+            claim.set(*self.numbers.entry(component).or_insert(next));
+        });
+        self.of.insert(configuration.id, claim);
     }
 
     /// Every component that a configuration names.
     pub fn components(&self) -> impl Iterator<Item = ComponentName> + '_ {
-        self.components.iter().copied()
+        self.numbers.keys().copied()
     }
 
     /// What requests claim together. A configuration that is not there claims nothing.

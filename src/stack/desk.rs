@@ -4,7 +4,7 @@
 //! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no circle of waits can
 //! arise, and none starves.
 
-use super::claims::Claims;
+use super::claims::{Claim, Claims};
 use super::request::{Batch, Request, Requester, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
@@ -20,6 +20,10 @@ pub struct Turn {
     pub batch: Batch,
     /// Undos that have given up requests of it, in the order in which they came.
     pub given_up: Vec<GivenUp>,
+    /// It has everything until it is over: what its undos take along is not known from its text ([`Stack::goes_alone`]).
+    ///
+    /// [`Stack::goes_alone`]: super::Stack::goes_alone
+    pub alone: bool,
 }
 
 /// An undo that has given up a request of a batch under way.
@@ -156,25 +160,29 @@ impl Desk {
         gone
     }
 
-    /// The next batch that may begin; it is under way from now on.
-    pub fn turn(&mut self, claims: &Claims) -> Option<&Turn> {
+    /// The next batch that may begin; it is under way from now on. `alone` says which would begin alone.
+    pub fn turn(&mut self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<&Turn> {
         let at = if self.under_way.is_empty() {
             // Whatever else waits came later.
             (!self.waiting.is_empty()).then_some(0)
         } else {
-            self.free(claims)
+            self.free(claims, &alone)
         }?;
         let batch = self.waiting.remove(at)?;
         let number = (0..).find(|n| self.under_way.iter().all(|turn| turn.number != *n))?;
-        self.under_way.push(Turn { number, batch, given_up: Vec::new() });
+        let alone = alone(&batch);
+        self.under_way.push(Turn { number, batch, given_up: Vec::new(), alone });
         self.under_way.last()
     }
 
-    fn free(&self, claims: &Claims) -> Option<usize> {
+    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<usize> {
         let mut held = claims.of(self.under_way.iter().flat_map(|turn| &turn.batch.requests));
+        if self.under_way.iter().any(|turn| turn.alone) {
+            held.join(&Claim::all());
+        }
         let mut asking: Vec<Line> = self.under_way.iter().filter_map(|turn| line(&turn.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
-            let claim = claims.of(&batch.requests);
+            let claim = if alone(batch) { Claim::all() } else { claims.of(&batch.requests) };
             if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) {
                 return Some(at);
             }

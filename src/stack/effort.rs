@@ -117,6 +117,7 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
         holds: configuration.holds.is_some(),
         on_failure: configuration.on_failure,
         frame: Some(Arc::new(frame.clone())),
+        along: Vec::new(),
     };
     let revision = system.revision();
     let parts = vec![part];

@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -14,6 +14,7 @@ mod batch;
 pub mod claims;
 mod desk;
 mod effort;
+mod leave;
 mod mend;
 mod net;
 mod permanent;
@@ -37,7 +38,7 @@ pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, components, is_kept, shares};
-pub use work::{Op, Part, Planned, places, transaction};
+pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, Seen, World};
 
 use crate::model::{ComponentName, ConfigId, Finding, Ident, RunState, Step, codes};

@@ -11,6 +11,8 @@ pub enum Requester {
     Coordinator(ComponentName),
     /// Somebody at a terminal or behind the control socket. All of them are one requester.
     Operator,
+    /// A safety event that acts by itself, since no coordinator leads any more.
+    Safety,
 }
 
 impl fmt::Display for Requester {
@@ -18,6 +20,7 @@ impl fmt::Display for Requester {
         match self {
             Self::Coordinator(name) => write!(f, "{name}"),
             Self::Operator => f.write_str(OPERATOR),
+            Self::Safety => f.write_str("a safety event"),
         }
     }
 }

@@ -45,6 +45,19 @@ fn meet(mine: &FxHashSet<ComponentName>, theirs: &Footprint) -> bool {
 
 /// Whether the frame at `at` may be popped.
 pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Finding>> {
+    look(frames, at).map_err(|hindrance| Box::new(hindrance.finding))
+}
+
+/// What keeps a frame from being popped.
+pub(super) struct Hindrance {
+    /// The frame above that shares something with it, the newest of them; none: it is a floor, or one above holds it back.
+    pub by: Option<FrameId>,
+    /// In words.
+    pub finding: Finding,
+}
+
+/// The same, and which frame it is that stands in its way.
+pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hindrance>> {
     let frame = &frames[at];
     if frames[at..].iter().any(|above| above.floor.is_some()) {
         let mine = components(&frame.footprint);
@@ -56,7 +69,7 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
                 let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
                 let finding = Finding::error(codes::STACK_FLOOR, message)
                     .help("apply a configuration that leads to the wanted state instead");
-                return Err(Box::new(finding));
+                return Err(Box::new(Hindrance { by: None, finding }));
             }
         }
     }
@@ -91,7 +104,7 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
             let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
             let finding = Finding::error(codes::STACK_SHARED, message)
                 .help(format!("undo `{theirs}` first, or undo down to `{mine}`"));
-            return Err(Box::new(finding));
+            return Err(Box::new(Hindrance { by: Some(other.id), finding }));
         }
     }
     Ok(hand)

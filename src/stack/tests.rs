@@ -368,6 +368,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
         placed: false,
+        alone: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -401,6 +402,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
         placed: false,
+        alone: false,
     };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -427,7 +429,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     let under_way = || {
         let mut desk = super::Desk::default();
         let _ = desk.arrive((0..3).map(apply).collect(), |_| false, &claims);
-        let number = desk.turn(&claims).expect("nothing is in its way").number;
+        let number = desk.turn(&claims, |_| false).expect("nothing is in its way").number;
         assert_eq!([1, 2, 1].map(|n| desk.give_up(number, undo(n))), [Some(1), Some(2), Some(1)]);
         (desk, number)
     };

@@ -49,6 +49,24 @@ pub struct Part {
     pub on_failure: OnFailure,
     /// Its frame as it will be, without a number: what is pushed, or what is being popped.
     pub frame: Option<Arc<Frame>>,
+    /// What is undone with it, since it stands in its way ([`along`](super::leave::along)): first, and in that order.
+    pub along: Vec<Along>,
+}
+
+/// A frame that is undone with another one, both or none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Along {
+    /// The steps that undo it in [`Planned::whole`].
+    pub range: Range<u32>,
+    /// As it is.
+    pub frame: Arc<Frame>,
+}
+
+impl Part {
+    /// The steps without those of what is undone with it.
+    pub fn own(&self) -> Range<u32> {
+        self.along.last().map_or(self.range.start, |along| along.range.end)..self.range.end
+    }
 }
 
 /// Steps, and how the stack changes when they are done. Take it over with [`Stack::commit`]; dropped, nothing happened.
@@ -187,16 +205,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                 self.push(configuration, *requester, *at, *scope, context, &mut edits)?;
                 frame.clone_from(&edits.push);
             }
-            Op::Undo(id) => match self.frames.iter().position(|f| f.id == *id) {
-                Some(at) => {
-                    frame = Some(self.frames[at].clone());
-                    self.pop(at, &mut edits)?;
-                }
-                None => {
-                    let finding = Finding::error(codes::STACK_NO_FRAME, format!("there is no frame {}", id.0));
-                    return Err(Refusal::one(finding.help("`davit stack` shows the frames")));
-                }
-            },
+            Op::Undo(id) => frame = Some(self.undo(*id, &mut edits)?),
             Op::UndoTop => match self.frames.len().checked_sub(1) {
                 Some(top) => {
                     frame = Some(self.frames[top].clone());
@@ -216,8 +225,41 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                 }
             }
         }
-        self.parts.push(Part { range: from..self.place(), edits, pushes, holds, on_failure, frame });
+        let range = from..self.place();
+        self.parts.push(Part { range, edits, pushes, holds, on_failure, frame, along: Vec::new() });
         Ok(())
+    }
+
+    /// Adds the undo of a frame with those of others that stand in its way, which come first: one part of the whole.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub(super) fn add_undo(&mut self, id: FrameId, with: &[FrameId]) -> Result<(), Refusal> {
+        if let Some(lone) = self.lone.take() {
+            self.script.append(lone.iter().cloned());
+        }
+        let from = self.place();
+        let (mut edits, mut along) = (Edits::default(), Vec::with_capacity(with.len()));
+        for other in with {
+            let first = self.place();
+            let frame = self.undo(*other, &mut edits)?;
+            along.push(Along { range: first..self.place(), frame });
+        }
+        let frame = Some(self.undo(id, &mut edits)?);
+        let (range, on_failure) = (from..self.place(), OnFailure::default());
+        self.parts.push(Part { range, edits, pushes: None, holds: false, on_failure, frame, along });
+        Ok(())
+    }
+
+    /// Pops a frame, and answers it as it was.
+    fn undo(&mut self, id: FrameId, edits: &mut Edits) -> Result<Arc<Frame>, Refusal> {
+        let Some(at) = self.frames.iter().position(|f| f.id == id) else {
+            let finding = Finding::error(codes::STACK_NO_FRAME, format!("there is no frame {}", id.0));
+            return Err(Refusal::one(finding.help("`davit stack` shows the frames")));
+        };
+        let frame = self.frames[at].clone();
+        self.pop(at, edits)?;
+        Ok(frame)
     }
 
     fn pop(&mut self, at: usize, edits: &mut Edits) -> Result<(), Refusal> {

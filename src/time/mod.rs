@@ -7,6 +7,7 @@
 //! * [`clock`]: the handle.
 //! * [`channel`]: bounded queues between participants. [`signal`]: one thread waits, anybody notifies.
 //! * [`simulated`]: the scheduler that hands one token round.
+//! * [`wall`]: the calendar's time, for what is written down for people. Nothing is decided by it.
 
 // The one room that may ask the operating system for the time; everybody else asks the clock.
 #![allow(clippy::disallowed_methods)]
@@ -17,10 +18,12 @@ pub mod signal;
 pub mod simulated;
 #[cfg(test)]
 mod tests;
+pub mod wall;
 
 pub use channel::{Receiver, RecvError, SendError, Sender, TryRecvError, TrySendError};
 pub use clock::{Clock, Guard, Join, JoinError, Released};
 pub use signal::Signal;
+pub use wall::Wall;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;

@@ -5,9 +5,10 @@ use super::{Can, Phase, Transaction};
 use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
-use crate::stack::{Ending, FrameId, Inverse, Reason, Residual};
+use crate::stack::{Edits, Ending, Frame, FrameId, Inverse, Part, Reason, Residual};
 use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// What came of a transaction.
@@ -61,11 +62,15 @@ pub struct BrokenPart {
     /// What is left, in words and steps.
     pub residual: Arc<Residual>,
     /// The partial frame: what takes back what was done.
-    pub frame: Option<crate::stack::Frame>,
+    pub frame: Option<Frame>,
     /// The frame that it takes the place of, where that was being undone.
     pub instead: Option<FrameId>,
     /// The components of which not all is known, as the model has them.
     pub expected: Snapshot,
+    /// What was to be undone with it: frames that are gone all the same, and what is left of others.
+    pub gone: Edits,
+    /// Each in the place of that of its number.
+    pub also: Vec<Frame>,
 }
 
 impl Transaction {
@@ -384,52 +389,77 @@ impl Transaction {
     /// nothing to add to that.
     fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, live: &System) -> PartEnd {
         let planned = &self.planned.parts[part];
-        let forward = self.forward.as_ref().expect("it was carried out");
         let undone = planned.pushes.is_none();
         let items: Vec<Item> = if whole && !undone {
             Vec::new()
         } else if undone {
-            // What is still to be undone of the frame; so is what safe configurations have done again, for whom it never was, and
-            // a call that was given up: taking back half of it is not taking it back.
-            let theirs = |i: &u32| self.interrupted && self.touched.has(&forward.list[*i as usize].step);
-            let done: FxHashSet<u32> = (forward.done.iter())
-                .filter(|i| !self.taken_back.contains(*i) && !theirs(i) && !self.told.contains(i))
-                .filter_map(|i| self.planned.place(*i as usize))
-                .collect();
-            let open = planned.range.clone().filter(|place| !done.contains(place) && !self.finished.contains(place));
-            open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
+            self.items_open(planned.own())
         } else {
             self.items_left(part, live)
         };
         // A safe configuration that is being undone demands nothing any more of what is back, and perhaps broken.
         let demands = !(undone && planned.frame.as_ref().is_some_and(|frame| frame.safe));
-        let left = residual.components().filter(|_| demands);
-        let components: FxHashSet<ComponentName> =
-            items.iter().flat_map(|item| touch::components(&item.step)).chain(left).collect();
-        let slots: FxHashSet<_> = items.iter().filter_map(|item| touch::absolute(&item.step)).collect();
+        let left: FxHashSet<ComponentName> = residual.components().filter(|_| demands).collect();
         let irreversible = residual.irreversible.first().cloned();
-        let frame = planned.frame.as_deref().map(|frame| {
-            let about = |component: &ComponentName| components.contains(component);
-            let touches = (frame.footprint.touches.iter())
-                .filter(|touch| {
-                    let (a, b) = touch.slot.components();
-                    about(&a) || about(&b)
-                })
-                .copied()
-                .collect();
-            crate::stack::Frame {
-                inverse: Inverse::List(items),
-                footprint: Arc::new(Footprint { touches }),
-                saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
-                floor: irreversible.map(|step| format!("`{step}` cannot be undone")),
-                partial: true,
-                ..frame.clone()
-            }
-        });
+        let floor = irreversible.map(|step| format!("`{step}` cannot be undone"));
+        let frame = planned.frame.as_deref().map(|frame| partial(frame, items, &left, floor));
         let instead = if undone { frame.as_ref().map(|frame| frame.id) } else { None };
         let residual = Arc::new(residual);
         // Of a frame that was being undone nothing is: it stays as it is.
         let frame = frame.filter(|_| !(whole && undone));
-        PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected }))
+        let (gone, also) = if whole { (Edits::default(), Vec::new()) } else { self.of_along(planned) };
+        PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected, gone, also }))
+    }
+
+    /// What is still to be undone of a frame; so is what safe configurations have done again, for whom it never was, and a
+    /// call that was given up: taking back half of it is not taking it back.
+    fn items_open(&self, own: Range<u32>) -> Vec<Item> {
+        let forward = self.forward.as_ref().expect("it was carried out");
+        let theirs = |i: &u32| self.interrupted && self.touched.has(&forward.list[*i as usize].step);
+        let done: FxHashSet<u32> = (forward.done.iter())
+            .filter(|i| !self.taken_back.contains(*i) && !theirs(i) && !self.told.contains(i))
+            .filter_map(|i| self.planned.place(*i as usize))
+            .collect();
+        let open = own.filter(|place| !done.contains(place) && !self.finished.contains(place));
+        open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
+    }
+
+    /// What was to be undone with a part that is neither done nor taken back: what is gone all the same, and what is left of
+    /// the others. Of what was not begun, or is back, nothing is told.
+    fn of_along(&self, part: &Part) -> (Edits, Vec<Frame>) {
+        let (mut gone, mut also) = (Edits::default(), Vec::new());
+        for along in &part.along {
+            let items = self.items_open(along.range.clone());
+            if items.is_empty() {
+                gone.pops.extend(part.edits.pops.iter().find(|(id, _)| *id == along.frame.id).cloned());
+            } else if items.len() < along.range.len() {
+                also.push(partial(&along.frame, items, &FxHashSet::default(), None));
+            }
+        }
+        (gone, also)
+    }
+}
+
+/// A frame of which only `items` are left to be undone; it is about these, and about `also`.
+fn partial(frame: &Frame, items: Vec<Item>, also: &FxHashSet<ComponentName>, floor: Option<String>) -> Frame {
+    let mut components: FxHashSet<ComponentName> =
+        items.iter().flat_map(|item| touch::components(&item.step)).collect();
+    components.extend(also);
+    let slots: FxHashSet<_> = items.iter().filter_map(|item| touch::absolute(&item.step)).collect();
+    let about = |component: &ComponentName| components.contains(component);
+    let touches = (frame.footprint.touches.iter())
+        .filter(|touch| {
+            let (a, b) = touch.slot.components();
+            about(&a) || about(&b)
+        })
+        .copied()
+        .collect();
+    Frame {
+        inverse: Inverse::List(items),
+        footprint: Arc::new(Footprint { touches }),
+        saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
+        floor,
+        partial: true,
+        ..frame.clone()
     }
 }

@@ -5,6 +5,7 @@ use super::Transaction;
 use super::run::Run;
 use super::touched::Touched;
 use crate::model::{ComponentName, RunState, Step, Transition, Wanted};
+use crate::plan::PlannedStep;
 use crate::system::touch::{Slot, components, slot};
 use crate::system::{View, step};
 use rustc_hash::FxHashSet;
@@ -22,6 +23,12 @@ impl Transaction {
         let forward = self.forward.as_ref().expect("something was carried out");
         let failed = forward.failures.iter().map(|(i, _)| i).chain(&forward.unsettled);
         failed.map(|i| &forward.list[*i as usize].step)
+    }
+
+    /// The steps of a best effort that were not done, for all that is known.
+    pub fn failed_steps(&self) -> impl Iterator<Item = &PlannedStep> {
+        let forward = self.forward.as_ref().expect("something was carried out");
+        forward.failures.iter().map(|(i, _)| &forward.list[*i as usize])
     }
 
     /// The steps of a best effort that are not over.

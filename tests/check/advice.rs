@@ -145,16 +145,36 @@ fn a_bare_undo_is_answered_too() {
 /// What an operator's frame has done is no mistake of the coordinator, whether the frame or what it did stands in the way.
 #[test]
 fn what_an_operators_frame_has_changed_is_the_operators_doing() {
-    let running = CONFIGURATIONS.replace("\"Drive\") },", "\"Drive\"), post_conf_state = { \"a:running\" } },");
+    let running = CONFIGURATIONS.replace("\"Drive\") },", "\"Drive\"), post_conf_state = { \"a:running\" } },")
+        + " heave = Configuration { operation_call(\"a.raise\") },";
     let check = |keys: &str| Small::new(&running, STATES, keys).check();
     let alone = check("");
     assert_eq!(alone.0["verdict"], "sound", "{:#}", alone.0);
-    for applied in ["soft", "halt"] {
-        let said = check(&format!("operator: [{applied}]\n"));
-        let found = said.of("coord::refused_by_other");
-        assert!(found.iter().any(|f| f["severity"] == "warning"), "{applied}: {:#}", said.0);
-        let own = said.refused("base.undo");
-        assert!(own.iter().all(|(severity, _)| *severity == "info"), "{applied}: {:#}", said.0);
-        assert_eq!(said.0["verdict"], "warnings", "{applied}: {:#}", said.0);
-    }
+    // What can be undone without moving anything goes with what the coordinator undoes when it leads down.
+    let soft = check("operator: [soft]\n");
+    assert!(soft.of("coord::refused_by_other").is_empty(), "{:#}", soft.0);
+    assert_eq!(soft.0["verdict"], "sound", "{:#}", soft.0);
+    let applied = "heave";
+    let said = check(&format!("operator: [{applied}]\n"));
+    let found = said.of("coord::refused_by_other");
+    assert!(found.iter().any(|f| f["severity"] == "warning"), "{applied}: {:#}", said.0);
+    let own = said.refused("base.undo");
+    assert!(own.iter().all(|(severity, _)| *severity == "info"), "{applied}: {:#}", said.0);
+    assert_eq!(said.0["verdict"], "warnings", "{applied}: {:#}", said.0);
+}
+
+/// Where something moves, force is told what brings it to rest; where nothing names it that is noted, and no more.
+#[test]
+fn what_moves_and_is_brought_to_rest_by_nothing_is_noted() {
+    let said = check("", "");
+    let found = texts(&said, "deploy::no_rest");
+    let (message, help) = found[0];
+    assert!(message.contains("`Drive` moves") && help.contains("rest: [park]"), "{message}: {help}");
+    assert_eq!(said.0["verdict"], "sound", "{:#}", said.0);
+    let arms = Small::new(&CONFIGURATIONS.replace("\"Drive\"", "\"Arm\""), STATES, "").check();
+    assert!(arms.of("deploy::no_rest").is_empty(), "{:#}", arms.0);
+    let small = Small::new(CONFIGURATIONS, STATES, "");
+    small.demo.replace("small.yaml", "down: idle", "rest: [halt], down: idle");
+    let named = small.check();
+    assert!(named.of("deploy::no_rest").is_empty(), "{:#}", named.0);
 }

@@ -161,3 +161,38 @@ fn a_way_may_give_up_what_has_nothing_to_do() {
     let scripts = numbered.map(|(number, _)| std::fs::read_to_string(small.demo.path(&format!("way{number}.lua"))));
     assert!(scripts.flatten().any(|text| text.contains("which leads to the same")), "{:#}", said.0);
 }
+
+/// Where the stack is full, the frame that was pushed first is squashed first: two orders of frames that share nothing are two
+/// worlds then.
+#[test]
+fn which_of_two_frames_is_squashed_first_is_kept_apart() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\"), create(\"b\", \"Drive\") }, z = Configuration { create(\"c\", \"Drive\") },
+        x = Configuration { property_set(\"a.gain\", 2.0) }, y = Configuration { property_set(\"b.gain\", 3.0) },
+        all = Configuration { destroy(\"a\"), destroy(\"b\"), destroy(\"c\") },";
+    // By the shorter way `x` lies below `y`, by the longer one above it.
+    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, later = state {},
+        x1 = state { entry = \"x\" }, y2 = state { entry = \"y\" }, y1 = state { entry = \"y\" }, x2 = state { entry = \"x\" },
+        both = state {}, full = state { entry = \"z\" }, undoing = state { entry = \"y.undo\" }, off = state { entry = \"x.undo\" },
+        leaving = state { entry = \"all\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
+        trans { src = \"up\", tgt = \"x1\", events = { \"e_x\" } },
+        trans { src = \"x1\", tgt = \"y2\", events = { \"x.ok\" } },
+        trans { src = \"y2\", tgt = \"both\", events = { \"y.ok\" } },
+        trans { src = \"up\", tgt = \"later\", events = { \"e_later\" } },
+        trans { src = \"later\", tgt = \"y1\", events = { \"e_y\" } },
+        trans { src = \"y1\", tgt = \"x2\", events = { \"y.ok\" } },
+        trans { src = \"x2\", tgt = \"both\", events = { \"x.ok\" } },
+        trans { src = \"both\", tgt = \"full\", events = { \"e_full\" } },
+        trans { src = \"full\", tgt = \"undoing\", events = { \"e_shutdown\" } },
+        trans { src = \"undoing\", tgt = \"off\", events = { \"y.undone\", \"y.undo.failed\" } },
+        trans { src = \"off\", tgt = \"leaving\", events = { \"x.undone\", \"x.undo.failed\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },";
+    let said = Small::new(configurations, states, "limits: { stack: 3 }\n").check();
+    for request in ["x.undo", "y.undo"] {
+        let refused = said.refused(request);
+        assert!(refused.iter().any(|(severity, _)| *severity == "error"), "{request} {refused:?} {:#}", said.0);
+    }
+}

@@ -11,6 +11,8 @@ mod circles;
 mod demands;
 mod follow;
 mod product;
+mod replayed;
 mod shown;
+mod stopping;
 mod support;
 mod verdicts;

@@ -104,6 +104,9 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
                     "may have to wait",
                     "are squashed",
                     "only creates",
+                    "so long",
+                    "goes back",
+                    "round for ever",
                 ];
                 assert!(reasons.iter().any(|why| made.err.contains(why)), "{}", made.err);
                 continue;

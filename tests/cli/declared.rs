@@ -36,13 +36,13 @@ fn found(demo: &Demo) -> Option<(String, String, u64)> {
 
 #[test]
 fn names_are_checked() {
-    // All names are right; that the simulated platform shows no values, and that an operator who may rename what the
-    // coordinator holds gets in its way, are other matters.
+    // All names are right; that the simulated platform shows no values, and that nobody hears what is lost, are other
+    // matters. An operator who may rename what the coordinator holds does not get in its way when it leads down.
     let (code, ..) = found(&declared()).expect("a warning");
     assert_eq!(code, "conf::holds_unseen");
     let demo = declared();
     demo.replace("configurations.lua", "above(\"source.y\", 1.0)", "in_state(\"source\", \"running\")");
-    assert_eq!(found(&demo).map(|(code, ..)| code).as_deref(), Some("coord::refused_by_other"));
+    assert_eq!(found(&demo).map(|(code, ..)| code).as_deref(), Some("coord::lost_unheard"));
     for (file, from, to, code, said, line) in [
         ("deployment.yaml", "[rename,", "[renam,", "deploy::unknown_configuration", "did you mean `rename`", 31),
         ("deployment.yaml", "source.k, sink", "sorce.k, sink", "conf::unknown_component", "did you mean `source`", 31),

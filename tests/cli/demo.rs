@@ -138,7 +138,12 @@ impl Ran {
 /// The program, in a directory.
 pub fn program(dir: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_davit"));
-    command.current_dir(dir).args(args).env_remove("NO_COLOR").env("XDG_RUNTIME_DIR", dir);
+    command
+        .current_dir(dir)
+        .args(args)
+        .env_remove("NO_COLOR")
+        .env("XDG_RUNTIME_DIR", dir)
+        .env("XDG_STATE_HOME", dir.join("state"));
     command
 }
 

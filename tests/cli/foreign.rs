@@ -84,7 +84,11 @@ fn another_users_process_is_no_deployment() {
     chown(&folder, Some(NOBODY), Some(NOBODY)).unwrap();
     let theirs = |args: &[&str]| {
         let mut command = as_nobody(Path::new(env!("CARGO_BIN_EXE_davit")));
-        command.args(args).current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path(""));
+        command
+            .args(args)
+            .current_dir(demo.path(""))
+            .env("XDG_RUNTIME_DIR", demo.path(""))
+            .env("XDG_STATE_HOME", demo.path("state"));
         command.stdout(Stdio::null()).stderr(Stdio::null());
         command
     };

@@ -181,7 +181,7 @@ fn runs_out(limit: u32) {
     let program = env!("CARGO_BIN_EXE_davit");
     let mut command = std::process::Command::new("sh");
     command.args(["-c", &format!("ulimit -n {limit}; exec '{program}' deploy deployment.yaml")]);
-    command.current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path(""));
+    command.current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path("")).env("XDG_STATE_HOME", demo.path("state"));
     command.stdout(Stdio::null()).stderr(Stdio::null());
     let deployed = Foreground::start(&mut command);
     demo.until_phase("up");

@@ -137,7 +137,7 @@ fn a_script_is_stopped_by_signals_and_leaves_nothing() {
         assert_eq!(running.end().code(), Some(code), "{}{}", demo.read("out"), demo.read("err"));
         assert!(demo.read("err").contains("interrupted by a signal"), "{}", demo.read("err"));
         let out = demo.read("out");
-        assert!(!out.contains("never") && (forced || out.contains("create_all.undone")), "{out}");
+        assert!(!out.contains("\nnever\n") && (forced || out.contains("create_all.undone")), "{out}");
     }
     // Its end without `shutdown()` counts as well.
     let demo = Demo::new();
@@ -145,4 +145,62 @@ fn a_script_is_stopped_by_signals_and_leaves_nothing() {
     demo.write("story.lua", "deploy('deployment.yaml')");
     let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
     assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
+}
+
+/// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
+#[test]
+fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
+    let demo = Demo::new();
+    demo.write(
+        "deployment.yaml",
+        "davit: 1
+name: small
+platform: simulated
+types:
+  T: { properties: { g: { type: float, default: 1.0 } } }
+configurations: [configurations.lua]
+coordinator: coordinator.lua
+safety: [e_estop]
+deploy:   { event: e_start, up: up, within_s: 20 }
+shutdown: { event: e_stop, down: idle, within_s: 1 }
+",
+    );
+    demo.write(
+        "configurations.lua",
+        "ConfiguratorConf { base = Configuration { create(\"a\", \"T\"), post_conf_state = { \"a:running\" } },
+          calm = Configuration { safe = true, property_set(\"a.g\", 0.0) } }",
+    );
+    demo.write(
+        "coordinator.lua",
+        "return state {
+          idle = state {}, up = state { entry = \"base\" }, leaving = state {}, safe = state { entry = \"calm\" },
+          gone = state { entry = { \"calm.undo\", \"base.undo\" } },
+          trans { src = \"initial\", tgt = \"idle\" }, trans { src = \"idle\", tgt = \"up\", events = { \"e_start\" } },
+          trans { src = \"up\", tgt = \"leaving\", events = { \"e_stop\" } },
+          trans { src = \"up\", tgt = \"safe\", events = { \"e_estop\" } },
+          trans { src = \"leaving\", tgt = \"safe\", events = { \"e_estop\" } },
+          trans { src = \"safe\", tgt = \"gone\", events = { \"e_stop\" } },
+          trans { src = \"gone\", tgt = \"idle\", events = { \"base.undone\" } },
+        }",
+    );
+    demo.replace("deployment.yaml", "within_s: 1 }", "within_s: 600 }");
+    let deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    deployed.signal(libc::SIGHUP);
+    demo.until_phase("shutting_down");
+    let status = demo.run(&["status"]);
+    assert!(!status.out.contains("stands still"), "{}", status.out);
+    let emergency = demo.run(&["event", "e_estop", "--wait", "calm.ok"]);
+    assert_eq!(emergency.code, 0, "{}{}", emergency.out, emergency.err);
+    let status = demo.run(&["status"]);
+    let says = "stands still, `calm` is in force since ";
+    let leads_on =
+        "`davit shutdown` raises `e_stop` once more, which its coordinator hears there; `davit shutdown --force`";
+    assert!(status.out.contains(says) && status.out.contains(leads_on), "{}", status.out);
+    let json = demo.run(&["status", "--json"]).json();
+    assert_eq!(json["stopping"]["stands_still"]["safe"], "calm", "{json:#}");
+    // What it said leads on does.
+    let down = demo.run(&["shutdown"]);
+    assert_eq!(down.code, 0, "{}{}", down.out, down.err);
+    assert_eq!(deployed.end().code(), Some(0), "{}", demo.read("out"));
 }

@@ -48,7 +48,8 @@ fn the_socket_of_a_killed_process_is_removed_only_by_who_deploys_that_name_anew(
     deployed.signal(libc::SIGKILL);
     let _ = deployed.end();
     let socket = demo.path("davit/demo.sock");
-    assert!(demo.run(&["status"]).err.contains("cli::not_running"));
+    assert!(demo.run(&["stack"]).err.contains("cli::not_running"));
+    assert_eq!(demo.run(&["status"]).code, 4, "it died");
     assert!(socket.exists(), "nobody removes what may be just born");
     assert_eq!(demo.run(&["deploy", "deployment.yaml", "--detach"]).code, 0);
     assert_eq!(demo.run(&["shutdown"]).code, 0);

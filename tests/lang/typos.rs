@@ -60,6 +60,7 @@ fn deployment_keys_names_and_values() {
         ("args: [float]", "args: float", "text::wrong_type 12:22", "args: [float, int]"),
         ("period_ms: 1.0", "period_ms: 1ms", "text::bad_time 14:25", "period_ms: 1"),
         ("period_ms: 1.0", "period_ms: 0", "text::bad_time 14:25", "more than 0"),
+        ("period_ms: 1.0", "period_ms: '2.5'", "text::bad_time 14:25", "period_ms: 2.5`"),
         ("period_ms: 1.0", "period_s: 1.0", "text::unknown_key 14:14", "`period_ms`"),
         ("priority: 80", "priority: 100", "text::bad_value 14:40", "99"),
         ("[c.lua]", "[d.lua]", "text::no_file 15:18", "`c.lua`"),

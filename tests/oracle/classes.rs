@@ -5,7 +5,7 @@ use davit::check::{Known, Shown};
 use std::collections::BTreeMap;
 
 /// The classes, and of how many cases each was part of.
-pub const CLASSES: [&str; 14] = [
+pub const CLASSES: [&str; 15] = [
     "an undo and a push of which one fails",
     "safe in a batch",
     "e_done",
@@ -19,6 +19,7 @@ pub const CLASSES: [&str; 14] = [
     "three waiting",
     "two at once",
     "interrupted by safe",
+    "taken along",
     "known to the end",
 ];
 
@@ -74,7 +75,12 @@ impl Classes {
             }
             self.close();
             match note {
-                Note::Answer { request, by, answer, .. } => self.answered(*request, by, answer),
+                Note::Answer { request, by, answer, along, .. } => {
+                    if *along {
+                        self.meets("taken along");
+                    }
+                    self.answered(*request, by, answer);
+                }
                 Note::Moved(active) if active.last().is_some_and(|leaf| leaf.contains("done")) => self.meets("e_done"),
                 _ => {}
             }

@@ -23,6 +23,8 @@ pub enum Note {
         answer: String,
         #[allow(dead_code)] // told when a case disagrees
         steps: String,
+        /// What an operator had put in its way was undone with it.
+        along: bool,
     },
     Requested {
         request: u64,
@@ -113,7 +115,8 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
             let note = match what {
                 Happening::Answered(a) => {
                     let steps = serde_json::to_string(&a.steps).unwrap_or_default();
-                    Note::Answer { request: a.request, by: a.by.clone(), answer: a.answer.clone(), steps }
+                    let along = a.reasons.iter().any(|reason| reason.contains("of an operator was undone with it"));
+                    Note::Answer { request: a.request, by: a.by.clone(), answer: a.answer.clone(), steps, along }
                 }
                 Happening::Requested { request, ask, by } => {
                     Note::Requested { request: request.unwrap_or_default(), by: by.clone(), ask: ask.clone() }
@@ -154,7 +157,22 @@ impl Case<'_> {
                 _ if action == 0 => self.raise("e_start")?,
                 0..=9 => self.raise(chance.pick(&EVENTS))?,
                 10..=12 => self.raise("e_start")?,
-                13 | 14 => self.raise("e_shutdown")?,
+                13 | 14 => {
+                    // What an operator has put on top of what is led down now.
+                    let all = &made.deployment.configurations;
+                    let first = if all.len() > 3 { 3 } else { 0 };
+                    let id = all[first + chance.below(all.len() - first)].id;
+                    if chance.percent(90) && !(id.as_str() == "c3" && made.kept) {
+                        self.operator(Ask::Apply(id))?;
+                        self.rest(action)?;
+                        for _ in 0..chance.below(12) {
+                            self.clock.sleep(Duration::from_millis(1));
+                            self.rest(action)?;
+                        }
+                        self.clock.sleep(Duration::from_nanos(1000));
+                    }
+                    self.raise("e_shutdown")?;
+                }
                 15 => self.raise(CONFIRMS)?,
                 16..=18 if self.names.len() == 1 || chance.percent(50) => {
                     let id = made.deployment.configurations[chance.below(made.deployment.configurations.len())].id;

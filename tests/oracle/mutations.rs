@@ -1,25 +1,49 @@
-//! What the oracle must notice: small changes, each made alone in a copy of the sources, in which the oracle then runs.
+//! What the tests must notice: small changes, all of them in one copy of the project, each behind a switch. The copy is built
+//! once and run with each of them; unchanged, it must pass.
 
+use davit::time::Clock;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// A change of one place.
 struct Mutation {
     name: String,
     file: String,
+    /// The test binary that must notice it, and which of its tests alone.
+    by: Noticed,
+    before: String,
     old: String,
+    after: String,
     new: String,
+}
+
+#[derive(Clone, PartialEq, Eq)]
+enum Noticed {
+    Oracle,
+    Check(String),
 }
 
 fn mutations() -> Vec<Mutation> {
     let text = include_str!("mutations.txt");
     let one = |block: &str| {
-        let (name, rest) = block.split_once("\nfile: ").expect("a file");
-        let (file, rest) = rest.split_once("\n-\n").expect("what stands there");
+        let (head, rest) = block.split_once("\n-\n").expect("what stands there");
+        let (name, keys) = head.split_once("\nfile: ").expect("a file");
+        let (file, by) = match keys.split_once("\nby: check ") {
+            Some((file, tests)) => (file, Noticed::Check(tests.to_owned())),
+            None => (keys, Noticed::Oracle),
+        };
         let (old, rest) = rest.split_once("\n+\n").expect("what stands there then");
-        let new = rest.trim_end().strip_suffix('.').expect("an end");
-        let new = new.strip_suffix('\n').unwrap_or(new).to_owned();
-        Mutation { name: name.to_owned(), file: file.to_owned(), old: old.to_owned(), new }
+        let new = rest.trim_end().strip_suffix('.').expect("an end").trim_end().to_owned();
+        let (before, old, after) = match old.split_once('«') {
+            Some((before, rest)) => {
+                let (old, after) = rest.split_once('»').expect("the end of what is changed");
+                (before, old, after)
+            }
+            None => ("", old, ""),
+        };
+        let [name, file, before, old, after] = [name, file, before, old, after].map(str::to_owned);
+        Mutation { name, file, by, before, old, after, new }
     };
     text.split("\n## ").skip(1).map(one).collect()
 }
@@ -29,85 +53,191 @@ fn root() -> PathBuf {
 }
 
 impl Mutation {
-    fn applied(&self) -> String {
-        let text =
-            std::fs::read_to_string(root().join(&self.file)).unwrap_or_else(|why| panic!("{}: {why}", self.file));
-        let found = text.matches(&self.old).count();
-        assert_eq!(found, 1, "`{}`: its place in {} is found {found} times", self.name, self.file);
-        text.replacen(&self.old, &self.new, 1)
+    /// The text with the change behind its switch.
+    fn switched(&self, number: usize, text: &str) -> String {
+        let Self { name, file, before, old, after, new, .. } = self;
+        let place = format!("{before}{old}{after}");
+        let found = text.matches(&place).count();
+        assert_eq!(found, 1, "`{name}`: its place in {file} is found {found} times");
+        let switch = format!("{before}{{ if crate::mutation::is({number}) {{ {new} }} else {{ {old} }} }}{after}");
+        text.replacen(&place, &switch, 1)
     }
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
 }
 
 #[test]
 fn every_mutation_still_finds_its_place() {
     let all = mutations();
-    assert!(all.len() >= 15, "{} mutations", all.len());
+    assert!(all.len() >= 24, "{} mutations", all.len());
     for mutation in &all {
         assert_ne!(mutation.old, mutation.new, "`{}` changes nothing", mutation.name);
-        mutation.applied();
+        mutation.switched(1, &read(&root().join(&mutation.file)));
     }
 }
 
-fn copy(from: &Path, to: &Path) {
-    if from.is_dir() {
-        std::fs::create_dir_all(to).expect("room for a copy");
-        for entry in std::fs::read_dir(from).expect("a folder of sources").flatten() {
-            copy(&entry.path(), &to.join(entry.file_name()));
+/// Which of them is made is said by the environment; none of them without it.
+const SWITCH: &str = "
+/// Which change is made.
+#[doc(hidden)]
+#[allow(missing_docs)]
+pub mod mutation {
+    static MADE: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| {
+        std::env::var(\"DAVIT_MUTANT\").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
+    });
+
+    pub fn is(number: usize) -> bool {
+        *MADE == number
+    }
+}
+";
+
+/// The files of a folder, or the one file.
+fn files(at: &Path, all: &mut Vec<PathBuf>) {
+    if !at.is_dir() {
+        return all.push(at.to_owned());
+    }
+    let mut inside: Vec<PathBuf> =
+        std::fs::read_dir(at).expect("a folder").flatten().map(|entry| entry.path()).collect();
+    inside.sort();
+    inside.iter().for_each(|path| files(path, all));
+}
+
+/// The copy, with every change behind its switch. What is the same keeps its time, so that only what changed is built anew.
+fn copy(to: &Path) {
+    let mut all = Vec::new();
+    let kept = [
+        "Cargo.toml",
+        "Cargo.lock",
+        "rust-toolchain.toml",
+        "src",
+        "benches",
+        "examples",
+        "tests",
+        "deployments",
+        "configs",
+    ];
+    kept.map(|name| root().join(name)).iter().filter(|path| path.exists()).for_each(|path| files(path, &mut all));
+    for path in all {
+        let name = path.strip_prefix(root()).expect("below the root").to_owned();
+        let mut text = std::fs::read(&path).expect("a file");
+        let changes =
+            || mutations().into_iter().zip(1usize..).filter(|(mutation, _)| Path::new(&mutation.file) == name);
+        if changes().next().is_some() || name == Path::new("src/lib.rs") {
+            let mut source = String::from_utf8(text).expect("a source");
+            for (mutation, number) in changes() {
+                source = mutation.switched(number, &source);
+            }
+            if name == Path::new("src/lib.rs") {
+                source.push_str(SWITCH);
+            }
+            text = source.into_bytes();
         }
-        return;
-    }
-    // What is the same keeps its time, so that only what a mutation touches is built anew.
-    let text = std::fs::read(from).expect("a source");
-    if std::fs::read(to).ok().as_ref() != Some(&text) {
-        std::fs::write(to, text).expect("room for a copy");
+        let to = to.join(&name);
+        if std::fs::read(&to).ok().as_ref() != Some(&text) {
+            std::fs::create_dir_all(to.parent().expect("a folder")).expect("room for a copy");
+            std::fs::write(&to, text).expect("room for a copy");
+        }
     }
 }
 
-/// Whether the oracle passes in the copy; none: it does not build.
-fn passes(at: &Path) -> Option<bool> {
-    let cargo = |more: &[&str]| {
-        Command::new(env!("CARGO"))
-            .args(["test", "--locked", "--offline", "--test", "oracle"])
-            .args(more)
-            .current_dir(at)
-            .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "5000".to_owned()))
-            .env("DAVIT_ORACLE_ENOUGH", "1")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .status()
-            .expect("cargo runs")
-            .success()
+/// Builds the copy's two test binaries: the oracle, and that of `check`.
+fn built(at: &Path) -> [PathBuf; 2] {
+    let made = Command::new(env!("CARGO"))
+        .args([
+            "test",
+            "--locked",
+            "--offline",
+            "--test",
+            "oracle",
+            "--test",
+            "check",
+            "--no-run",
+            "--message-format=json",
+        ])
+        .current_dir(at)
+        .env("CARGO_TARGET_DIR", at.join("target"))
+        .env_remove("CARGO_MANIFEST_DIR")
+        .output()
+        .expect("cargo runs");
+    assert!(made.status.success(), "the copy does not build:\n{}", String::from_utf8_lossy(&made.stderr));
+    let text = String::from_utf8(made.stdout).expect("text");
+    ["oracle", "check"].map(|name| {
+        let of = |line: &str| {
+            let message: serde_json::Value = serde_json::from_str(line).ok()?;
+            let own = message["target"]["name"] == name && message["target"]["kind"][0] == "test";
+            message["executable"].as_str().filter(|_| own).map(PathBuf::from)
+        };
+        text.lines().find_map(of).unwrap_or_else(|| panic!("no test `{name}`"))
+    })
+}
+
+/// What never ends is noticed, too.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Whether the tests pass with that change made.
+fn passes(at: &Path, [oracle, check]: &[PathBuf; 2], by: &Noticed, number: usize) -> bool {
+    let mut command = match by {
+        Noticed::Oracle => Command::new(oracle),
+        Noticed::Check(_) => Command::new(check),
     };
-    cargo(&["--no-run"]).then(|| cargo(&["a_running_deployment"]))
+    let tests = match by {
+        Noticed::Oracle => "a_running_deployment",
+        Noticed::Check(tests) => tests,
+    };
+    let mut running = command
+        .arg(tests)
+        .current_dir(at)
+        .env("CARGO_MANIFEST_DIR", at)
+        .env("DAVIT_MUTANT", number.to_string())
+        .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "6000".to_owned()))
+        .env("DAVIT_ORACLE_ENOUGH", "1")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the tests run");
+    let clock = Clock::real();
+    let begun = clock.now();
+    loop {
+        match running.try_wait().expect("the tests run") {
+            Some(status) => return status.success(),
+            None if clock.now().since(begun) > PATIENCE => {
+                let _ = running.kill();
+                let _ = running.wait();
+                return false;
+            }
+            None => clock.sleep(Duration::from_millis(20)),
+        }
+    }
 }
 
-/// Builds the project once for each: half an hour. `DAVIT_MUTATIONS_AT` says where the copy lies, `DAVIT_MUTATION` which alone to make
-/// (a part of its name), `DAVIT_MUTATION_CASES` how many cases are run.
+/// One build, and a run with each change until it is noticed: a few minutes. `DAVIT_MUTATIONS_AT` says where the copy lies,
+/// `DAVIT_MUTATION` which alone to make (a part of its name), `DAVIT_MUTATION_CASES` how many cases the oracle runs.
 #[test]
-#[ignore = "builds the project once for each mutation"]
+#[ignore = "builds the project once more"]
 fn mutations_are_noticed() {
     let at = std::env::var_os("DAVIT_MUTATIONS_AT");
     let at = at.map_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutations"), PathBuf::from);
-    for name in ["Cargo.toml", "Cargo.lock", "rust-toolchain.toml", "src", "benches", "tests/oracle"] {
-        let to = at.join(name);
-        std::fs::create_dir_all(to.parent().expect("a folder")).expect("room for a copy");
-        copy(&root().join(name), &to);
-    }
-    let mut survived = Vec::new();
+    copy(&at);
+    let tests = built(&at);
     let only = std::env::var("DAVIT_MUTATION").unwrap_or_default();
-    for mutation in mutations().into_iter().filter(|mutation| mutation.name.contains(&only)) {
-        std::fs::write(at.join(&mutation.file), mutation.applied()).expect("room for a copy");
-        let went = passes(&at);
-        let told = match went {
-            Some(true) => "survived",
-            Some(false) => "killed",
-            None => "does not build",
-        };
-        println!("{told:<15} {}", mutation.name);
-        if went != Some(false) {
-            survived.push(mutation.name);
+    let all: Vec<(Mutation, usize)> =
+        mutations().into_iter().zip(1..).filter(|(m, _)| m.name.contains(&only)).collect();
+    let clock = Clock::real();
+    let mut sound: Vec<Noticed> = Vec::new();
+    let mut survived = Vec::new();
+    for (mutation, number) in all {
+        if !sound.contains(&mutation.by) {
+            assert!(passes(&at, &tests, &mutation.by, 0), "what must notice `{}` fails without it", mutation.name);
+            sound.push(mutation.by.clone());
         }
-        copy(&root().join(&mutation.file), &at.join(&mutation.file));
+        let begun = clock.now();
+        let survives = passes(&at, &tests, &mutation.by, number);
+        let told = if survives { "survived" } else { "noticed" };
+        println!("{told:<10}{:>6.1} s  {}", clock.now().since(begun).as_secs_f64(), mutation.name);
+        survived.extend(survives.then_some(mutation.name));
     }
     assert!(survived.is_empty(), "not noticed: {survived:?}");
 }

@@ -1,8 +1,10 @@
 //! A deployment alive: control socket, bring-up, shutdown, faults on the way.
 
+mod along;
 mod beside;
 mod bringup;
 mod classes;
+mod defects;
 mod doors;
 mod flood;
 mod hangs;

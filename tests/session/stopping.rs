@@ -23,10 +23,12 @@ types:
     operations:
       raise: { effect: { undo: lower }, moves: true }
       lower: { effect: { undo: raise }, moves: true }
+      open: { effect: { undo: close } }
+      close: { effect: { undo: open } }
 configurations: [conf.lua]
 coordinator: coordinator.lua
 safety: [e_estop]
-operator: [soft, lift]
+operator: [soft, stiff, look, hoist, lift]
 deploy:   { event: e_start, up: up, failed: [failed], within_s: 20 }
 shutdown: { event: e_stop, down: idle, within_s: 5, rest: [rest] }
 ";
@@ -35,8 +37,11 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
   base = Configuration { create("a", "T"), create("b", "T"), post_conf_state = { "_default:running" } },
   lift = Configuration { timeout = 10.0, operation_call("a.raise") },
   soft = Configuration { property_set("b.k", 3.0) },
+  stiff = Configuration { property_set("b.k", 4.0) },
+  look = Configuration { operation_call("b.open") },
+  hoist = Configuration { operation_call("b.raise") },
   calm = Configuration { safe = true, property_set("a.g", 0.0) },
-  rest = Configuration { timeout = 10.0, operation_call("a.lower"):undo("a.raise") },
+  rest = Configuration { timeout = 10.0, operation_call("a.lower"):undo("a.raise"), operation_call("b.open") },
 }
 "#;
 
@@ -67,17 +72,17 @@ fn coordinator(leading: &str) -> String {
     )
 }
 
-struct Small {
-    clock: Clock,
-    platform: Simulated,
-    session: Arc<Session>,
-    heard: Arc<Mutex<Vec<String>>>,
+pub struct Small {
+    pub clock: Clock,
+    pub platform: Simulated,
+    pub session: Arc<Session>,
+    pub heard: Arc<Mutex<Vec<String>>>,
     _guard: Guard,
 }
 
 impl Small {
     /// Raising and lowering take 2 s each.
-    fn new(leading: &str, faults: Vec<FaultRule>) -> Self {
+    pub fn new(leading: &str, faults: Vec<FaultRule>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let coordinator = coordinator(leading);
         for (name, text) in
@@ -110,7 +115,7 @@ impl Small {
         Self { clock, platform, session, heard, _guard: guard }
     }
 
-    fn up(leading: &str) -> Self {
+    pub fn up(leading: &str) -> Self {
         let small = Self::new(leading, Vec::new());
         small.session.bring_up().unwrap_or_else(|not| panic!("{not:#?}"));
         small.platform.record();
@@ -118,7 +123,7 @@ impl Small {
     }
 
     /// Somebody does something so many seconds from now, while this thread is stopping it.
-    fn after(&self, seconds: f64, what: impl FnOnce(&Session) + Send + 'static) {
+    pub fn after(&self, seconds: f64, what: impl FnOnce(&Session) + Send + 'static) {
         let (clock, session) = (self.clock.clone(), self.session.clone());
         self.clock.spawn("somebody", move || {
             clock.sleep(Duration::from_secs_f64(seconds));
@@ -127,15 +132,15 @@ impl Small {
     }
 
     /// The steps that the platform was asked for since they were read last.
-    fn steps(&self) -> Vec<String> {
+    pub fn steps(&self) -> Vec<String> {
         self.platform.record().iter().map(ToString::to_string).collect()
     }
 
-    fn heard(&self, what: &str) -> bool {
+    pub fn heard(&self, what: &str) -> bool {
         self.heard.lock().unwrap().iter().any(|line| line == what)
     }
 
-    fn stop(&self) -> (Ended, f64) {
+    pub fn stop(&self) -> (Ended, f64) {
         let began = self.clock.now();
         let ended = self.session.take_down(false);
         (ended, self.clock.now().since(began).as_secs_f64())
@@ -143,17 +148,49 @@ impl Small {
 
     /// Nothing is there, whatever is said.
     #[track_caller]
-    fn is_empty(&self) {
+    pub fn is_empty(&self) {
         let seen = self.platform.observe(self.clock.now() + Duration::from_secs(1)).unwrap();
         assert!(seen.is_empty(), "{seen:?}");
     }
 }
 
-fn event(name: &str) -> EventName {
+impl Small {
+    /// An operator has applied these, one after the other.
+    pub fn with(self, applied: &[&str]) -> Self {
+        for id in applied {
+            self.session.request(Ask::Apply(ConfigId::new(id).unwrap()), "operator", false);
+            self.clock.sleep(Duration::from_secs(1));
+            assert!(self.heard(&format!("{id}.ok")), "{:?}", self.heard.lock().unwrap());
+        }
+        self.steps();
+        self
+    }
+
+    /// Why something was answered so.
+    pub fn why(&self, answered: &str) -> String {
+        let log = self.session.hub().log(usize::MAX);
+        let mut why = log.iter().rev().filter_map(|entry| match &entry.what {
+            Happening::Answered(answer) if answer.answer == answered => Some(answer.reasons.join("; ")),
+            _ => None,
+        });
+        why.next().unwrap_or_else(|| panic!("no {answered}: {:?}", self.heard.lock().unwrap()))
+    }
+
+    pub fn in_force(session: &Session) -> Vec<String> {
+        session
+            .status()
+            .stack
+            .iter()
+            .map(|frame| format!("{}{}", frame.configuration, ["", " partial"][usize::from(frame.partial)]))
+            .collect()
+    }
+}
+
+pub fn event(name: &str) -> EventName {
     EventName::new(name).unwrap()
 }
 
-fn force(session: &Session) {
+pub fn force(session: &Session) {
     session.command(Command::Shutdown { force: true });
 }
 
@@ -272,13 +309,17 @@ fn an_emergency_on_the_way_down_stops_the_time() {
     small.after(1.0, |session| session.raise(event("e_estop"), "test"));
     small.after(60.0, |session| {
         let status = session.status();
-        assert_eq!(status.stopping.map(|view| view.stage), Some(Stage::Led), "{:?}", status.coordinator);
+        let view = status.stopping.expect("it is being stopped");
+        assert_eq!(view.stage, Stage::Led, "{:?}", status.coordinator);
+        let still = view.stands_still.expect("it waits for people").to_string();
+        let says = "its coordinator hears nothing there that is open now; `davit shutdown --force`";
+        assert!(still.starts_with("`calm` is in force since ") && still.contains(says), "{still}");
         force(session);
     });
     let (ended, took) = small.stop();
     assert!((62.0..63.0).contains(&took), "{took}");
     assert!(ended.is_clean(), "{ended:?}");
-    let calls = small.steps().iter().filter(|step| step.contains("operation_call")).count();
+    let calls = small.steps().iter().filter(|step| step.contains("operation_call a.")).count();
     assert_eq!(calls, 2, "nothing moves before somebody asks: {:?}", small.heard.lock().unwrap());
 }
 
@@ -326,6 +367,56 @@ fn a_safety_event_acts_by_itself_once_nobody_leads() {
     assert!(!steps[safe..].iter().any(|step| step.contains("operation_call")), "{steps:?}");
 }
 
+/// An operator's safe configuration that was asked for before, at the very instant, has not come since: nobody waits for what its
+/// coordinator would do about it.
+#[test]
+fn what_was_made_safe_at_the_very_instant_was_so_before() {
+    let small = Small::up("deaf");
+    small.session.request(Ask::Apply(ConfigId::new("calm").unwrap()), "operator", false);
+    small.after(20.0, |session| {
+        let view = session.status().stopping.expect("it is being stopped");
+        assert!(view.held && view.stage == Stage::TakenBack && view.stands_still.is_none(), "{view:?}");
+        force(session);
+    });
+    let (ended, took) = small.stop();
+    assert!((20.0..22.0).contains(&took) && ended.is_clean(), "{took} {ended:?}");
+}
+
+/// Who sends a safety event that acts by itself is told so, and its safe configurations are nobody's requests.
+#[test]
+fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
+    let small = Small::up("deaf");
+    let service = SessionService::new(Arc::downgrade(&small.session));
+    let answered = Arc::new(Mutex::new(Vec::new()));
+    let told = answered.clone();
+    small.after(6.0, move |session| {
+        // Who waits outside the clock is no participant of it.
+        let asked = std::thread::spawn(move || {
+            for _ in 0..2 {
+                let params = json!({"event": "e_estop", "wait": true});
+                told.lock().unwrap().push(service.call(1, "event", &params).unwrap());
+            }
+        });
+        while !asked.is_finished() {
+            session.clock().sleep(Duration::from_micros(10));
+        }
+        force(session);
+    });
+    let (ended, _) = small.stop();
+    let answered = std::mem::take(&mut *answered.lock().unwrap());
+    assert_eq!(answered[0], json!({"accepted": true, "taken": true, "acted": ["calm.ok"]}), "{ended:?}");
+    assert_eq!(answered[1], json!({"accepted": true, "taken": true, "acted": []}));
+    let log = small.session.hub().log(usize::MAX);
+    let by = log.iter().find_map(|entry| match &entry.what {
+        Happening::Answered(answer) if answer.answer == "calm.ok" => Some(answer.by.clone()),
+        _ => None,
+    });
+    assert_eq!(by.as_deref(), Some("a safety event"));
+    let delivered =
+        log.iter().any(|entry| matches!(&entry.what, Happening::Forced { note } if note.contains("was not delivered")));
+    assert!(!delivered, "it did what it is for");
+}
+
 /// From the first moment on; what makes safe, what shuts down and what only looks stays open.
 #[test]
 fn while_it_is_stopped_others_are_refused_in_words() {
@@ -366,4 +457,36 @@ fn while_it_is_stopped_others_are_refused_in_words() {
     assert_eq!(told.len(), 8, "{told:?}");
     assert!(small.heard("soft.failed"), "{:?}", small.heard.lock().unwrap());
     assert!(!small.steps().iter().any(|step| step.contains("b.k")));
+}
+
+/// Down is what the platform shows, not what it has said: what is there all the same is removed by the next stages.
+#[test]
+fn what_was_said_to_be_gone_and_is_there_is_not_down() {
+    let small = Small::new("lowering", vec![FaultRule::on("destroy a", Fault::FalseDone).times(1)]);
+    small.session.bring_up().unwrap();
+    let (ended, _) = small.stop();
+    assert!(ended.is_clean() && ended.stage != Stage::Led, "{ended:?}");
+    assert!(ended.forced[0].contains("`idle` was reached with components left"), "{ended:?}");
+    small.is_empty();
+}
+
+/// What brings it to rest is tried again as often as what is removed, and only what failed of it.
+#[test]
+fn what_brings_it_to_rest_is_tried_again() {
+    for (times, partly) in [(2, false), (9, true)] {
+        let small = Small::up("lowering");
+        small.platform.set_faults(Faults::new(vec![FaultRule::on("operation_call a.lower", Fault::Fail).times(times)]));
+        let began = small.clock.now();
+        let ended = small.session.take_down(true);
+        // Three times two seconds, and what was done is not done again.
+        let took = small.clock.now().since(began).as_secs_f64();
+        assert!((6.0..7.0).contains(&took), "{took} {ended:?}");
+        let steps = small.steps();
+        assert_eq!(steps.iter().filter(|step| step.contains("b.open")).count(), 1, "{steps:?}");
+        let told = "`rest`, to come to rest, applied";
+        assert!(ended.forced.contains(&told.to_owned()) != partly, "{ended:?}");
+        // Its time is not that in which everything is removed.
+        assert!(ended.is_clean(), "{ended:?}");
+        small.is_empty();
+    }
 }

@@ -159,10 +159,10 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
         None
     };
     if let Kind::Str(text) = &node.kind {
-        let help = match parse_time(text) {
-            Some(seconds) => {
-                format!("write the number alone: `{}`", with_number(example, seconds / factor))
-            }
+        // A number in quotes is one of the key's own unit.
+        let bare = text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        let help = match bare.or_else(|| parse_time(text).map(|seconds| seconds / factor)) {
+            Some(number) => format!("write the number alone: `{}`", with_number(example, number)),
             None => format!("write it like `{example}`"),
         };
         return refuse(cx, format!("{what} is a number of {word}, this is the text `{text}`"), help);

@@ -10,7 +10,8 @@ use crate::platform::{Cause, PlatformEvent};
 use crate::runtime::activity::{Activity, Request};
 use crate::runtime::builder::CallerFn;
 use crate::runtime::call::{Call, Progress, Reply};
-use crate::runtime::cell::{Cell, Closed, Inside};
+use crate::runtime::cell::{Cell, Inside};
+use crate::runtime::gate::Closed;
 use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Sender, Time, lock};
 use std::sync::Arc;
@@ -22,10 +23,10 @@ impl Inner {
         let may = |state| {
             if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) }
         };
-        match cell.enter_idle(safe, may) {
-            Ok(inside) => inside.hand_over(),
+        let mut inside = match Inside::idle(&**cell, safe, may) {
+            Ok(inside) => inside.sent(cell),
             Err(why) => return Outcome::NotDone(closed(why, cell.name, transition.as_str())),
-        }
+        };
         let settled = Arc::new(Settled::default());
         let _entered = self.under_way.enter(What::Hook(cell.name, transition, settled.clone()));
         let (answer, answered) = self.clock.channel(1);
@@ -33,8 +34,6 @@ impl Inner {
             let (inner, cell, settled) = (self.own.clone(), cell.clone(), settled.clone());
             let clock = self.clock.clone();
             Box::new(move || {
-                // SAFETY: `BUSY` was set above and handed over to this job alone.
-                let mut inside = unsafe { Inside::resume(&cell) };
                 if !settled.begin() {
                     drop(inside);
                     let _ = answer.try_send(Outcome::NotDone(Cause::Cancelled));
@@ -55,9 +54,7 @@ impl Inner {
             })
         };
         if let Err(text) = self.workers.run(job) {
-            // The job was dropped unrun: the right to be inside is ours again.
-            // SAFETY: it was handed over to the job, and the job is gone.
-            drop(unsafe { Inside::resume(cell) });
+            // The job was dropped unrun, and the right to be inside with it.
             return Outcome::NotDone(Cause::Refused(text));
         }
         match answered.recv_deadline(deadline) {
@@ -147,7 +144,8 @@ impl Inner {
             None => Place::Worker,
         };
         // Beside the component a safe call disturbs nobody, and inside it one is let in that can still come to rest.
-        let keeps_out = if safe { !matches!(place, Place::Beside(_)) && cell.is_lost() } else { cell.is_quarantined() };
+        let keeps_out =
+            if safe { !matches!(place, Place::Beside(_)) && cell.gate.is_lost() } else { cell.gate.is_quarantined() };
         if keeps_out {
             return Err(Cause::Quarantined);
         }
@@ -189,13 +187,13 @@ impl Inner {
                 Ok(())
             }
             Place::Worker => {
-                if safe || !cell.is_restless() {
+                let inside = if safe || !cell.is_restless() {
                     let refused = |why| closed(why, cell.name, "call an operation of");
-                    cell.enter_idle(safe, |_| true).map_err(refused)?.hand_over();
+                    Inside::idle(&**cell, safe, |_| true).map_err(refused)?
                 } else {
-                    self.enter_rested(cell, &progress, deadline)?.hand_over();
-                }
-                self.operate_idle(cell, *index, args, Call(progress))
+                    self.enter_rested(cell, &progress, deadline)?
+                };
+                self.operate_idle(inside, cell, *index, args, Call(progress))
             }
         }
     }
@@ -204,7 +202,7 @@ impl Inner {
     fn enter_rested<'a>(&self, cell: &'a Cell, progress: &Progress, deadline: Time) -> Result<Inside<'a>, Cause> {
         let mut naps = Naps::default();
         loop {
-            match cell.enter_idle(false, |_| true) {
+            match Inside::idle(cell, false, |_| true) {
                 Ok(inside) => return Ok(inside),
                 Err(Closed::Busy) if progress.is_withdrawn() => return Err(Cause::Cancelled),
                 Err(Closed::Busy) if naps.take(&self.clock, deadline) => {}
@@ -214,12 +212,20 @@ impl Inner {
         }
     }
 
-    /// Calls an operation of a component that does not run, on a worker. `BUSY` is set and handed over to this call.
-    fn operate_idle(&self, cell: &Arc<Cell>, index: usize, args: Vec<Value>, call: Call) -> Result<(), Cause> {
+    /// Calls an operation of a component that does not run, on a worker.
+    fn operate_idle(
+        &self,
+        inside: Inside<'_>,
+        cell: &Arc<Cell>,
+        index: usize,
+        args: Vec<Value>,
+        call: Call,
+    ) -> Result<(), Cause> {
         let (inner, clock, own) = (self.own.clone(), self.clock.clone(), cell.clone());
+        let inside = inside.sent(cell);
         let job: Job = Box::new(move || {
-            // SAFETY: `BUSY` was set by the caller and handed over to this job alone.
-            let mut inside = unsafe { Inside::resume(&own) };
+            // Left before the call is dropped: who hears its answer may call again at once.
+            let mut inside = inside;
             let progress = call.0.clone();
             if !progress.begin() {
                 return;
@@ -237,11 +243,7 @@ impl Inner {
                 inner.clean_up(&own, None, own.state() == RunState::Stopped);
             }
         });
-        self.workers.run(job).map_err(|text| {
-            // SAFETY: it was handed over to the job, and the job is gone.
-            drop(unsafe { Inside::resume(cell) });
-            Cause::Refused(text)
-        })
+        self.workers.run(job).map_err(Cause::Refused)
     }
 
     fn await_answer(&self, begun: Begun, replied: Receiver<Reply>, deadline: Time) -> Outcome {
@@ -284,7 +286,7 @@ impl Inner {
         if progress.is_answered() || progress.is_inside() {
             return;
         }
-        cell.keep_out_until_rest();
+        cell.gate.keep_out_until_rest();
         registry.quarantined.insert(cell.name);
         drop(registry);
         let (inner, cell) = (self.own.clone(), cell.clone());
@@ -300,7 +302,7 @@ impl Inner {
     /// It answers all the time, so nothing is to be cleaned up: it stays as it is, at rest.
     fn come_to_rest(&self, cell: &Cell) {
         let mut registry = lock(&self.registry);
-        if !cell.came_to_rest() || cell.is_lost() {
+        if !cell.gate.came_to_rest() || cell.gate.is_lost() {
             return;
         }
         let was = registry.quarantined.remove(&cell.name);
@@ -331,12 +333,12 @@ impl Inner {
                 return;
             }
         }
-        let Some(mut inside) = inside.or_else(|| cell.enter_returned()) else { return };
+        let Some(mut inside) = inside.or_else(|| Inside::returned(cell)) else { return };
         if configured && cell.kind.has_hook(Transition::Cleanup) {
             let _ = inside.hook(&self.clock, Transition::Cleanup);
         }
         let body = inside.take();
-        inside.hand_over();
+        inside.close();
         let entry = {
             let mut registry = lock(&self.registry);
             registry.sever(cell.name);

@@ -136,7 +136,7 @@ impl Platform for EmbeddedPlatform {
                 let registry = lock(&self.inner.registry);
                 let waits = registry.find(*component).is_ok_and(|slot| {
                     let cell = &registry.entry(slot).cell;
-                    cell.kind.has_hook(*transition) || (*transition == Transition::Stop && cell.is_busy())
+                    cell.kind.has_hook(*transition) || (*transition == Transition::Stop && cell.gate.is_busy())
                 });
                 if waits { Execution::Blocking } else { Execution::Immediate }
             }
@@ -209,7 +209,7 @@ impl Platform for EmbeddedPlatform {
     fn quarantined(&self) -> Vec<ComponentName> {
         let registry = lock(&self.inner.registry);
         // Who was restless and does not run any more is at rest.
-        let at_rest = |name| registry.find(name).is_ok_and(|slot| !registry.entry(slot).cell.is_quarantined());
+        let at_rest = |name| registry.find(name).is_ok_and(|slot| !registry.entry(slot).cell.gate.is_quarantined());
         let mut names: Vec<_> = registry.quarantined.iter().copied().filter(|name| !at_rest(*name)).collect();
         names.sort_unstable();
         names

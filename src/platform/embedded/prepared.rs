@@ -79,7 +79,7 @@ impl Prepared for Resolved {
                 if let Err(cause) = inner.shift(&mut registry, *slot, *transition, false) {
                     return Outcome::NotDone(cause);
                 }
-                if *transition != Transition::Stop || !registry.entry(*slot).cell.is_busy() {
+                if *transition != Transition::Stop || !registry.entry(*slot).cell.gate.is_busy() {
                     return Outcome::Done(None);
                 }
                 let cell = registry.entry(*slot).cell.clone();

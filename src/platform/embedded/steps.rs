@@ -4,7 +4,8 @@ use super::registry::Registry;
 use super::{Inner, Outcome};
 use crate::model::{ComponentName, Policy, RunState, Step, Transition};
 use crate::platform::{Cause, PlatformEvent};
-use crate::runtime::cell::{Cell, Closed};
+use crate::runtime::cell::Cell;
+use crate::runtime::gate::Closed;
 use crate::time::{Clock, Time, lock};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -103,7 +104,7 @@ impl Inner {
                 if let Err(cause) = self.shift(&mut registry, slot, transition, safe) {
                     return Outcome::NotDone(cause);
                 }
-                if !hook && !cell.is_busy() {
+                if !hook && !cell.gate.is_busy() {
                     return Outcome::Done(None);
                 }
             }
@@ -130,7 +131,7 @@ impl Inner {
         if transition == Transition::Start && cell.state() == RunState::Stopped {
             cell.restart();
         }
-        cell.shift(transition, safe).map_err(|why| closed(why, cell.name, transition.as_str()))?;
+        cell.gate.shift(transition, safe).map_err(|why| closed(why, cell.name, transition.as_str()))?;
         match transition {
             Transition::Start => registry.crew_of(slot).activity.started(cell),
             Transition::Stop => registry.crew_of(slot).activity.stopped(cell),
@@ -146,7 +147,7 @@ impl Inner {
     pub(super) fn await_idle(&self, cell: &Arc<Cell>, deadline: Time) -> Result<(), Outcome> {
         let mut naps = Naps::default();
         let mut spins = if self.clock.is_simulated() { SPINS } else { 0 };
-        while cell.is_busy() {
+        while cell.gate.is_busy() {
             if spins < SPINS {
                 spins += 1;
                 std::hint::spin_loop();
@@ -172,7 +173,7 @@ impl Inner {
     /// `in_activity`: the call holds up the component's activity.
     pub(super) fn give_up(&self, cell: &Arc<Cell>, in_activity: bool, really: impl FnOnce() -> bool) -> bool {
         let mut registry = lock(&self.registry);
-        let Some(was_running) = (if really() { cell.quarantine() } else { None }) else { return false };
+        let Some(was_running) = (if really() { cell.gate.quarantine() } else { None }) else { return false };
         registry.quarantined.insert(cell.name);
         let stuck = registry.find(cell.name).ok().map(|slot| {
             let activity = &registry.crew_of(slot).activity;

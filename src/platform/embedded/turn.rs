@@ -13,7 +13,7 @@ use crate::model::{ComponentName, Ident, RunState, Step, TypeName, Value};
 use crate::platform::{Cause, Ended, PlatformEvent};
 use crate::runtime::activity::Activity;
 use crate::runtime::beat::Beat;
-use crate::runtime::cell::Cell;
+use crate::runtime::cell::{Cell, Inside};
 use crate::runtime::{Notice, guard};
 use crate::time::{RecvError, Time, lock};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -267,15 +267,16 @@ impl Inner {
         let mut registry = lock(&self.registry);
         let taken = registry.find(name).and_then(|slot| {
             let cell = registry.entry(slot).cell.clone();
-            if cell.is_quarantined() {
+            if cell.gate.is_quarantined() {
                 return Err(Cause::Quarantined);
             }
             registry.is_unconnected(slot)?;
             let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
-            let mut inside = cell.enter_idle(false, may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
+            let mut inside =
+                Inside::idle(&*cell, false, may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
             let body = inside.take();
             // Nobody enters it again, whoever still knows it.
-            inside.hand_over();
+            inside.close();
             Ok((body, registry.remove(slot)))
         });
         drop(registry);

@@ -21,7 +21,7 @@ impl Registry {
 
     pub(super) fn connect(&mut self, from: MemberRef, to: MemberRef, policy: Policy) -> Result<(), Cause> {
         let (writer, reader) = (self.find(from.component)?, self.find(to.component)?);
-        if [writer, reader].iter().any(|slot| self.entry(*slot).cell.is_quarantined()) {
+        if [writer, reader].iter().any(|slot| self.entry(*slot).cell.gate.is_quarantined()) {
             return Err(Cause::Quarantined);
         }
         let (out_port, out_type) = self.port(writer, from.member)?;
@@ -129,7 +129,7 @@ impl Registry {
     /// A `safe` value is written in quarantine too: it waits for nobody.
     pub(super) fn set_property(&mut self, slot: u32, index: usize, value: &Value, safe: bool) -> Result<(), Cause> {
         let entry = self.entry_mut(slot);
-        if !safe && entry.cell.is_quarantined() {
+        if !safe && entry.cell.gate.is_quarantined() {
             return Err(Cause::Quarantined);
         }
         let name = entry.cell.kind.properties[index];
@@ -184,7 +184,7 @@ impl Registry {
         safe: bool,
     ) -> Result<(), Cause> {
         let entry = self.entry_mut(slot);
-        if !safe && entry.cell.is_quarantined() {
+        if !safe && entry.cell.gate.is_quarantined() {
             return Err(Cause::Quarantined);
         }
         let name = entry.cell.kind.ports[index];

@@ -1,0 +1,103 @@
+//! What does not come any more once stopping has begun: where a deployment declares `safety:`, an ordinary event that somebody
+//! raises from outside is refused then ([`Deployment::stays_open`](crate::model::Deployment::stays_open)). What components
+//! and monitors report comes all the same.
+
+use super::explore::Barred;
+use super::product::Product;
+use super::reactions::triggers;
+use super::state::{Move, State};
+use crate::model::{EventName, Monitor};
+use crate::statechart::EventId;
+
+/// Who may still raise an event from outside while the deployment is being stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Raises {
+    /// Nobody.
+    Nobody,
+    /// A component, if one does: the types of this platform do not say what they raise.
+    Perhaps,
+    /// Somebody from outside, a component or a monitor.
+    Somebody,
+}
+
+impl Product<'_> {
+    /// Who may raise, while it is being stopped, what a move brings from outside.
+    pub(super) fn raises_while_stopping(&self, by: Move) -> Raises {
+        let of = |name: EventName| self.may_raise(name);
+        match by {
+            // One is followed for all that no coordinator tells from it.
+            Move::Event(at) => {
+                let alike = (0..self.outside.len()).filter(|other| self.alike[*other] == usize::from(at));
+                alike.map(|other| of(self.outside[other])).max().unwrap_or(Raises::Nobody)
+            }
+            Move::Confirmed(id) => {
+                let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
+                confirm.map_or(Raises::Somebody, |confirm| of(confirm.event))
+            }
+            _ => Raises::Somebody,
+        }
+    }
+
+    /// Why a move leads no deployment down that is being stopped.
+    pub(super) fn barred(&self, by: Move) -> Option<Barred> {
+        if self.is_first_or_last(by) {
+            return Some(Barred::Again);
+        }
+        match self.raises_while_stopping(by) {
+            Raises::Nobody => return Some(Barred::Closed),
+            Raises::Perhaps => return Some(Barred::Reported),
+            Raises::Somebody => {}
+        }
+        let late = matches!(by, Move::Time(..)) && self.takes(by) >= self.deployment.shutdown.within;
+        late.then_some(Barred::Late)
+    }
+
+    /// Events that would lead on from a state, were they not refused while the deployment is being stopped.
+    pub(super) fn closed_at(&self, state: &State) -> Vec<EventName> {
+        let leads = |(at, _): &(usize, &EventName)| {
+            let by = Move::Event(u16::try_from(*at).unwrap_or(u16::MAX));
+            self.raises_while_stopping(by) == Raises::Nobody
+        };
+        let heard = |(_, name): &(usize, &EventName)| {
+            self.members.iter().zip(&state.leaves).any(|(member, leaf)| {
+                let event = member.chart.event(**name);
+                event != EventId::OTHER && triggers(member.chart, *leaf).0.contains(&event)
+            })
+        };
+        self.outside.iter().enumerate().filter(leads).filter(heard).map(|(_, name)| *name).collect()
+    }
+
+    /// The event that a move brings from outside; empty: it brings none.
+    pub(super) fn named(&self, by: Move) -> String {
+        match by {
+            Move::Event(at) => self.outside[usize::from(at)].to_string(),
+            Move::Confirmed(id) => {
+                let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
+                confirm.map(|confirm| confirm.event.to_string()).unwrap_or_default()
+            }
+            _ => String::new(),
+        }
+    }
+
+    fn may_raise(&self, name: EventName) -> Raises {
+        let deployment = self.deployment;
+        let reacts = deployment.reactions.iter().any(|reaction| reaction.raise == name);
+        let faults = name.as_str().ends_with(".faulted");
+        let reported =
+            reacts || faults || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
+        match deployment.stays_open(name.as_str()) || reported {
+            true => Raises::Somebody,
+            // There components raise what `simulated: { reactions }` says, and nothing else.
+            false if deployment.platform.as_str() == "simulated" => Raises::Nobody,
+            false => Raises::Perhaps,
+        }
+    }
+}
+
+/// What to do about an event that is refused while the deployment is being stopped.
+pub fn still_comes(event: &str) -> String {
+    format!(
+        "`{event}` is refused while it is being stopped, since it is not listed under `safety`: let an answer, a time, or what \
+         a component or a monitor reports lead on"
+    )
+}

@@ -1,0 +1,40 @@
+//! A way up or down that is tried with every request answered *ok*, and what is tried.
+
+use super::members::Member;
+use super::state::{Next, State};
+use crate::model::{EventName, Findings};
+use crate::stack::Request;
+use crate::statechart::{EventId, NodeId};
+use std::time::Duration;
+
+/// A way: states with what leads to them.
+pub struct Way {
+    pub from: State,
+    pub moves: Vec<Next>,
+    pub reached: bool,
+    pub refused: Option<(Request, Findings)>,
+    /// No way lasts shorter: so long, and the time events that it waits for. Only where it has less time.
+    pub late: Option<(Duration, Vec<(usize, EventId)>)>,
+}
+
+/// What is tried.
+pub struct Tried {
+    /// The event that it begins with.
+    pub first: EventName,
+    /// The event that does not come on it.
+    pub never: EventName,
+    /// Stopping has begun: not every event comes any more.
+    pub stopping: bool,
+    /// So much time there is.
+    pub within: Duration,
+}
+
+impl Way {
+    /// The state at the end.
+    pub fn end(&self) -> &State {
+        self.moves.last().map_or(&self.from, |next| &next.state)
+    }
+}
+
+/// Which state of a coordinator is the goal.
+pub type Goal = fn(&Member<'_>) -> Option<NodeId>;

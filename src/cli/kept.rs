@@ -1,0 +1,146 @@
+//! What is known of deployments that do not run any more: how they ended, and of those that died how far they were.
+
+use super::exit::Exit;
+use super::log::count;
+use super::output::{Output, Style};
+use crate::session::client::ClientError;
+use crate::session::kept::{self, Life, Story, entries};
+use crate::session::{Ended, Stage};
+use crate::time::Wall;
+use serde_json::{Value as Json, json};
+
+/// What a command answers about a deployment that died.
+#[derive(Debug)]
+pub struct Died {
+    life: Life,
+    story: Story,
+    /// The last that it told, a few entries.
+    last: Vec<Json>,
+}
+
+/// Entries of a dead deployment's log that `davit status` shows.
+const LAST: usize = 3;
+
+impl Died {
+    /// Of a life that ended without a word.
+    pub fn of(life: Life) -> Self {
+        let entries = entries(&life.name).unwrap_or_default();
+        let last = entries[entries.len().saturating_sub(LAST)..].to_vec();
+        Self { story: Story::of(&entries), last, life }
+    }
+
+    /// For programs: what it was when it died, and when.
+    pub fn json(&self) -> Json {
+        let Self { life, story, .. } = self;
+        json!({
+            "name": life.name,
+            "phase": "died",
+            "pid": life.pid,
+            "file": life.file,
+            "began": life.began.to_string(),
+            "seen": life.seen.to_string(),
+            "rebooted": life.rebooted,
+            "was": {
+                "phase": story.phase,
+                "coordinator": story.active(),
+                "outstanding": story.outstanding.values().collect::<Vec<_>>(),
+                "faults": story.faults,
+                "at": story.at,
+            },
+            "log": kept::log_file(&life.name),
+        })
+    }
+
+    /// For people.
+    pub fn print(&self, out: &Output) {
+        let Self { life, story, last } = self;
+        self.print_short(out);
+        out.line(format!("process      {}, since {}: {}", life.pid, life.began, life.file.display()));
+        out.line(format!("it was       {}", story.phase.as_deref().unwrap_or("(not known)")));
+        for active in story.states.values() {
+            let leaf = active.last().map_or("(inactive)", String::as_str);
+            out.line(format!("coordinator  {}", out.paint(Style::Name, leaf)));
+        }
+        if !story.outstanding.is_empty() {
+            let asked: Vec<&str> = story.outstanding.values().map(String::as_str).collect();
+            out.line(format!("waiting for  {}", asked.join(", ")));
+        }
+        for (component, reason) in &story.faults {
+            out.line(format!("{} {component}: {reason}", out.paint(Style::Bad, "fault")));
+        }
+        if !last.is_empty() {
+            out.line(out.paint(Style::Bold, "the last that it told"));
+            last.iter().for_each(|entry| out.text(super::log::line(out, entry, false)));
+        }
+        out.line(out.paint(
+            Style::Dim,
+            format!(
+                "what its components did since is not known: look at the hardware; `davit log {0}` shows all that it told, \
+                 `davit deploy {1}` begins anew",
+                life.name,
+                life.file.display()
+            ),
+        ));
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.life.name
+    }
+
+    /// When it was seen alive last.
+    pub fn seen(&self) -> Wall {
+        self.life.seen
+    }
+
+    /// In one line.
+    pub fn print_short(&self, out: &Output) {
+        let name = out.paint(Style::Bold, self.name());
+        out.line(format!("{name}  {}  {}", out.paint(Style::Bad, "died"), self.when()));
+    }
+
+    /// When, and what is known of why.
+    pub fn when(&self) -> String {
+        let Life { seen, rebooted, .. } = &self.life;
+        let why = if *rebooted { "the machine went down" } else { "killed, or crashed" };
+        format!("{why}; seen alive last at {seen} ({})", seen.ago())
+    }
+}
+
+/// The life that is meant where no deployment could be asked: that of the name, or the last one that there was. None: nothing
+/// is kept, or the reason is another one.
+pub fn meant(error: &ClientError) -> Option<Life> {
+    let life = match error {
+        ClientError::None => kept::lives().into_iter().max_by(|a, b| a.seen.0.total_cmp(&b.seen.0)),
+        ClientError::Unknown { name, .. } => kept::life(name),
+        _ => None,
+    };
+    life.filter(|life| !life.alive)
+}
+
+/// Those that died and were not deployed since.
+pub fn died() -> Vec<Died> {
+    kept::lives().into_iter().filter(Life::died).map(Died::of).collect()
+}
+
+/// What is known of how a deployment ended that does not run, for a sentence behind `no deployment is running`.
+pub fn ended(life: &Life) -> String {
+    let Some(end) = &life.end else { return format!("`{}` died: `davit status {0}` tells of it", life.name) };
+    let how = match (&end.ended, &end.why) {
+        (_, Some(why)) => why.clone(),
+        (Some(ended), None) => how(ended),
+        (None, None) => "stopped".to_owned(),
+    };
+    format!("`{}` ended at {} ({}): {how}; `davit log {0}` shows its log", life.name, end.at, end.at.ago())
+}
+
+fn how(ended: &Ended) -> String {
+    match ended.stage {
+        _ if !ended.is_clean() => format!("{} left", count(ended.left.len(), "thing")),
+        Stage::Led => "down".to_owned(),
+        stage => format!("down {}", stage.words()),
+    }
+}
+
+/// How `davit status` ends where a deployment died: it was not shut down.
+pub const EXIT: Exit = Exit::Forced;

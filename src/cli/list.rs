@@ -1,0 +1,135 @@
+//! `davit list`: the deployments of this user, one line each.
+
+use super::exit::Exit;
+use super::kept::{self, Died};
+use super::output::{Output, Style, Table};
+use super::remote::ASK;
+use super::status::{state_style, text};
+use super::{Answer, Context, Failure, Run};
+use crate::model::codes::CLI_NOTHING_KEPT;
+use crate::session::client::Client;
+use crate::session::kept::{Life, forget, life};
+use crate::session::{owner, place};
+use serde_json::{Value as Json, json};
+use std::collections::BTreeSet;
+
+/// List the running deployments of this user, and those that died without being shut down.
+///
+/// One that died is listed until its name is deployed again, or until it is forgotten.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Throw away what is kept of a deployment that does not run any more: its log, and that it died.
+    #[arg(long, value_name = "NAME", conflicts_with = "json")]
+    forget: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        if let Some(name) = self.forget {
+            return if forget(&name) {
+                Ok(Exit::Done)
+            } else {
+                Err(Failure::no(
+                    CLI_NOTHING_KEPT,
+                    format!("nothing of a deployment `{name}` that does not run any more is kept"),
+                    "`davit list` shows what runs, and what died",
+                ))
+            };
+        }
+        let overview = Overview::look();
+        overview.show(&context.out, self.json);
+        Ok(Exit::Done)
+    }
+}
+
+/// All deployments of this user.
+pub struct Overview {
+    running: Vec<Json>,
+    died: Vec<Died>,
+}
+
+impl Overview {
+    /// Asks all that run, at the same time: one that does not answer keeps nobody else waiting.
+    pub fn look() -> Self {
+        let mut names: BTreeSet<String> = owner::owned().into_iter().collect();
+        if place::is_there().is_ok_and(|there| there) {
+            names.extend(place::running());
+        }
+        let running: Vec<Json> = std::thread::scope(|scope| {
+            let asked: Vec<_> = names.iter().map(|name| scope.spawn(move || about(name))).collect();
+            asked.into_iter().filter_map(|asked| asked.join().ok()).collect()
+        });
+        let died = kept::died().into_iter().filter(|died| !names.contains(died.name())).collect();
+        Self { running, died }
+    }
+
+    /// As text or JSON.
+    pub fn show(&self, out: &Output, json: bool) {
+        if json {
+            out.json(&self.running.iter().cloned().chain(self.died.iter().map(Died::json)).collect::<Vec<_>>());
+            return;
+        }
+        if self.running.is_empty() && self.died.is_empty() {
+            out.line("no deployment is running");
+        }
+        let mut table = Table::new(0);
+        for one in &self.running {
+            let phase = one["phase"].as_str().unwrap_or("no answer");
+            let states = one["coordinator"].as_array().into_iter().flatten().map(text).collect::<Vec<_>>().join(", ");
+            let faults = one["faults"].as_u64().filter(|faults| *faults > 0);
+            table.row([
+                out.paint(Style::Bold, text(&one["name"])),
+                out.paint(state_style(phase), phase),
+                if one["why"].is_null() { out.paint(Style::Name, states) } else { text(&one["why"]).to_owned() },
+                faults.map_or_else(String::new, |faults| {
+                    out.paint(Style::Bad, super::log::count(usize::try_from(faults).unwrap_or(usize::MAX), "fault"))
+                }),
+                one["pid"].as_u64().map_or_else(String::new, |pid| format!("process {pid}")),
+                one["began"].as_str().map_or_else(String::new, |began| out.paint(Style::Dim, format!("since {began}"))),
+            ]);
+        }
+        out.text(table.to_string());
+        for died in &self.died {
+            died.print_short(out);
+        }
+    }
+
+    /// How `davit status` ends that has shown it.
+    pub fn exit(&self) -> Exit {
+        if self.running.iter().any(|one| one["phase"] == "broken") {
+            Exit::Broken
+        } else if !self.died.is_empty() {
+            kept::EXIT
+        } else if self.running.iter().any(|one| one["phase"].is_null()) {
+            Exit::No
+        } else {
+            Exit::Done
+        }
+    }
+}
+
+/// One that runs, as `davit list --json` has it.
+fn about(name: &str) -> Json {
+    let mut one = match Client::connect(Some(name)).and_then(|mut client| client.call("status", &json!({}), ASK)) {
+        Err(why) => json!({ "name": name, "phase": null, "why": why.to_string() }),
+        Ok(status) => {
+            let leaves = status["coordinators"].as_object().into_iter().flatten();
+            let leaves = leaves.filter_map(|(_, states)| states.as_array()?.last().cloned());
+            let length = |key: &str| status[key].as_array().map_or(0, Vec::len);
+            json!({
+                "name": name, "phase": status["phase"], "coordinator": leaves.collect::<Vec<_>>(), "at": status["at"],
+                "frames": length("stack"), "faults": length("faults"), "residual": length("residual"),
+            })
+        }
+    };
+    // Of a process that could not keep anything, or keeps it elsewhere, this is not known.
+    if let Some(Life { pid, began, file, alive: true, .. }) = life(name) {
+        one["pid"] = json!(pid);
+        one["began"] = json!(began.to_string());
+        one["file"] = json!(file);
+    }
+    one
+}

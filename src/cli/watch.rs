@@ -1,0 +1,227 @@
+//! `davit watch`: a running deployment as it changes.
+//!
+//! It asks again and again, as any client may: whatever becomes of this terminal (Ctrl-S, a pipe that nobody reads) is nothing
+//! to the deployment.
+
+use super::exit::Exit;
+use super::kept::{self, Died};
+use super::log::{count, duration};
+use super::output::{self, Output, Style, Table};
+use super::remote::{ASK, connect, failure, seconds};
+use super::status::{state_style, text};
+use super::{Answer, Context, Run};
+use crate::session::kept::Life;
+use crate::session::owner;
+use crate::time::Clock;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::{Value as Json, json};
+use std::time::Duration;
+
+/// How long a look waits for what monitors say.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+/// Watch a running deployment: its phase, the coordinators' states, the stack, components, monitors (enabled, verdict, and how far
+/// they are from changing) and activities.
+///
+/// On a terminal it is drawn anew again and again; elsewhere it is a line a look, with `--json` one object a line. Ctrl-C ends it, and
+/// so does the end of the deployment. Exit status: 0; 1 the deployment does not answer any more; 4 it died.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The running deployment's name; not needed while only one runs.
+    name: Option<String>,
+    /// How often to look, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.5, value_parser = seconds)]
+    every: f64,
+    /// End after so many looks.
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    /// Print JSON: one object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run for Args {
+    fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.show(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn show(self, context: &Context) -> Answer {
+        let out = &context.out;
+        let mut client = connect(self.name.as_deref())?;
+        let name = client.name().to_owned();
+        let screen = (!self.json && output::is_terminal()).then(Screen::new);
+        let clock = Clock::real();
+        let mut looks = 0;
+        loop {
+            let look = match client.call("look", &json!({ "within_s": PATIENCE.as_secs_f64() }), PATIENCE + ASK) {
+                Ok(look) => look,
+                Err(error) => {
+                    drop(screen);
+                    client.wait_until_free();
+                    return if owner::is_owned(&name) { Err(failure(error)) } else { Ok(self.over(out, &name)) };
+                }
+            };
+            match &screen {
+                _ if self.json => out.json_line(&look),
+                Some(screen) => screen.draw(drawn(out, &look)),
+                None => out.line(line(out, &look)),
+            }
+            looks += 1;
+            if self.count.is_some_and(|count| looks >= count) || output::reader_is_gone() {
+                return Ok(Exit::Done);
+            }
+            clock.sleep(Duration::from_secs_f64(self.every));
+        }
+    }
+
+    /// It does not run any more.
+    fn over(&self, out: &Output, name: &str) -> Exit {
+        let life = crate::session::kept::life(name);
+        let (exit, end) = match life.clone().filter(Life::died).map(Died::of) {
+            Some(died) if self.json => (kept::EXIT, died.json()),
+            Some(died) => {
+                died.print_short(out);
+                return kept::EXIT;
+            }
+            None => (Exit::Done, json!({ "name": name, "phase": "down" })),
+        };
+        if self.json {
+            out.json_line(&end);
+        } else {
+            out.line(
+                life.filter(|life| life.end.is_some()).map_or(format!("`{name}` ended"), |life| kept::ended(&life)),
+            );
+        }
+        exit
+    }
+}
+
+/// What is drawn anew.
+struct Screen(ProgressBar);
+
+impl Screen {
+    fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());
+        bar.set_style(ProgressStyle::with_template("{msg}").expect("a valid template"));
+        Self(bar)
+    }
+
+    fn draw(&self, text: String) {
+        self.0.set_message(text);
+    }
+}
+
+impl Drop for Screen {
+    /// What was seen last stays.
+    fn drop(&mut self) {
+        self.0.abandon();
+    }
+}
+
+/// The innermost active states of all coordinators.
+fn leaves(status: &Json) -> String {
+    let all = status["coordinators"].as_object().into_iter().flatten();
+    let leaf = |(_, states): (&String, &Json)| Some(states.as_array()?.last()?.as_str()?.to_owned());
+    all.filter_map(leaf).collect::<Vec<_>>().join(", ")
+}
+
+fn verdict(out: &Output, monitor: &Json) -> String {
+    match (monitor["enabled"] == true, monitor["verdict"].as_bool()) {
+        (false, _) => out.paint(Style::Dim, "off"),
+        (true, None) => out.paint(Style::Dim, "not heard of"),
+        (true, Some(true)) => out.paint(Style::Care, "true"),
+        (true, Some(false)) => "false".to_owned(),
+    }
+}
+
+fn margin(monitor: &Json) -> String {
+    monitor["robustness"].as_f64().map_or_else(String::new, |margin| format!("{margin:+.4}"))
+}
+
+/// A look in one line.
+fn line(out: &Output, look: &Json) -> String {
+    let status = &look["status"];
+    let phase = text(&status["phase"]);
+    let frames = status["stack"].as_array().map_or(0, Vec::len);
+    let mut parts = vec![
+        format!("{:>12.3} s", status["at"].as_f64().unwrap_or_default()),
+        out.paint(state_style(phase), phase),
+        out.paint(Style::Name, leaves(status)),
+        count(frames, "frame"),
+    ];
+    let monitors = look["monitors"].as_array().into_iter().flatten();
+    parts.extend(
+        monitors.map(|it| format!("{}: {} {}", text(&it["name"]), verdict(out, it), margin(it)).trim_end().to_owned()),
+    );
+    let faults = status["faults"].as_array().into_iter().flatten();
+    parts.extend(
+        faults.map(|it| out.paint(Style::Bad, format!("fault {}: {}", text(&it["component"]), text(&it["reason"])))),
+    );
+    parts.join("  ")
+}
+
+/// A look as a page.
+fn drawn(out: &Output, look: &Json) -> String {
+    let status = &look["status"];
+    let list = |key: &str| look[key].as_array().cloned().unwrap_or_default();
+    let phase = text(&status["phase"]);
+    let mut page = format!(
+        "{}  {}  {:.3} s\ncoordinator  {}\n",
+        out.paint(Style::Bold, text(&status["name"])),
+        out.paint(state_style(phase), phase),
+        status["at"].as_f64().unwrap_or_default(),
+        out.paint(Style::Name, leaves(status)),
+    );
+    let waiting: Vec<&str> = status["outstanding"].as_array().into_iter().flatten().map(text).collect();
+    if !waiting.is_empty() {
+        page += &format!("waiting for  {}\n", waiting.join(", "));
+    }
+    let frames: Vec<String> =
+        status["stack"].as_array().into_iter().flatten().map(|frame| framed(out, frame)).collect();
+    page += &format!("stack        {}\n", if frames.is_empty() { "empty".to_owned() } else { frames.join(", ") });
+    for fault in status["faults"].as_array().into_iter().flatten() {
+        let word = out.paint(Style::Bad, "fault");
+        page += &format!("{word}        {}: {}\n", text(&fault["component"]), text(&fault["reason"]));
+    }
+    let mut components = Table::new(2);
+    for (name, component) in status["system"]["components"].as_object().into_iter().flatten() {
+        let state = text(&component["state"]);
+        components.row([
+            out.paint(state_style(state), state),
+            name.clone(),
+            out.paint(Style::Dim, text(&component["type"])),
+        ]);
+    }
+    let mut monitors = Table::new(2);
+    for monitor in list("monitors") {
+        monitors.row([verdict(out, &monitor), text(&monitor["name"]).to_owned(), margin(&monitor)]);
+    }
+    let mut activities = Table::new(2);
+    for activity in list("activities") {
+        let us = |key: &str| duration(activity[key].as_f64().unwrap_or_default() * 1e6);
+        let overruns = activity["overruns"].as_u64().unwrap_or_default();
+        activities.row([
+            text(&activity["name"]).to_owned(),
+            format!("{} rounds", activity["cycles"]),
+            out.paint(if overruns > 0 { Style::Care } else { Style::Dim }, format!("{overruns} missed")),
+            format!("late {} (at most {})", us("latency_last_s"), us("latency_max_s")),
+            format!("takes {} (at most {})", us("duration_last_s"), us("duration_max_s")),
+        ]);
+    }
+    for (title, table) in [("components", components), ("monitors", monitors), ("activities", activities)] {
+        if !table.is_empty() {
+            page += &format!("{}\n{table}", out.paint(Style::Bold, title));
+        }
+    }
+    page.trim_end().to_owned()
+}
+
+/// A frame, with what is wrong with it.
+fn framed(out: &Output, frame: &Json) -> String {
+    let name = text(&frame["configuration"]);
+    let marks: Vec<&str> = ["partial", "lost"].into_iter().filter(|mark| frame[*mark] == true).collect();
+    if marks.is_empty() { name.to_owned() } else { format!("{name} ({})", out.paint(Style::Bad, marks.join(", "))) }
+}

@@ -1,0 +1,2 @@
+mod latest;
+mod links;

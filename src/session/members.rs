@@ -1,0 +1,250 @@
+//! One property or port of a running deployment: what it is worth, and an operator's change of it.
+
+use super::Session;
+use crate::limits;
+use crate::model::finding::did_you_mean;
+use crate::model::monitor::{Part, PortSignal};
+use crate::model::{
+    Ask, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef,
+    OperatorMay, Origin, RequestId, Value, ValueType,
+};
+use crate::monitor::{Input, Sample};
+use crate::time::lock;
+use serde::Serialize;
+use serde_json::Value as Json;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What a member is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A property.
+    Property,
+    /// An in-port.
+    In,
+    /// An out-port.
+    Out,
+}
+
+/// What `davit get --json` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MemberView {
+    /// Which: `Component.member`.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: String,
+    /// The unit, if its type states one.
+    pub unit: Option<Arc<str>>,
+    /// The value; none: there is none, or it cannot be shown, as `why` says.
+    pub value: Option<Json>,
+    /// When that was: of what a component sends when it was sent, else when it was read; in seconds of the deployment's clock.
+    pub at: Option<f64>,
+    /// Why there is no value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+    /// The out-ports that drive it, where it is an in-port.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub driven_by: Vec<String>,
+}
+
+/// Why a member could not be read or set: one sentence, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct NoMember {
+    /// What is wrong.
+    pub message: String,
+    /// What to do.
+    pub help: String,
+}
+
+fn no(message: impl Into<String>, help: impl Into<String>) -> NoMember {
+    NoMember { message: message.into(), help: help.into() }
+}
+
+/// A member that is there.
+struct Found {
+    member: MemberRef,
+    kind: Kind,
+    ty: ValueType,
+    unit: Option<Arc<str>>,
+}
+
+impl Session {
+    /// What a property or port is worth now. Of what a component sends, within that (real) time.
+    ///
+    /// # Errors
+    /// When there is none of that name, or the platform cannot be read.
+    pub fn get(&self, name: &str, within: Duration) -> Result<MemberView, NoMember> {
+        let Found { member, kind, ty, unit } = self.member(name)?;
+        let busy = |why: String| no(why, "something may keep it busy: `davit status` shows it");
+        let seen = self.platform().observe_some(&[member.component], self.clock().now() + limits::VIEW);
+        let seen = seen.map_err(|why| busy(why.to_string()))?;
+        let now = self.clock().now().as_secs_f64();
+        let driven_by: Vec<MemberRef> =
+            seen.connections.keys().filter(|(_, to)| *to == member).map(|(from, _)| *from).collect();
+        let json = |value: &Value| serde_json::to_value(value).expect("values are plain data");
+        let (value, at, why) = match kind {
+            Kind::Property => {
+                let value = seen.components.get(&member.component).and_then(|c| c.properties.get(&member.member));
+                (value.map(json), Some(now), value.is_none().then(|| "it is not there any more".to_owned()))
+            }
+            Kind::In if driven_by.is_empty() => {
+                let value = seen.ports.get(&member);
+                (value.map(json), value.map(|_| now), value.is_none().then(|| "it was never written".to_owned()))
+            }
+            Kind::In | Kind::Out => match self.sample(member, &ty, within) {
+                Ok((value, at)) => (Some(value), Some(at), None),
+                Err(why) => (None, None, Some(why)),
+            },
+        };
+        let driven_by = driven_by.iter().map(ToString::to_string).collect();
+        Ok(MemberView { name: member.to_string(), kind, ty: ty.to_string(), unit, value, at, why, driven_by })
+    }
+
+    /// Asks, in the name of an operator, for a frame of one change: that a property or port is worth this. `force`: also where
+    /// the deployment's `operator:` does not list it.
+    ///
+    /// # Errors
+    /// When there is nothing of that name that can be set to this.
+    pub fn set(&self, line: u32, name: &str, value: &Json, force: bool) -> Result<RequestId, NoMember> {
+        let Found { member, kind, ty, .. } = self.member(name)?;
+        let wanted = |why: String| no(format!("`{member}` is a {ty}: {why}"), format!("give a value of the type {ty}"));
+        let value = value_of(value).map_err(wanted)?.fit(&ty).map_err(|why| wanted(why.to_string()))?;
+        let change = match kind {
+            Kind::Property => ChangeKind::PropertySet { property: member, value },
+            Kind::In => ChangeKind::PortWrite { port: member, value },
+            Kind::Out => {
+                return Err(no(
+                    format!("`{member}` is an out-port: its component alone sends on it"),
+                    "an operator can set properties, and write in-ports that nothing drives",
+                ));
+            }
+        };
+        let id = ConfigId::setting(member);
+        let change = Change { kind: change, origin: Origin::NONE };
+        let configuration = Configuration { changes: vec![change], ..Configuration::new(id) };
+        let listed = self.deployment().operator.iter().any(|(may, _)| *may == OperatorMay::Set(member));
+        // One at a time: what is asked for and has not begun must not become another value.
+        let mut set = lock(self.settings());
+        if self.hub().is_outstanding(Ask::Apply(id)) {
+            return Err(no(format!("`{member}` is being set already"), "wait for the answer to that"));
+        }
+        if !self.configurator().define(configuration, listed, self.clock().now() + limits::VIEW) {
+            return Err(no("the configurator does not answer", "something may keep it busy: `davit status` shows it"));
+        }
+        set.insert(id);
+        Ok(self.request_on(line, Ask::Apply(id), "operator", force))
+    }
+
+    /// The one of that name that an operator has set.
+    pub(super) fn setting(&self, name: &str) -> Option<ConfigId> {
+        lock(self.settings()).iter().find(|id| id.as_str() == name).copied()
+    }
+
+    /// Of a component that is there.
+    fn member(&self, name: &str) -> Result<Found, NoMember> {
+        // Asked before it becomes a name: names are kept for ever.
+        let (of, member) = name
+            .split_once('.')
+            .ok_or_else(|| no(format!("`{name}` names no property or port"), "it is written `Component.member`"))?;
+        let system = self.system();
+        let component = system.components.iter().find(|(known, _)| known.as_str() == of);
+        let (component, ty) = component
+            .and_then(|(known, it)| Some((*known, self.platform().catalogue().get(it.ty)?)))
+            .ok_or_else(|| {
+                let known = system.components.keys().map(ComponentName::as_str);
+                no(format!("there is no component `{of}`"), did_you_mean(of, "components", known))
+            })?;
+        if let Some((known, property)) = ty.properties.iter().find(|(known, _)| known.as_str() == member) {
+            let (ty, unit) = (property.ty.clone(), property.unit.clone());
+            return Ok(Found { member: component.member(*known), kind: Kind::Property, ty, unit });
+        }
+        let port = ty.ports.iter().find(|(known, _)| known.as_str() == member);
+        let (known, port) = port.ok_or_else(|| unknown(component, member, ty))?;
+        let kind = if port.direction == Direction::In { Kind::In } else { Kind::Out };
+        Ok(Found { member: component.member(*known), kind, ty: port.ty.clone(), unit: port.unit.clone() })
+    }
+
+    /// The next that goes through a port.
+    fn sample(&self, member: MemberRef, ty: &ValueType, within: Duration) -> Result<(Json, f64), String> {
+        let unseen = || format!("what goes through a port of the type {ty} is not shown");
+        let parts = parts(ty).filter(|parts| parts.len() <= limits::GET_PARTS).ok_or_else(unseen)?;
+        let inputs: Vec<Input> = parts.into_iter().map(|path| Input::Port(PortSignal { member, path })).collect();
+        let samples = self.samples(&inputs, within).ok_or("this platform does not show what goes through ports")?;
+        if !samples.iter().all(|sample| sample.present) {
+            return Err(format!("nothing went through it in {} s", within.as_secs_f64()));
+        }
+        let at = samples.iter().map(|sample| sample.at).max().unwrap_or_default().as_secs_f64();
+        Ok((assembled(ty, &mut samples.iter()), at))
+    }
+}
+
+fn unknown(component: ComponentName, member: &str, ty: &ComponentType) -> NoMember {
+    let known = ty.properties.keys().chain(ty.ports.keys()).map(Ident::as_str);
+    no(format!("`{component}` has no property or port `{member}`"), did_you_mean(member, "properties and ports", known))
+}
+
+/// The ways to all numbers in a value of a type; none: there may be anything in it.
+fn parts(ty: &ValueType) -> Option<Vec<Vec<Part>>> {
+    let below = |step: Part, ty: &ValueType| -> Option<Vec<Vec<Part>>> {
+        let under = |path: Vec<Part>| std::iter::once(step).chain(path).collect();
+        Some(parts(ty)?.into_iter().map(under).collect())
+    };
+    match ty {
+        ValueType::Bool | ValueType::Int | ValueType::Float => Some(vec![Vec::new()]),
+        ValueType::Array(element, Some(length)) if *length <= limits::GET_PARTS => {
+            let each = (0..*length).map(|at| below(Part::Index(at), element)).collect::<Option<Vec<_>>>()?;
+            Some(each.concat())
+        }
+        ValueType::Record(fields) => {
+            let each = fields.iter().map(|(name, ty)| below(Part::Field(*name), ty)).collect::<Option<Vec<_>>>()?;
+            Some(each.concat())
+        }
+        _ => None,
+    }
+}
+
+/// The value of that type whose numbers these are.
+fn assembled<'a>(ty: &ValueType, numbers: &mut impl Iterator<Item = &'a Sample>) -> Json {
+    match ty {
+        ValueType::Array(element, length) => {
+            (0..length.unwrap_or_default()).map(|_| assembled(element, numbers)).collect()
+        }
+        ValueType::Record(fields) => {
+            fields.iter().map(|(name, ty)| (name.to_string(), assembled(ty, numbers))).collect()
+        }
+        _ => {
+            let number = numbers.next().map_or(f64::NAN, |sample| sample.value);
+            match ty {
+                ValueType::Bool => (number != 0.0).into(),
+                #[allow(clippy::cast_possible_truncation)]
+                ValueType::Int => (number as i64).into(),
+                _ => number.into(),
+            }
+        }
+    }
+}
+
+/// A value as JSON has it.
+fn value_of(json: &Json) -> Result<Value, String> {
+    Ok(match json {
+        Json::Null => return Err("null is no value".to_owned()),
+        Json::Bool(is) => Value::Bool(*is),
+        Json::Number(number) => match number.as_i64() {
+            Some(whole) => Value::Int(whole),
+            None => Value::Float(number.as_f64().ok_or_else(|| format!("{number} is no number that can be kept"))?),
+        },
+        Json::String(text) => Value::str(text),
+        Json::Array(elements) => Value::Array(elements.iter().map(value_of).collect::<Result<_, _>>()?),
+        Json::Object(fields) => {
+            let field = |(name, value): (&String, &Json)| {
+                Ok((Ident::new(name).map_err(|why| why.to_string())?, value_of(value)?))
+            };
+            Value::Record(fields.iter().map(field).collect::<Result<_, String>>()?)
+        }
+    })
+}

@@ -1,0 +1,103 @@
+//! What a coordinator that leads down takes along: frames of operators that stand in the way of what it undoes (design §6).
+//!
+//! An operator may have put something on top of what a coordinator has applied; while everything is being stopped nobody is
+//! there who would take that away again. So it goes first, newest first, in one transaction with the undo that was asked for:
+//! both or none. What is `safe`, and what would move, is nobody's to take along.
+
+use super::request::{Batch, Request, Requester, Why};
+use super::share::{self, Hindrance};
+use super::{Frame, FrameId, Inverse, Stack, World};
+use crate::model::Finding;
+use crate::system::{View, step};
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// Whether an undo takes along what stands in its way, while everything is led down.
+fn takes_along(request: &Request) -> bool {
+    request.why == Why::Asked && request.ask.is_undo() && matches!(request.requester, Requester::Coordinator(_))
+}
+
+impl Stack {
+    /// Whether a batch may come to undo frames that its text does not name, while everything is led down: then it goes alone.
+    pub fn goes_alone(&self, batch: &Batch) -> bool {
+        let theirs = |frame: &Arc<Frame>| frame.requester == Requester::Operator;
+        batch.requests.iter().any(takes_along) && self.frames.iter().any(theirs)
+    }
+}
+
+/// The frames that the undo of `id`, asked for by `request`, takes along, in the order in which they go; none where it needs
+/// none. `frames` are those that there are then. `repaired`: what is broken is mended before.
+///
+/// # Errors
+/// What stands in its way and stays, in words: of a frame of an operator also why it does.
+pub(super) fn along(
+    world: &World,
+    frames: &[Arc<Frame>],
+    request: &Request,
+    id: FrameId,
+    repaired: bool,
+) -> Result<SmallVec<[FrameId; 2]>, Box<Finding>> {
+    let mut along: SmallVec<[FrameId; 2]> = SmallVec::new();
+    if !takes_along(request) {
+        return Ok(along);
+    }
+    let mut first: Option<Finding> = None;
+    let mut open: SmallVec<[FrameId; 4]> = SmallVec::from_iter([id]);
+    while let Some(next) = open.pop() {
+        // As it will be when those are gone.
+        let there = |frame: &&Arc<Frame>| frame.id == next || !along.contains(&frame.id);
+        let rest: Vec<Arc<Frame>> = frames.iter().filter(there).cloned().collect();
+        let Some(at) = rest.iter().position(|frame| frame.id == next) else { continue };
+        let Err(hindrance) = share::look(&rest, at) else { continue };
+        let Hindrance { by, finding } = *hindrance;
+        let frame = rest.iter().find(|frame| Some(frame.id) == by);
+        let why = match frame.map(|frame| stays(world, frame, repaired)) {
+            Some(None) => None,
+            Some(Some(why)) => Some(why),
+            None => Some(None),
+        };
+        if let Some(why) = why {
+            let of = first.unwrap_or_else(|| finding.clone());
+            let why = why.or_else(|| (next != id).then_some(finding.message));
+            let told = why.map(|why| format!("{}; that is not undone with it: {why}", of.message));
+            return Err(Box::new(Finding { message: told.unwrap_or_else(|| of.message.clone()), ..of }));
+        }
+        let Some(frame) = frame else { continue };
+        first.get_or_insert(finding);
+        along.push(frame.id);
+        open.extend([next, frame.id]);
+    }
+    // Newest first.
+    let place = |id: &FrameId| frames.iter().position(|frame| frame.id == *id);
+    along.sort_by_key(|id| std::cmp::Reverse(place(id)));
+    Ok(along)
+}
+
+/// Whether a frame is not taken along, and why, where it could be thought to be.
+fn stays(world: &World, frame: &Frame, repaired: bool) -> Option<Option<String>> {
+    if frame.requester != Requester::Operator {
+        return Some(None);
+    }
+    if frame.safe {
+        return Some(Some("it is a safe configuration, and people let it go".to_owned()));
+    }
+    if let Some(step) = moving(frame, &world.system) {
+        return Some(Some(format!("`{step}` moves, and nobody asked for that")));
+    }
+    let mut components = share::components(&frame.footprint).into_iter();
+    let broken = world.broken_at(&mut components).filter(|_| !repaired)?;
+    Some(Some(format!("what it is about is broken: {}", broken.residual.cause)))
+}
+
+/// What moves when a frame is undone.
+fn moving(frame: &Frame, view: &impl View) -> Option<String> {
+    match &frame.inverse {
+        Inverse::Steps(steps) => {
+            let back = steps.iter().rev().filter(|planned| planned.undo_moves);
+            back.flat_map(|planned| planned.undo.steps()).map(ToString::to_string).next()
+        }
+        Inverse::List(items) => {
+            items.iter().find(|item| step::moves(&item.step, view)).map(|item| item.step.to_string())
+        }
+    }
+}

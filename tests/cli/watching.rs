@@ -1,0 +1,134 @@
+//! `davit watch`: drawn anew on a terminal, lines elsewhere; whatever becomes of it, the deployment goes on.
+
+use crate::demo::Demo;
+use crate::foreground::{Foreground, read_until, terminal};
+use crate::kept::{deploy, kill};
+use std::io::{BufRead, BufReader, Write};
+use std::process::Stdio;
+
+/// Takes the deployment down whatever the test found.
+struct Deployed(Demo);
+
+impl Drop for Deployed {
+    fn drop(&mut self) {
+        let _ = self.0.command(&["shutdown", "--force"]).output();
+    }
+}
+
+const CONFIGURATIONS: &str = "ConfiguratorConf {
+  create_all = Configuration { create('source', 'standard.Constant', { activity = 'control', properties = { value = 2.5 } }),
+                               create('watcher', 'davit.Monitors', { activity = 'control' }) },
+  connect_all = Configuration {},
+  start_all = Configuration { post_conf_state = { 'source:running', 'watcher:running' } },
+  slow = Configuration { property_set('source.value', 2.5) },
+  fast = Configuration { property_set('source.value', 7.0), property_set('watcher.low', true) },
+}
+";
+
+const MONITORS: &str = "monitors:
+  high: { when: { above: [source.y, 4] }, event: e_high }
+  low: { when: { below: [source.y, 1] }, event: e_low, enabled: false }
+";
+
+/// With components that run, and monitors.
+fn live() -> Deployed {
+    let demo = Demo::new();
+    let text = demo.read("deployment.yaml").replace("platform: simulated", "platform: embedded\nlibraries: [standard]");
+    let types = text.find("types:").unwrap()..text.find("activities:").unwrap();
+    demo.write(
+        "deployment.yaml",
+        &format!("{}{}monitors: [monitors.yaml]\n", &text[..types.start], &text[types.end..]),
+    );
+    demo.write("configurations.lua", CONFIGURATIONS);
+    demo.write("monitors.yaml", MONITORS);
+    deploy(&demo, "deployment.yaml");
+    Deployed(demo)
+}
+
+#[test]
+fn monitors_are_shown_with_what_they_say() {
+    let deployed = live();
+    let run = |args: &[&str]| deployed.0.run(args);
+    // As often as it takes: the machine may be busy.
+    let look = |wanted: &dyn Fn(&serde_json::Value) -> bool| {
+        crate::foreground::until("monitors say something", || {
+            let ran = run(&["watch", "--json", "--count", "1"]);
+            assert_eq!((ran.code, ran.out.lines().count()), (0, 1), "{}{}", ran.out, ran.err);
+            Some(ran.json()).filter(wanted)
+        })
+    };
+    let seen = look(&|seen| seen["monitors"][0]["verdict"].is_boolean());
+    let [high, low] = &seen["monitors"].as_array().expect("monitors")[..] else { panic!("{seen}") };
+    assert_eq!(
+        (&high["name"], &high["enabled"], &high["verdict"]),
+        (&"high".into(), &true.into(), &false.into()),
+        "{seen}"
+    );
+    assert_eq!(high["robustness"], -1.5, "{seen}");
+    assert_eq!((&low["enabled"], &low["verdict"]), (&false.into(), &serde_json::Value::Null), "{seen}");
+    assert_eq!(seen["status"]["phase"], "up");
+    assert_eq!(seen["activities"][0]["name"], "control", "{seen}");
+    assert_eq!(run(&["event", "e_fast", "--wait", "fast.ok"]).code, 0);
+    let seen = look(&|seen| seen["monitors"][0]["verdict"] == true && seen["monitors"][1]["verdict"].is_boolean());
+    assert_eq!((&seen["monitors"][0]["robustness"], &seen["monitors"][1]["robustness"]), (&3.0.into(), &(-6.0).into()));
+
+    let lines = run(&["watch", "--count", "2", "--every", "0"]);
+    assert_eq!(lines.out.lines().count(), 2, "{}", lines.out);
+    for line in lines.out.lines() {
+        for words in ["up", "root.operational.fast_mode", "4 frames", "high: true +3.0000"] {
+            assert!(line.contains(words), "{words}: {line}");
+        }
+    }
+}
+
+#[test]
+fn a_terminal_that_is_stopped_is_nothing_to_the_deployment() {
+    let deployed = live();
+    let demo = &deployed.0;
+    let (mut person, program) = terminal();
+    let mut command = demo.command(&["watch", "--every", "0.05", "--color", "never"]);
+    command.env("TERM", "xterm").stdout(Stdio::from(program.try_clone().unwrap())).stderr(Stdio::null());
+    let watch = Foreground::start(&mut command);
+    drop(command);
+    let seen = read_until(&mut person, "missed");
+    for words in ["demo  up", "root.operational.slow_mode", "stack        create_all", "source", "high", "control"] {
+        assert!(seen.contains(words), "{words}: {seen}");
+    }
+    // It is drawn anew, where it was: lines are cleared for that.
+    let again = read_until(&mut person, "\x1b[2K");
+    assert!(again.contains("\x1b[2K"), "{again}");
+    // Ctrl-S.
+    person.write_all(b"\x13").unwrap();
+    let fast = demo.run(&["event", "e_fast", "--wait", "fast.ok", "--within", "60"]);
+    assert_eq!(fast.code, 0, "the coordinator reacts: {}{}", fast.out, fast.err);
+    // Ctrl-Q; and a signal ends it, and nothing else. (Not Ctrl-C: what a shell has started in the background does not hear it.)
+    person.write_all(b"\x11").unwrap();
+    assert!(read_until(&mut person, "root.operational.fast_mode").contains("fast_mode"));
+    watch.signal(libc::SIGTERM);
+    assert!(!watch.end().success());
+    assert_eq!(demo.run(&["status", "--json"]).json()["phase"], "up");
+}
+
+#[test]
+fn it_ends_with_the_deployment_and_says_how_that_was() {
+    for killed in [false, true] {
+        let deployed = Deployed(Demo::new());
+        let demo = &deployed.0;
+        deploy(demo, "deployment.yaml");
+        let mut command = demo.command(&["watch", "--every", "0.05"]);
+        let (read, write) = std::io::pipe().expect("a pipe");
+        let watch = Foreground::start(command.stdout(write).stderr(Stdio::null()));
+        drop(command);
+        let mut lines = BufReader::new(read).lines();
+        assert!(lines.next().expect("a line").unwrap().contains("up  root.operational.slow_mode"));
+        if killed {
+            kill(demo, "demo");
+        } else {
+            assert_eq!(demo.run(&["shutdown"]).code, 0);
+        }
+        assert_eq!(watch.end().code(), Some(if killed { 4 } else { 0 }));
+        let last = lines.last().expect("a last line").unwrap();
+        let said = if killed { "demo  died  killed, or crashed" } else { "`demo` ended at 2" };
+        assert!(last.contains(said), "{last}");
+    }
+}
