@@ -5,7 +5,7 @@ use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
-use crate::stack::{Arrival, Batch, Request, Requester, Turn, Why, given_up_of};
+use crate::stack::{Arrival, Arrived, Batch, Request, Requester, Turn, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -187,37 +187,42 @@ impl Product<'_> {
         let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
         // What has begun was planned as it was asked for.
         begun.into_iter().for_each(|(number, requests)| state.desk.begun_as(number, &requests));
-        for (request, verdict, _) in &arrival.told {
-            self.owed(&mut state, request);
-            if *verdict == Verdict::UndoFailed {
-                state.stayed = true;
-                let left = self.frames_left(&state);
-                let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &left);
-                self.go(&mut state, &went);
-            }
-            self.due(&mut state, *request, *verdict);
-        }
-        for (number, undo) in arrival.given_up {
-            self.owed(&mut state, &undo);
-            self.give_up(&mut state, number, undo);
-        }
-        if !arrival.safe.is_empty() {
-            for turn in state.desk.under_way() {
-                if state.interrupted.iter().all(|of| of.number != turn.number) {
-                    let (number, given_up) = (turn.number, turn.given_up.len());
-                    state.interrupted.push(Interrupted { number, planned: state.world, given_up });
+        for arrived in arrival.in_order() {
+            match arrived {
+                Arrived::Told(request, verdict, _) => {
+                    self.owed(&mut state, &request);
+                    if verdict == Verdict::UndoFailed {
+                        state.stayed = true;
+                        let left = self.frames_left(&state);
+                        let went = self.worlds.stay(state.world, state.world, std::iter::once(request), &left);
+                        self.go(&mut state, &went);
+                    }
+                    self.due(&mut state, request, verdict);
                 }
+                Arrived::GivesUp(number, undo) => {
+                    self.owed(&mut state, &undo);
+                    self.give_up(&mut state, number, undo);
+                }
+                Arrived::Safe(request) => self.interrupts(&mut state, request),
             }
-        }
-        for request in arrival.safe {
-            self.owed(&mut state, &request);
-            if let Some(world) = self.worlds.get(state.world) {
-                world.note_gone(&request, state.safe.iter(), state.desk.requests_mut());
-            }
-            state.safe.push(request);
         }
         self.begin(&mut state);
         state
+    }
+
+    /// A safe configuration interrupts what is under way.
+    fn interrupts(&self, state: &mut State, request: Request) {
+        for turn in state.desk.under_way() {
+            if state.interrupted.iter().all(|of| of.number != turn.number) {
+                let (number, given_up) = (turn.number, turn.given_up.len());
+                state.interrupted.push(Interrupted { number, planned: state.world, given_up });
+            }
+        }
+        self.owed(state, &request);
+        if let Some(world) = self.worlds.get(state.world) {
+            world.note_gone(&request, state.safe.iter(), state.desk.requests_mut());
+        }
+        state.safe.push(request);
     }
 
     /// What is under way is given up by its own undo.

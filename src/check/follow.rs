@@ -18,7 +18,7 @@ use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 
-/// More states than that are not followed: something is wrong with whoever asks.
+/// More states than that are not followed: each of many frames that nobody has confirmed may have been taken back, or not.
 const MOST: usize = 20_000;
 
 /// What is seen of a running deployment.
@@ -168,7 +168,7 @@ impl<'a> Follower<'a> {
         self.told(rest.iter())
     }
 
-    /// Whether more was on its way between coordinators than is followed.
+    /// Whether more was on its way between coordinators than is followed, or it may have been in more states than are.
     pub fn overflowed(&self) -> bool {
         self.product.overflow
     }
@@ -178,13 +178,18 @@ impl<'a> Follower<'a> {
         let mut rest: FxHashSet<State> = FxHashSet::default();
         let mut answering: FxHashSet<May> = FxHashSet::default();
         let mut open: Vec<State> = Vec::new();
-        let note = |may: May, rest: &mut FxHashSet<State>, open: &mut Vec<State>, answering: &mut FxHashSet<May>| {
-            if !may.owed.is_empty() {
-                answering.insert(may);
-            } else if rest.len() < MOST && rest.insert(may.state.clone()) {
-                open.push(may.state);
-            }
-        };
+        let mut more = false;
+        let mut note =
+            |may: May, rest: &mut FxHashSet<State>, open: &mut Vec<State>, answering: &mut FxHashSet<May>| {
+                if !may.owed.is_empty() {
+                    answering.insert(may);
+                } else if rest.len() >= MOST {
+                    // Not known to be new, but where so many are it does not matter.
+                    more = true;
+                } else if rest.insert(may.state.clone()) {
+                    open.push(may.state);
+                }
+            };
         for may in std::mem::take(&mut self.may) {
             note(may, &mut rest, &mut open, &mut answering);
         }
@@ -200,6 +205,7 @@ impl<'a> Follower<'a> {
                 }
             }
         }
+        self.product.overflow |= more;
         (rest, answering.into_iter().collect())
     }
 

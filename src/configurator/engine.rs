@@ -17,7 +17,7 @@ use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Sn
 use crate::plan::Context;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
-use crate::stack::{Batch, Desk, FrameId, Requester, Why, World};
+use crate::stack::{Arrived, Batch, Desk, FrameId, Requester, Why, World};
 use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -275,26 +275,31 @@ impl Engine {
         let configurations = self.given.configurations.clone();
         let safe = |id: ConfigId| configurations.get(&id).is_some_and(|c| c.safe);
         let arrival = self.desk.arrive(batch, safe, &self.given.claims);
-        for (request, verdict, reason) in arrival.told {
-            self.owe(request);
-            if verdict == Verdict::UndoFailed {
-                let held = self.frames_left();
-                self.world.stays(&request, &held);
+        for arrived in arrival.in_order() {
+            match arrived {
+                Arrived::Told(request, verdict, reason) => {
+                    self.owe(request);
+                    if verdict == Verdict::UndoFailed {
+                        let held = self.frames_left();
+                        self.world.stays(&request, &held);
+                    }
+                    let reason = (verdict != Verdict::Undone).then_some(reason);
+                    self.answer(request, verdict, reason);
+                }
+                Arrived::GivesUp(number, undo) => {
+                    self.owe(undo);
+                    self.give_up_request(number, undo);
+                }
+                Arrived::Safe(safe) => {
+                    let applied = self.running.iter().filter_map(|running| match &running.purpose {
+                        Purpose::Safe(safe) => Some(&safe.0),
+                        _ => None,
+                    });
+                    let waiting = self.safety.waiting.iter().chain(applied);
+                    self.world.note_gone(&safe, waiting, self.desk.requests_mut());
+                    self.safety.waiting.push_back(safe);
+                }
             }
-            let reason = (verdict != Verdict::Undone).then_some(reason);
-            self.answer(request, verdict, reason);
-        }
-        for safe in arrival.safe {
-            let applied = self.running.iter().filter_map(|running| match &running.purpose {
-                Purpose::Safe(safe) => Some(&safe.0),
-                _ => None,
-            });
-            self.world.note_gone(&safe, self.safety.waiting.iter().chain(applied), self.desk.requests_mut());
-            self.safety.waiting.push_back(safe);
-        }
-        for (number, request) in arrival.given_up {
-            self.owe(request);
-            self.give_up_request(number, request);
         }
         self.changed();
     }

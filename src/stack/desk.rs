@@ -64,6 +64,26 @@ pub struct Arrival {
     pub given_up: Vec<(u32, Request)>,
 }
 
+/// One thing that comes of it.
+#[derive(Debug)]
+pub enum Arrived {
+    /// A request is answered.
+    Told(Request, Verdict, answer::Reason),
+    /// An undo gives up what is under way under that number.
+    GivesUp(u32, Request),
+    /// A safe configuration is asked for.
+    Safe(Request),
+}
+
+impl Arrival {
+    /// All of it, in the order in which it happens: what is given up is so before what is safe interrupts it.
+    pub fn in_order(self) -> impl Iterator<Item = Arrived> {
+        let told = self.told.into_iter().map(|(request, verdict, why)| Arrived::Told(request, verdict, why));
+        let given_up = self.given_up.into_iter().map(|(number, undo)| Arrived::GivesUp(number, undo));
+        told.chain(given_up).chain(self.safe.into_iter().map(Arrived::Safe))
+    }
+}
+
 impl Desk {
     /// Batches that have not begun, the oldest first.
     pub fn waiting(&self) -> impl Iterator<Item = &Batch> {

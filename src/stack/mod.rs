@@ -30,7 +30,7 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
-pub use desk::{Arrival, Desk, GivenUp, Gone, Turn, given_up_of};
+pub use desk::{Arrival, Arrived, Desk, GivenUp, Gone, Turn, given_up_of};
 pub use effort::{Effort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;

@@ -125,8 +125,9 @@ impl Transaction {
         let mut heed = Heed::new(&self.touched, open.map(|i| &forward.list[*i as usize].step));
         // What of a way back came in only when a safe configuration had written the same.
         for (step, undo, revision) in &self.late_back {
-            let theirs = self.touched.has(step) && !self.touched.knew(step, *revision);
-            if theirs && !self.touched.overwrote(step, *revision) {
+            // Those that were there when it was laid out have it as they want it.
+            let Some(since) = self.touched_since.as_deref().filter(|since| since.has(step)) else { continue };
+            if !since.knew(step, *revision) && !since.overwrote(step, *revision) {
                 // What they want, and nothing else, may move for it.
                 let goes = |back: &&Step| self.touched.wants_step(back) || !step::moves(back, live);
                 for back in undo.steps().iter().filter(goes) {

@@ -100,6 +100,8 @@ pub struct Transaction {
     faulted: Vec<(ComponentName, crate::model::RunState)>,
     doubted: bool,
     touched: Touched,
+    /// What of that was touched since the way back in hand began: it was laid out without knowing of it.
+    touched_since: Option<Box<Touched>>,
     /// Steps of ways back that came in after a safe configuration had begun, with what takes them back and the revision then.
     late_back: Vec<(Step, crate::system::Undo, u64)>,
     /// Why it ends early, if not because of a step.
@@ -147,6 +149,7 @@ impl Transaction {
             faulted: Vec::new(),
             doubted: false,
             touched: Touched::default(),
+            touched_since: None,
             late_back: Vec::new(),
             stopped_by: None,
             given_up: SmallVec::new(),
@@ -297,6 +300,9 @@ impl Transaction {
             }
             Input::Release(touched) => {
                 self.held = false;
+                if self.back.is_some() {
+                    self.touched_since.get_or_insert_default().join(touched.clone());
+                }
                 self.touched.join(touched);
             }
             Input::Stop => {
@@ -465,6 +471,7 @@ impl Transaction {
         // A safe configuration that came during its last step may want more of what that has brought back.
         failed |= way.restores || whole && way.brings;
         self.late_back.clear();
+        self.touched_since = None;
         let again = self.interrupted || self.attempts < 2;
         if way.list.is_empty() || !(failed && again) || self.attempts > 8 {
             if self.taken_down {

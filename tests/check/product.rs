@@ -207,6 +207,54 @@ fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
     }
 }
 
+/// What nobody undoes by its name counts where it keeps something else from being undone.
+#[test]
+fn a_frame_in_the_way_tells_worlds_apart() {
+    let configurations = "made = Configuration { create(\"d\", \"Drive\") },
+        same = Configuration { property_set(\"d.gain\", 1.0) },";
+    for ways in [["\"made\"", "\"made\", \"same\""], ["\"made\", \"same\"", "\"made\""]] {
+        let said = two_ways(configurations, ways, "\"made.undo\"");
+        assert!(said.refused("made.undo").iter().any(|(severity, _)| *severity == "error"), "{ways:?}: {:#}", said.0);
+    }
+}
+
+/// What nobody undoes by its name counts where it takes over a value: undone below it, that value stays.
+#[test]
+fn a_frame_that_takes_over_a_value_tells_worlds_apart() {
+    let states = |first: &str, second: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = \"base\" }}, up = state {{}},
+             left = state {{ entry = {{ {first} }} }}, right = state {{ entry = {{ {second} }} }}, both = state {{}},
+             back = state {{ entry = \"five.undo\" }}, next = state {{ entry = \"one\" }},
+             failed = state {{ entry = \"wrong\" }}, leaving = state {{ entry = \"all\" }},
+             trans {{ src = \"initial\", tgt = \"idle\" }},
+             trans {{ src = \"idle\", tgt = \"building\", events = {{ \"e_start\" }} }},
+             trans {{ src = \"building\", tgt = \"up\", events = {{ \"base.ok\" }} }},
+             trans {{ src = \"up\", tgt = \"left\", events = {{ \"e_left\" }} }},
+             trans {{ src = \"up\", tgt = \"right\", events = {{ \"e_right\" }} }},
+             trans {{ src = \"left\", tgt = \"both\", events = {{ \"e_both\" }} }},
+             trans {{ src = \"right\", tgt = \"both\", events = {{ \"e_both\" }} }},
+             trans {{ src = \"both\", tgt = \"back\", events = {{ \"e_then\" }} }},
+             trans {{ src = \"back\", tgt = \"next\", events = {{ \"five.undone\" }} }},
+             trans {{ src = \"next\", tgt = \"failed\", events = {{ \"one.failed\" }} }},"
+        ) + &["building", "up", "left", "right", "both", "back", "next", "failed"]
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"e_shutdown\" }} }},"))
+            .join(" ")
+            + "trans { src = \"leaving\", tgt = \"idle\", events = { \"all.ok\" } },"
+    };
+    let configurations = format!("{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},
+        five = Configuration {{ property_set(\"a.gain\", 5.0) }}, same = Configuration {{ property_set(\"a.gain\", 5.0) }},
+        one = Configuration {{ property_set(\"a.gain\", 1.0) }},");
+    let (alone, under) = ("\"five\"", "\"five\", \"same\"");
+    for (first, second) in [(alone, under), (under, alone)] {
+        let said = Small::new(&configurations, &states(first, second), "").check();
+        assert!(!said.refused("wrong").is_empty(), "{first}: {:#}", said.0);
+    }
+    // Without it in the way the value is there already, and what needs no step cannot fail.
+    let said = Small::new(&configurations, &states(alone, alone), "").check();
+    assert!(said.refused("wrong").is_empty(), "{:#}", said.0);
+}
+
 /// A state that is met first behind an undo that fails, and later without any failure.
 #[test]
 fn a_state_is_judged_by_its_best_way() {
