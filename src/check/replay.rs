@@ -34,6 +34,19 @@ pub(super) struct Begun {
     pub(super) idle: bool,
 }
 
+/// Why no script makes what was interrupted or given up wait.
+const GOES_BACK: &str = "what was interrupted or given up goes back at once";
+
+/// Whether a batch is the rest of one of which something was given up that had begun.
+fn gone_back_before(way: &[(&State, &Next)], begun: &[Begun], batch: &Begun) -> bool {
+    let cancelled = way[batch.at].1.answers.iter().filter(|(_, verdict)| *verdict == Verdict::Cancelled);
+    let began = |request: &Request| {
+        let before = begun.iter().filter(|before| before.over == Some(batch.at) && !before.idle);
+        before.flat_map(|before| &before.requests).any(|of| of == request)
+    };
+    cancelled.into_iter().any(|(request, _)| began(request))
+}
+
 impl Product<'_> {
     /// What each move of a way needs. `way` has the state before each move.
     pub fn replay(&mut self, way: &[(&State, &Next)]) -> Vec<Replay> {
@@ -57,7 +70,7 @@ impl Product<'_> {
             }
             let own = next.by == Move::Answer || before.interrupted.is_empty() && matches!(next.by, Move::Taken(..));
             if before.safe.is_empty() && goes_back(before) && !own {
-                all[k].does = Does::Cannot("what was interrupted or given up goes back at once");
+                all[k].does = Does::Cannot(GOES_BACK);
             }
             if own_time(k) && self.shows(before).is_at_once() {
                 all[k].does = Does::Cannot(AT_ONCE);
@@ -128,6 +141,10 @@ impl Product<'_> {
             let stands = batch.over.and_then(|at| self.stands_after(way[at].1)).unwrap_or_default();
             let takes = until.saturating_sub(times[batch.at]).saturating_sub(stands);
             match self.arms(state, &batch.requests, answers, takes) {
+                // They would meet the steps of what goes back just then.
+                Ok(arms) if !arms.is_empty() && gone_back_before(way, &begun, batch) => {
+                    all[batch.at].does = Does::Cannot(GOES_BACK);
+                }
                 Ok(mut arms) => {
                     arms.extend(batch.over.and_then(|at| self.lie(way, at, state, batch)));
                     let armed = (0..=batch.at).rev().find(|k| own_time(*k)).unwrap_or(0);

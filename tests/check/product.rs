@@ -256,6 +256,11 @@ fn a_frame_that_takes_over_a_value_tells_worlds_apart() {
     // Without it in the way the value is there already, and what needs no step cannot fail.
     let said = Small::new(&configurations, &states(alone, alone), "").check();
     assert!(said.refused("wrong").is_empty(), "{:#}", said.0);
+    // Both at once: given up while it begins, the first goes back before the second goes on.
+    let together = states(alone, under)
+        .replace("right = state { entry = \"five\" }", "right = state { entry = { \"five\", \"same\" } }")
+        .replace("tgt = \"right2\", events = { \"five.ok\" }", "tgt = \"both\", events = { \"e_both\" }");
+    Small::new(&configurations, &together, "").check();
 }
 
 /// A state that is met first behind an undo that fails, and later without any failure.
