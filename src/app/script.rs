@@ -15,10 +15,10 @@ use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
 use crate::limits;
 use crate::model::finding::{Finding, did_you_mean};
-use crate::model::{Ask, ConfigId, EventName, Ident};
+use crate::model::{Ask, ConfigId, Ident};
 use crate::runtime::Libraries;
 use crate::session::tap::Hears;
-use crate::session::{Ended, Hub, NO_FORWARD, NotUp, Session, recovery};
+use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, recovery};
 use crate::time::{Clock, Time};
 pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
@@ -373,7 +373,10 @@ fn raise(host: &Shared, name: &str, to: Option<Vec<String>>) -> mlua::Result<()>
     };
     let to: Option<Vec<Ident>> = to.map(|to| to.into_iter().map(known).collect::<mlua::Result<_>>()).transpose()?;
     let event = session.named(name).map_err(|why| {
-        let help = did_you_mean(name, "events", session.events().iter().map(EventName::as_str));
+        let help = match &why {
+            NotNamed::NotFromOutside(why) => why.help.clone(),
+            _ => session.near_event(name),
+        };
         error(format!("{why}: {help}"))
     })?;
     listen_anew(host, &session);

@@ -5,6 +5,7 @@ use crate::model::codes::{
     DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
 use crate::model::finding::{did_you_mean, nearest};
+use crate::model::statechart::is_internal;
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
 use std::collections::BTreeSet;
@@ -84,13 +85,8 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
         .events()
         .iter()
         .copied()
-        .filter(|e| !answers.contains(e) && !is_internal(e.as_str()) && !deployment.looks_like_answer(e.as_str()))
+        .filter(|e| !answers.contains(e) && deployment.never_from_outside(e.as_str()).is_none())
         .collect()
-}
-
-/// Whether the statechart makes events of that name itself: completion and time events.
-pub fn is_internal(event: &str) -> bool {
-    event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
 }
 
 /// All answers to what the chart asks for, and what it is told about that later.

@@ -27,8 +27,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         findings.extend(wrong.map(|finding| finding.path(format!("operator[{i}]"))));
     }
     for (i, (event, at)) in deployment.safety.iter().enumerate() {
-        if deployment.looks_like_answer(event.as_str()) {
-            let message = format!("`{event}` is an answer of the configurator, which nobody else raises");
+        if let Some(message) = deployment.never_from_outside(event.as_str()) {
             findings.push(
                 Finding::error(DEPLOY_SAFETY_ANSWER, message)
                     .at(*at)

@@ -1,12 +1,12 @@
 //! Monitors against the deployment: do the things exist that they look at, are they numbers, does somebody listen.
 
-use super::coordinator::is_internal;
 use super::universe::Universe;
 use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
+use crate::model::statechart::is_internal;
 use crate::model::{
     Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
@@ -57,7 +57,7 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
         for event in monitor.events() {
             let path = format!("monitors.{}", monitor.name);
             let text = event.as_str();
-            if is_internal(text) || deployment.looks_like_answer(text) {
+            if deployment.never_from_outside(text).is_some() {
                 let message = format!("the monitor `{}` raises `{event}`, which tells of something else", monitor.name);
                 findings.push(Finding::error(MONITOR_EVENT_TAKEN, message).at(monitor.origin).path(path).help(
                     "answers of the configurator and the events of the statechart itself cannot be made by a monitor: \

@@ -116,12 +116,7 @@ impl Product<'_> {
             },
             Move::Confirmed(id) => Happened::Confirmed { configuration: id.to_string() },
             Move::Lost(id) => Happened::Lost { configuration: id.to_string() },
-            Move::Operator(ask) => Happened::Operator {
-                request: match ask {
-                    Ask::Apply(id) => format!("apply {id}"),
-                    other => format!("undo {}", other.to_string().trim_end_matches(".undo")),
-                },
-            },
+            Move::Operator(ask) => Happened::Operator { request: ask.command() },
             Move::OthersDown => Happened::Down,
             Move::Rounds => Happened::Rounds { times: self.deployment.limits.stack },
         }

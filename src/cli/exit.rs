@@ -37,6 +37,13 @@ impl Exit {
         if ended.is_orderly() { well } else { Self::Forced }
     }
 
+    /// Of the ends of several things the one that tells most: broken, died or forced, no, done.
+    pub fn worst(all: impl IntoIterator<Item = Self>) -> Self {
+        let order = [Self::Done, Self::No, Self::Usage, Self::Forced, Self::Broken];
+        let place = |exit: &Self| order.iter().position(|of| of == exit);
+        all.into_iter().max_by_key(place).unwrap_or(Self::Done)
+    }
+
     /// The number.
     pub fn code(self) -> u8 {
         match self {

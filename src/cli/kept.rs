@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::log::count;
 use super::output::{Output, Style};
 use crate::session::client::ClientError;
-use crate::session::kept::{self, Life, Story, entries};
+use crate::session::kept::{self, Began, Life, Story, entries};
 use crate::session::{Ended, Stage};
 use crate::time::Wall;
 use serde_json::{Value as Json, json};
@@ -35,9 +35,10 @@ impl Died {
         json!({
             "name": life.name,
             "phase": "died",
-            "pid": life.pid,
-            "file": life.file,
-            "began": life.began.to_string(),
+            "pid": life.process.as_ref().map(|process| process.pid),
+            "file": life.process.as_ref().map(|process| &process.file),
+            "began": life.process.as_ref().map(|process| process.began.to_string()),
+            "damaged": life.is_damaged(),
             "seen": life.seen.to_string(),
             "rebooted": life.rebooted,
             "was": {
@@ -55,7 +56,9 @@ impl Died {
     pub fn print(&self, out: &Output) {
         let Self { life, story, last } = self;
         self.print_short(out);
-        out.line(format!("process      {}, since {}: {}", life.pid, life.began, life.file.display()));
+        if let Some(Began { pid, began, file, .. }) = &life.process {
+            out.line(format!("process      {pid}, since {began}: {}", file.display()));
+        }
         out.line(format!("it was       {}", story.phase.as_deref().unwrap_or("(not known)")));
         for active in story.states.values() {
             let leaf = active.last().map_or("(inactive)", String::as_str);
@@ -72,13 +75,14 @@ impl Died {
             out.line(out.paint(Style::Bold, "the last that it told"));
             last.iter().for_each(|entry| out.text(super::log::line(out, entry, false)));
         }
+        let file =
+            life.process.as_ref().map_or_else(|| "FILE".to_owned(), |process| process.file.display().to_string());
         out.line(out.paint(
             Style::Dim,
             format!(
                 "what its components did since is not known: look at the hardware; `davit log {0}` shows all that it told, \
-                 `davit deploy {1}` begins anew",
-                life.name,
-                life.file.display()
+                 `davit deploy {file}` begins anew",
+                life.name
             ),
         ));
     }
@@ -102,8 +106,14 @@ impl Died {
     /// When, and what is known of why.
     pub fn when(&self) -> String {
         let Life { seen, rebooted, .. } = &self.life;
-        let why = if *rebooted { "the machine went down" } else { "killed, or crashed" };
-        format!("{why}; seen alive last at {seen} ({})", seen.ago())
+        let why = match rebooted {
+            _ if self.life.is_damaged() => {
+                "its record is damaged and cannot be read, it may have been shut down; written last"
+            }
+            true => "the machine went down; seen alive last",
+            false => "killed, or crashed; seen alive last",
+        };
+        format!("{why} at {seen} ({})", seen.ago())
     }
 }
 
@@ -116,6 +126,16 @@ pub fn meant(error: &ClientError) -> Option<Life> {
         _ => None,
     };
     life.filter(|life| !life.alive)
+}
+
+/// Tells that a deployment died with which a command went along until now; false: it ended otherwise.
+pub fn told_died(out: &Output, name: &str, json: bool) -> bool {
+    let Some(died) = kept::life_after(name).filter(Life::died).map(Died::of) else { return false };
+    match json {
+        true => out.json_line(&died.json()),
+        false => died.print_short(out),
+    }
+    true
 }
 
 /// Those that died and were not deployed since.

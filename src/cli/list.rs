@@ -29,7 +29,13 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         if let Some(name) = self.forget {
-            return if forget(&name) {
+            return if owner::is_owned(&name) || life(&name).is_some_and(|life| life.alive) {
+                Err(Failure::no(
+                    CLI_NOTHING_KEPT,
+                    format!("`{name}` runs, and nothing of it is forgotten before it has ended"),
+                    format!("`davit shutdown {name}` takes it down; what is kept of it is then that it was shut down"),
+                ))
+            } else if forget(&name) {
                 Ok(Exit::Done)
             } else {
                 Err(Failure::no(
@@ -99,22 +105,28 @@ impl Overview {
 
     /// How `davit status` ends that has shown it.
     pub fn exit(&self) -> Exit {
-        if self.running.iter().any(|one| one["phase"] == "broken") {
-            Exit::Broken
-        } else if !self.died.is_empty() {
-            kept::EXIT
-        } else if self.running.iter().any(|one| one["phase"].is_null()) {
-            Exit::No
-        } else {
-            Exit::Done
-        }
+        let running = self.running.iter().map(|one| match &one["phase"] {
+            Json::Null => Exit::No,
+            phase => of_phase(phase),
+        });
+        Exit::worst(running.chain(self.died.iter().map(|_| kept::EXIT)))
     }
+}
+
+/// How `davit status` ends that has shown one that runs.
+pub fn of_phase(phase: &Json) -> Exit {
+    if phase == "broken" { Exit::Broken } else { Exit::Done }
+}
+
+/// One that does not answer, as `davit list --json` has it.
+pub fn silent(name: &str, why: &str) -> Json {
+    json!({ "name": name, "phase": null, "why": why })
 }
 
 /// One that runs, as `davit list --json` has it.
 fn about(name: &str) -> Json {
     let mut one = match Client::connect(Some(name)).and_then(|mut client| client.call("status", &json!({}), ASK)) {
-        Err(why) => json!({ "name": name, "phase": null, "why": why.to_string() }),
+        Err(why) => silent(name, &why.to_string()),
         Ok(status) => {
             let leaves = status["coordinators"].as_object().into_iter().flatten();
             let leaves = leaves.filter_map(|(_, states)| states.as_array()?.last().cloned());
@@ -126,10 +138,10 @@ fn about(name: &str) -> Json {
         }
     };
     // Of a process that could not keep anything, or keeps it elsewhere, this is not known.
-    if let Some(Life { pid, began, file, alive: true, .. }) = life(name) {
-        one["pid"] = json!(pid);
-        one["began"] = json!(began.to_string());
-        one["file"] = json!(file);
+    if let Some(Life { process: Some(process), alive: true, .. }) = life(name) {
+        one["pid"] = json!(process.pid);
+        one["began"] = json!(process.began.to_string());
+        one["file"] = json!(process.file);
     }
     one
 }

@@ -118,6 +118,9 @@ impl Args {
                 return Ok(Exit::Done);
             }
         }
+        if !phases.over && kept::told_died(&context.out, &name, self.json) {
+            return Ok(kept::EXIT);
+        }
         if !phases.over && owner::is_owned(&name) {
             return Err(Failure::no(
                 CLI_NO_ANSWER,

@@ -165,6 +165,15 @@ impl Failure {
         Self { exit: Exit::Usage, ..Self::no(code, message, help) }
     }
 
+    /// Why, and what to do, in one sentence.
+    pub fn message(&self) -> String {
+        let said = |finding: &Finding| match &finding.help {
+            Some(help) => format!("{}: {help}", finding.message),
+            None => finding.message.clone(),
+        };
+        self.findings.iter().map(said).collect::<Vec<_>>().join("; ")
+    }
+
     /// The same, as JSON if so asked.
     #[must_use]
     pub fn as_json(mut self, json: bool) -> Self {

@@ -4,7 +4,7 @@ use super::Failure;
 use super::exit::Exit;
 use super::kept;
 use crate::model::codes::{
-    CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED,
+    CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED, page,
 };
 use crate::session::client::{Client, ClientError};
 use serde_json::Value as Json;
@@ -98,7 +98,7 @@ pub fn failure(error: ClientError) -> Failure {
             )
         },
         ClientError::Refused(error) => Failure::no(
-            CLI_REFUSED,
+            error.data.get("code").and_then(Json::as_str).and_then(page).map_or(CLI_REFUSED, |page| page.code),
             error.message.clone(),
             error.data.get("help").and_then(Json::as_str).unwrap_or("`davit log` shows what happened").to_owned(),
         ),

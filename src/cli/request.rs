@@ -48,6 +48,9 @@ impl Run for EventArgs {
         let acted: Option<Vec<&str>> =
             answer["acted"].as_array().map(|all| all.iter().filter_map(Json::as_str).collect());
         let broke = acted.iter().flatten().any(|answer| answer.ends_with(".broken"));
+        // Nothing that makes safe, or not all of it.
+        let unsafe_still =
+            acted.as_ref().is_some_and(|all| all.is_empty() || !all.iter().all(|it| it.ends_with(".ok")));
         if self.json {
             context.out.json(&answer);
         } else if let Some(heard) = heard {
@@ -55,10 +58,15 @@ impl Run for EventArgs {
             context.out.line(format!("{} after {}", context.out.paint(style, heard), self.event));
         } else if let Some(acted) = acted {
             let what = match acted.is_empty() {
-                true => "it has acted just before".to_owned(),
+                true => "nothing was done, there is no safe configuration".to_owned(),
                 false => acted.join(", "),
             };
-            context.out.line(format!("{} acted by itself, since no coordinator leads any more: {what}", self.event));
+            let when = if answer["before"] == true { "had acted by itself just before" } else { "acted by itself" };
+            context.out.line(format!("{} {when}, since no coordinator leads any more: {what}", self.event));
+            if unsafe_still {
+                let again = format!("note: not everything is safe: `davit event {}` tries again", self.event);
+                context.out.error(format!("{again}; `davit log` shows why\n"));
+            }
         } else if let Some(taken) = taken {
             let what = if taken { "heard" } else { "raised, and no transition heard it" };
             context.out.line(format!("{} {what}", self.event));
@@ -71,6 +79,7 @@ impl Run for EventArgs {
         Ok(match heard {
             Some(heard) if heard.ends_with(".broken") && !good => Exit::Broken,
             None if broke => Exit::Broken,
+            None if unsafe_still => Exit::No,
             _ if good && taken != Some(false) => Exit::Done,
             _ => Exit::No,
         })

@@ -3,10 +3,10 @@
 use super::drift::listed;
 use super::exit::Exit;
 use super::kept::{self, Died};
-use super::list::Overview;
+use super::list::{Overview, of_phase, silent};
 use super::output::{Output, Style, Table};
 use super::remote::{ASK, failure};
-use super::{Answer, Context, Run};
+use super::{Answer, Context, Failure, Run};
 use crate::session::StoppingView;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::Life;
@@ -16,7 +16,7 @@ use serde_json::{Value as Json, json};
 /// was. Of several, where none is named: a line each, as `davit list`.
 ///
 /// Exit status: 0 it runs; 1 none runs; 3 it is broken; 4 it died: killed, crashed or cut off, and was not shut down. Of several the
-/// first of 3, 4, 1 and 0 that is so of one of them.
+/// first of 3, 4, 1 and 0 that is so of one of them; without a name also one that died beside the one that runs counts.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The deployments' names; not needed while only one runs.
@@ -36,9 +36,10 @@ impl Run for Args {
                 Ok(Seen::Runs(status)) => {
                     // Who runs has died before, if ever.
                     let own = status["name"].as_str().unwrap_or_default().to_owned();
-                    let exit = show(out, &[Seen::Runs(status)], self.json);
+                    let mut exit = show(out, &[Seen::Runs(status)], self.json);
                     for died in kept::died().iter().filter(|died| died.name() != own) {
                         out.error(format!("note: `{}` died: `davit status {0}` tells of it\n", died.name()));
+                        exit = Exit::worst([exit, kept::EXIT]);
                     }
                     Ok(exit)
                 }
@@ -50,10 +51,13 @@ impl Run for Args {
                 }
                 Err(error) => refused(error),
             },
-            names => match names.iter().map(|name| look(Some(name))).collect::<Result<Vec<Seen>, _>>() {
-                Ok(seen) => Ok(show(out, &seen, self.json)),
-                Err(error) => refused(error),
-            },
+            [name] => look(Some(name)).map_or_else(refused, |seen| Ok(show(out, &[seen], self.json))),
+            names => {
+                let seen =
+                    |name: &String| look(Some(name)).unwrap_or_else(|error| Seen::Not(name.clone(), failure(error)));
+                let seen: Vec<Seen> = names.iter().map(seen).collect();
+                Ok(show(out, &seen, self.json))
+            }
         }
     }
 }
@@ -62,6 +66,37 @@ impl Run for Args {
 enum Seen {
     Runs(Json),
     Died(Box<Died>),
+    /// It is not seen, and why; one of several.
+    Not(String, Failure),
+}
+
+impl Seen {
+    fn json(&self) -> Json {
+        match self {
+            Self::Runs(status) => status.clone(),
+            Self::Died(died) => died.json(),
+            Self::Not(name, why) => silent(name, &why.message()),
+        }
+    }
+
+    fn print(&self, out: &Output) {
+        match self {
+            Self::Runs(status) => print(out, status),
+            Self::Died(died) => died.print(out),
+            Self::Not(name, why) => {
+                let message = why.message();
+                out.line(format!("{}  {}  {message}", out.paint(Style::Bold, name), out.paint(Style::Dim, "not seen")));
+            }
+        }
+    }
+
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Runs(status) => of_phase(&status["phase"]),
+            Self::Died(_) => kept::EXIT,
+            Self::Not(_, why) => why.exit,
+        }
+    }
 }
 
 fn look(name: Option<&str>) -> Result<Seen, ClientError> {
@@ -77,34 +112,19 @@ fn look(name: Option<&str>) -> Result<Seen, ClientError> {
 
 /// One as it is, several below each other or as an array.
 fn show(out: &Output, seen: &[Seen], json: bool) -> Exit {
-    if json {
-        let one = |seen: &Seen| match seen {
-            Seen::Runs(status) => status.clone(),
-            Seen::Died(died) => died.json(),
-        };
-        match seen {
-            [only] => out.json(&one(only)),
-            all => out.json(&all.iter().map(one).collect::<Vec<_>>()),
-        }
-    } else {
-        for (i, seen) in seen.iter().enumerate() {
-            if i > 0 {
-                out.line("");
-            }
-            match seen {
-                Seen::Runs(status) => print(out, status),
-                Seen::Died(died) => died.print(out),
+    match seen {
+        [only] if json => out.json(&only.json()),
+        all if json => out.json(&all.iter().map(Seen::json).collect::<Vec<_>>()),
+        all => {
+            for (i, seen) in all.iter().enumerate() {
+                if i > 0 {
+                    out.line("");
+                }
+                seen.print(out);
             }
         }
     }
-    let is = |what: fn(&Seen) -> bool| seen.iter().any(what);
-    if is(|seen| matches!(seen, Seen::Runs(status) if status["phase"] == "broken")) {
-        Exit::Broken
-    } else if is(|seen| matches!(seen, Seen::Died(_))) {
-        kept::EXIT
-    } else {
-        Exit::Done
-    }
+    Exit::worst(seen.iter().map(Seen::exit))
 }
 
 /// The style of a phase or a run state.

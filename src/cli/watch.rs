@@ -4,13 +4,14 @@
 //! to the deployment.
 
 use super::exit::Exit;
-use super::kept::{self, Died};
+use super::kept;
+use super::list::silent;
 use super::log::{count, duration};
 use super::output::{self, Output, Style, Table};
-use super::remote::{ASK, connect, failure, seconds};
+use super::remote::{connect, failure, seconds};
 use super::status::{state_style, text};
 use super::{Answer, Context, Run};
-use crate::session::kept::Life;
+use crate::session::client::{Client, ClientError};
 use crate::session::owner;
 use crate::time::Clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -20,11 +21,15 @@ use std::time::Duration;
 /// How long a look waits for what monitors say.
 const PATIENCE: Duration = Duration::from_millis(300);
 
+/// How long a look may take before it is said that the deployment does not answer.
+const ANSWERS: Duration = Duration::from_secs(2);
+
 /// Watch a running deployment: its phase, the coordinators' states, the stack, components, monitors (enabled, verdict, and how far
 /// they are from changing) and activities.
 ///
-/// On a terminal it is drawn anew again and again; elsewhere it is a line a look, with `--json` one object a line. Ctrl-C ends it, and
-/// so does the end of the deployment. Exit status: 0; 1 the deployment does not answer any more; 4 it died.
+/// On a terminal it is drawn anew again and again; elsewhere it is a line a look, with `--json` one object a line. A look that is not
+/// answered within 2 s says so, and it goes on when the deployment answers again. Ctrl-C ends it, and so does the end of the
+/// deployment. Exit status: 0; 1 the deployment did not answer at the end; 4 it died.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
@@ -50,52 +55,102 @@ impl Run for Args {
 impl Args {
     fn show(self, context: &Context) -> Answer {
         let out = &context.out;
-        let mut client = connect(self.name.as_deref())?;
+        let client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
+        let mut looking = Looks { client, asked: None, anew: false };
         let screen = (!self.json && output::is_terminal()).then(Screen::new);
         let clock = Clock::real();
-        let mut looks = 0;
+        let (mut looks, mut page, mut heard) = (0, String::new(), clock.now());
         loop {
-            let look = match client.call("look", &json!({ "within_s": PATIENCE.as_secs_f64() }), PATIENCE + ASK) {
+            let look = match looking.next() {
                 Ok(look) => look,
                 Err(error) => {
                     drop(screen);
-                    client.wait_until_free();
+                    looking.client.wait_until_free();
                     return if owner::is_owned(&name) { Err(failure(error)) } else { Ok(self.over(out, &name)) };
                 }
             };
-            match &screen {
-                _ if self.json => out.json_line(&look),
-                Some(screen) => screen.draw(drawn(out, &look)),
-                None => out.line(line(out, &look)),
+            let answers = look.is_some();
+            if let Some(look) = look {
+                heard = clock.now();
+                match &screen {
+                    _ if self.json => out.json_line(&look),
+                    Some(screen) => {
+                        page = drawn(out, &look);
+                        screen.draw(page.clone());
+                    }
+                    None => out.line(line(out, &look)),
+                }
+            } else {
+                let why = format!("does not answer for {:.0} s", clock.now().since(heard).as_secs_f64());
+                let said = format!("{}  {}", out.paint(Style::Bold, &name), out.paint(Style::Bad, &why));
+                match &screen {
+                    _ if self.json => out.json_line(&silent(&name, &format!("`{name}` {why}"))),
+                    // What was seen last stays below it.
+                    Some(screen) => screen.draw(format!("{said}\n{page}").trim_end().to_owned()),
+                    None => out.line(said),
+                }
             }
             looks += 1;
             if self.count.is_some_and(|count| looks >= count) || output::reader_is_gone() {
-                return Ok(Exit::Done);
+                return Ok(if answers { Exit::Done } else { Exit::No });
             }
-            clock.sleep(Duration::from_secs_f64(self.every));
+            if answers {
+                clock.sleep(Duration::from_secs_f64(self.every));
+            }
         }
     }
 
     /// It does not run any more.
     fn over(&self, out: &Output, name: &str) -> Exit {
-        let life = crate::session::kept::life(name);
-        let (exit, end) = match life.clone().filter(Life::died).map(Died::of) {
-            Some(died) if self.json => (kept::EXIT, died.json()),
-            Some(died) => {
-                died.print_short(out);
-                return kept::EXIT;
-            }
-            None => (Exit::Done, json!({ "name": name, "phase": "down" })),
-        };
-        if self.json {
-            out.json_line(&end);
-        } else {
-            out.line(
-                life.filter(|life| life.end.is_some()).map_or(format!("`{name}` ended"), |life| kept::ended(&life)),
-            );
+        if kept::told_died(out, name, self.json) {
+            return kept::EXIT;
         }
-        exit
+        if self.json {
+            out.json_line(&json!({ "name": name, "phase": "down" }));
+        } else {
+            let life = crate::session::kept::life(name).filter(|life| life.end.is_some());
+            out.line(life.map_or(format!("`{name}` ended"), |life| kept::ended(&life)));
+        }
+        Exit::Done
+    }
+}
+
+/// Looks at a deployment, again and again on one connection.
+struct Looks {
+    client: Client,
+    /// The look that is not answered yet: while there is one no other is asked for.
+    asked: Option<u64>,
+    /// The connection was made anew, and nothing has come on it.
+    anew: bool,
+}
+
+impl Looks {
+    /// The next look; none: it is not answered in time, and goes on.
+    fn next(&mut self) -> Result<Option<Json>, ClientError> {
+        let answered = self.ask();
+        let Err(error) = answered else {
+            self.anew = false;
+            return answered;
+        };
+        // One that says nothing for long is closed: who was stopped for as long may have closed it.
+        if std::mem::replace(&mut self.anew, true) {
+            return Err(error);
+        }
+        self.client = Client::connect(Some(self.client.name()))?;
+        self.asked = None;
+        self.ask()
+    }
+
+    fn ask(&mut self) -> Result<Option<Json>, ClientError> {
+        let asked = match self.asked {
+            Some(asked) => asked,
+            None => self.client.send("look", &json!({ "within_s": PATIENCE.as_secs_f64() }))?,
+        };
+        self.asked = Some(asked);
+        let answer = self.client.answer(asked, ANSWERS)?;
+        self.asked = self.asked.filter(|_| answer.is_none());
+        Ok(answer)
     }
 }
 

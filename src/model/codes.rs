@@ -566,6 +566,11 @@ codes! {
         "Room for an answer is taken when a coordinator asks. This one has asked for so much without hearing the answers that there \
          is none left, so the request was answered *failed* at once and nothing was done. A coordinator should wait for an answer \
          before it asks for more.";
+    NOT_FROM_OUTSIDE = "run::not_from_outside", "an event that nobody outside may raise",
+        "Answers of the configurator, such as `engage.ok`, and the events of the statechart itself, such as `e_done@root.a`, tell a \
+         coordinator what has happened. If a command, a client of the control socket, a script or an embedding program raised one, the \
+         coordinator would be told what has not. Ask for what is meant (`davit apply engage`): the answer goes to whoever asks. What \
+         components and monitors raise, `COMPONENT.faulted` among it, is no such event.";
     STEP_FAILED = "run::step_failed", "a step failed",
         "The platform answered that a step did not happen: it was refused, or the component's own code failed or panicked. \
          What the request had done before was undone, unless the answer is *broken*. Mend what the message names and ask again.";

@@ -2,12 +2,12 @@
 
 use super::component_type::ComponentType;
 use super::configuration::Configuration;
-use super::event::{Ask, Verdict};
+use super::event::{Ask, UNDO, Verdict};
 use super::finding::Origin;
 use super::monitor::Monitor;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::program::Program;
-use super::statechart::Statechart;
+use super::statechart::{Statechart, is_internal};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -248,11 +248,39 @@ impl Deployment {
         match Verdict::split(event) {
             Some((subject, _)) => ConfigId::new(subject).is_ok(),
             None => event.rsplit_once('.').is_some_and(|(subject, _)| {
-                let subject = subject.strip_suffix(".undo").unwrap_or(subject);
+                let subject = subject.strip_suffix(UNDO).unwrap_or(subject);
                 subject == Ask::Undo.subject()
                     || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
             }),
         }
+    }
+
+    /// Why an event cannot come from outside (of a component, a monitor, an operator): it tells what only Davit knows. None: it
+    /// can.
+    pub fn never_from_outside(&self, event: &str) -> Option<String> {
+        if is_internal(event) {
+            Some(format!("`{event}` is an event of the statechart itself, which nobody else raises"))
+        } else if !self.looks_like_answer(event) {
+            None
+        } else if event.ends_with(UNDO) {
+            Some(format!("`{event}` is a request to the configurator, no event"))
+        } else {
+            Some(format!("`{event}` is an answer of the configurator, which nobody else raises"))
+        }
+    }
+
+    /// What is to be asked for in the place of such an event, as far as it names that.
+    pub fn asked_instead(&self, event: &str) -> Option<Ask> {
+        let (subject, ending) = Verdict::split(event).unwrap_or_else(|| {
+            let asked = event.strip_suffix(UNDO);
+            asked.map_or((event, ""), |id| (id, Verdict::Undone.ending(false)))
+        });
+        let of = [Ask::Undo, Ask::Commit { force: false }].into_iter().find(|ask| ask.subject() == subject);
+        of.or_else(|| {
+            let id = self.configurations.iter().map(|c| c.id).find(|id| id.as_str() == subject)?;
+            let undoes = Ask::UndoOf(id).verdicts().iter().any(|verdict| verdict.ending(false) == ending);
+            Some(if undoes { Ask::UndoOf(id) } else { Ask::Apply(id) })
+        })
     }
 
     /// Every answer that anybody may get.

@@ -38,6 +38,9 @@ impl fmt::Display for Ask {
     }
 }
 
+/// What asks for an undo ends so.
+pub const UNDO: &str = ".undo";
+
 /// What a name means that a coordinator raises (design §7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Raise {
@@ -56,7 +59,7 @@ impl Raise {
         if text == "undo" {
             return Self::Request(Ask::Undo);
         }
-        if let Some(id) = text.strip_suffix(".undo") {
+        if let Some(id) = text.strip_suffix(UNDO) {
             return match ConfigId::new(id) {
                 Ok(id) if configured(id) => Self::Request(Ask::UndoOf(id)),
                 _ => Self::UnknownUndo,
@@ -70,6 +73,15 @@ impl Raise {
 }
 
 impl Ask {
+    /// How it is asked for on the command line.
+    pub fn command(self) -> String {
+        match self {
+            Self::Apply(id) => format!("apply {id}"),
+            Self::UndoOf(id) => format!("undo {id}"),
+            Self::Undo | Self::UndoTo(_) | Self::Commit { .. } => self.to_string(),
+        }
+    }
+
     /// Whether it takes something back.
     pub fn is_undo(self) -> bool {
         matches!(self, Self::UndoOf(_) | Self::Undo | Self::UndoTo(_))

@@ -371,6 +371,11 @@ impl fmt::Display for Trigger {
     }
 }
 
+/// Whether a statechart makes events of that name itself: completion and time events.
+pub fn is_internal(event: &str) -> bool {
+    event.starts_with("e_done@") || event.starts_with("e_after(") || event.starts_with("e_at(") || event == "e_init_fsm"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

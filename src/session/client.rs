@@ -67,6 +67,8 @@ pub struct Client {
     name: String,
     reader: BufReader<UnixStream>,
     next: u64,
+    /// A line whose end has not come.
+    begun: Vec<u8>,
 }
 
 impl Client {
@@ -90,7 +92,7 @@ impl Client {
         let clock = Clock::real();
         loop {
             match place::reach(&place::socket(&name)) {
-                Ok(stream) => return Ok(Self { name, reader: BufReader::new(stream), next: 1 }),
+                Ok(stream) => return Ok(Self { name, reader: BufReader::new(stream), next: 1, begun: Vec::new() }),
                 Err(Unreached::Untrusted(why)) => return Err(why.into()),
                 Err(Unreached::Io(_)) => {}
             }
@@ -126,18 +128,44 @@ impl Client {
     /// # Errors
     /// When the deployment refuses, or does not answer in time.
     pub fn call(&mut self, method: &str, params: &Json, limit: Duration) -> Result<Json, ClientError> {
+        let asked = self.send(method, params)?;
+        self.answer(asked, limit)?.ok_or_else(|| {
+            let why = format!("nothing came within {} s", limit.as_secs_f64());
+            ClientError::Io { name: self.name.clone(), source: io::Error::new(io::ErrorKind::TimedOut, why) }
+        })
+    }
+
+    /// Calls a method whose answer is waited for with [`Client::answer`], under the number that this answers.
+    ///
+    /// # Errors
+    /// When the connection is gone.
+    pub fn send(&mut self, method: &str, params: &Json) -> Result<u64, ClientError> {
         let id = self.next;
         self.next += 1;
-        let io = |source| ClientError::Io { name: self.name.clone(), source };
-        self.reader.get_ref().set_read_timeout(Some(limit)).map_err(io)?;
         let line = json!({"jsonrpc": "2.0", "id": id, "method": method, "params": params}).to_string();
         // One that was refused a place may be closed by now; what it was told is still there to be read.
         match self.reader.get_mut().write_all(format!("{line}\n").as_bytes()) {
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => return Err(io(e)),
-            _ => {}
+            Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
+                Err(ClientError::Io { name: self.name.clone(), source })
+            }
+            _ => Ok(id),
         }
+    }
+
+    /// The answer to a call; none: it has not come within `limit`, and may yet.
+    ///
+    /// # Errors
+    /// When the deployment refuses, or the connection is gone.
+    pub fn answer(&mut self, id: u64, limit: Duration) -> Result<Option<Json>, ClientError> {
+        let io = |source| ClientError::Io { name: self.name.clone(), source };
+        self.reader.get_ref().set_read_timeout(Some(limit)).map_err(io)?;
         loop {
-            let json = self.read().map_err(|source| ClientError::Io { name: self.name.clone(), source })?;
+            let json = match self.read() {
+                Err(late) if matches!(late.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                    return Ok(None);
+                }
+                read => read.map_err(|source| ClientError::Io { name: self.name.clone(), source })?,
+            };
             let refused = json.get("error");
             let own = json.get("id").and_then(Json::as_u64) == Some(id);
             // An error without an `id` is about the connection.
@@ -150,7 +178,7 @@ impl Client {
                     serde_json::from_value(error.clone()).unwrap_or_else(|_| RpcError::new(0, error.to_string()));
                 return Err(error.into());
             }
-            return Ok(json.get("result").cloned().unwrap_or(Json::Null));
+            return Ok(Some(json.get("result").cloned().unwrap_or(Json::Null)));
         }
     }
 
@@ -176,10 +204,12 @@ impl Client {
     }
 
     fn read(&mut self) -> io::Result<Json> {
-        let mut line = String::new();
-        if self.reader.read_line(&mut line)? == 0 {
+        // What has come of a line stays, also where its end is late.
+        self.reader.read_until(b'\n', &mut self.begun)?;
+        let line = std::mem::take(&mut self.begun);
+        if line.is_empty() {
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "it closed the connection"));
         }
-        serde_json::from_str(&line).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))
+        serde_json::from_slice(&line).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))
     }
 }

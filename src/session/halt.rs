@@ -2,7 +2,7 @@
 
 use super::stages::Stage;
 use crate::limits;
-use crate::model::{ConfigId, EventName};
+use crate::model::{ConfigId, EventName, RequestId};
 use crate::time::{Time, lock};
 use rustc_hash::FxHashSet;
 use serde::{Deserialize, Serialize};
@@ -53,6 +53,14 @@ pub(super) struct Halt {
     state: Mutex<State>,
 }
 
+/// What a safety event does that acts by itself.
+pub(super) struct Heeded<'h> {
+    /// The requests that it made, or those of the one with which it is one.
+    pub requests: Vec<RequestId>,
+    /// What is to be applied with these numbers; nothing: that has been asked for.
+    pub apply: &'h [ConfigId],
+}
+
 #[derive(Default)]
 struct State {
     /// Stopping has begun.
@@ -61,8 +69,8 @@ struct State {
     held: bool,
     /// No coordinator leads any more.
     alone: bool,
-    /// When one acted by itself last.
-    acted: Option<Time>,
+    /// When one acted by itself last, and the requests that it made.
+    acted: Option<(Time, Vec<RequestId>)>,
     /// What components reported since it began, each event once.
     reported: Vec<String>,
 }
@@ -97,19 +105,30 @@ impl Halt {
         state.began && !state.alone
     }
 
-    /// An event came. What is to be applied since it is a safety event that nobody else acts on: again and again only after
-    /// a while, however often it comes.
+    /// An event came. What is to be applied since it is a safety event that nobody else acts on, with numbers for these requests
+    /// from `number`. However often one comes, it acts once in a while: in between it is one with the one that has acted, unless
+    /// `anew` says of its requests that they did not make everything safe.
     /// None: it is no such event, or a coordinator acts on it.
-    pub fn heed(&self, event: EventName, now: Time) -> Option<&[ConfigId]> {
+    pub fn heed(
+        &self,
+        event: EventName,
+        now: Time,
+        anew: impl FnOnce(&[RequestId]) -> bool,
+        mut number: impl FnMut() -> RequestId,
+    ) -> Option<Heeded<'_>> {
         let mut state = lock(&self.state);
         if !self.safety.contains(&event) || !state.alone {
             return None;
         }
-        if state.acted.is_some_and(|acted| now < acted + limits::SAFETY_AGAIN) {
-            return Some(&[]);
+        if let Some((acted, requests)) = &state.acted
+            && now < *acted + limits::SAFETY_AGAIN
+            && !anew(requests)
+        {
+            return Some(Heeded { requests: requests.clone(), apply: &[] });
         }
-        state.acted = Some(now);
-        Some(&self.safe)
+        let requests: Vec<RequestId> = self.safe.iter().map(|_| number()).collect();
+        state.acted = Some((now, requests.clone()));
+        Some(Heeded { requests, apply: &self.safe })
     }
 
     /// A component raised an event.

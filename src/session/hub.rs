@@ -263,15 +263,23 @@ impl Hub {
 
     /// A new request of `by`.
     pub fn request(&self, ask: Ask, by: &str) -> RequestId {
-        let id = {
-            let mut state = self.lock();
-            let id = RequestId(state.next);
-            state.next += 1;
-            state.outstanding.insert(id, Outstanding { ask, by: by.to_owned(), at: self.clock.now() });
-            id
-        };
-        self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
+        let id = self.number();
+        self.requested(id, ask, by);
         id
+    }
+
+    /// A number for a request that comes at once.
+    pub fn number(&self) -> RequestId {
+        let mut state = self.lock();
+        state.next += 1;
+        RequestId(state.next - 1)
+    }
+
+    /// A request of that number is made.
+    pub fn requested(&self, id: RequestId, ask: Ask, by: &str) {
+        let outstanding = Outstanding { ask, by: by.to_owned(), at: self.clock.now() };
+        self.lock().outstanding.insert(id, outstanding);
+        self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
     }
 
     /// A request was answered. It stays outstanding until it is [settled](Self::settled), when whoever asked has been told.

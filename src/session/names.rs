@@ -4,14 +4,31 @@ use super::Session;
 use crate::limits::{EVENTS_UNLISTED, UNLISTED_BYTES};
 use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
-use crate::model::{EventName, Verdict};
+use crate::model::{Ask, Code, EventName, Verdict, codes};
 use crate::time::lock;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
 
+/// Why nobody outside may raise an event.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct NotFromOutside {
+    message: String,
+    /// What to do instead.
+    pub help: String,
+}
+
+impl NotFromOutside {
+    /// What `davit explain` tells more about.
+    pub const CODE: Code = codes::NOT_FROM_OUTSIDE;
+}
+
 /// Why a text from outside is no event here.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotNamed {
+    /// It tells what only Davit knows.
+    #[error(transparent)]
+    NotFromOutside(#[from] NotFromOutside),
     /// No transition lists it, and no function may see it.
     #[error("the coordinator knows no event `{0}`")]
     Unknown(String),
@@ -60,12 +77,47 @@ pub(super) fn instead(event: &str) -> Vec<String> {
     others.iter().map(|verdict| format!("{subject}{}", verdict.ending(bare))).collect()
 }
 
+/// How what is meant is asked for.
+fn instead_of(ask: Ask) -> String {
+    let script = match ask {
+        Ask::Apply(id) => format!("apply(\"{id}\")"),
+        Ask::UndoOf(id) => format!("undo(\"{id}\")"),
+        other => format!("{other}()"),
+    };
+    format!("`davit {}` asks for it (in a script `{script}`)", ask.command())
+}
+
 impl Session {
+    /// Whether somebody outside may raise an event: everything that comes from there is asked this, by whichever way it comes.
+    ///
+    /// # Errors
+    /// [`NotFromOutside`].
+    pub fn may_raise(&self, event: &str) -> Result<(), NotFromOutside> {
+        let deployment = self.deployment();
+        let Some(message) = deployment.never_from_outside(event) else { return Ok(()) };
+        let help = deployment.asked_instead(event).map_or_else(
+            || "raise an event that a transition waits for; answers go to whoever asks for something".to_owned(),
+            instead_of,
+        );
+        Err(NotFromOutside { message, help })
+    }
+
+    /// What may have been meant by a text that is no event here: what somebody waits for, and may be raised from outside.
+    pub fn near_event(&self, name: &str) -> String {
+        if let Some(id) = self.configurations().into_iter().find(|id| id.as_str() == name) {
+            return format!("`{name}` is a configuration: {}", instead_of(Ask::Apply(id)));
+        }
+        let events = self.events();
+        let waited_for = events.iter().map(EventName::as_str).filter(|event| self.may_raise(event).is_ok());
+        did_you_mean(name, "events", waited_for)
+    }
+
     /// The event that a text from outside names. Asked before it becomes a name: names are kept for ever.
     ///
     /// # Errors
-    /// [`NotNamed`]: nobody here can hear it, or there are too many that only functions may hear.
+    /// [`NotNamed`]: nobody outside may raise it, nobody here can hear it, or there are too many that only functions may hear.
     pub fn named(&self, name: &str) -> Result<EventName, NotNamed> {
+        self.may_raise(name)?;
         match self.events().into_iter().find(|known| known.as_str() == name) {
             Some(known) => Ok(known),
             None if self.sees_all_events() => self.hub().unlisted.keep(name),

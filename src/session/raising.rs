@@ -2,34 +2,45 @@
 
 use super::Session;
 use super::log::Happening;
+use super::names::NotFromOutside;
 use super::parts::Part;
-use super::routes::make_safe;
+use super::routes::{Acted, make_safe};
 use crate::coordinator::{Class, Refused};
-use crate::model::{EventName, Ident, RequestId};
+use crate::model::{EventName, Ident};
 
 /// An event that was given to all coordinators.
 #[derive(Debug)]
 pub struct Offered {
     /// To be asked with what became of it.
     pub ticket: u64,
-    /// It is one of safety that acted by itself, since no coordinator leads any more: these requests; none where it had acted
-    /// just before.
-    pub acted: Option<Vec<RequestId>>,
+    /// It is one of safety that acted by itself, since no coordinator leads any more.
+    pub acted: Option<Acted>,
+}
+
+/// Why an event from outside was not raised. Nobody was told of it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotRaised {
+    /// Nobody outside may raise it.
+    #[error(transparent)]
+    NotFromOutside(#[from] NotFromOutside),
+    /// [`Refused::Full`]: a coordinator that may hear it does not keep up.
+    #[error(transparent)]
+    Refused(#[from] Refused),
 }
 
 impl Session {
-    /// Gives an event to all coordinators, in the name of `from`; where there is no room for it that is written down.
+    /// Gives an event to all coordinators, in the name of `from`; where that is refused it is written down.
     pub fn raise(&self, event: EventName, from: &str) {
         if let Err(refused) = self.offer(event, from) {
             self.hub().note(Happening::Forced { note: format!("`{event}` was not delivered: {refused}") });
         }
     }
 
-    /// The same, for those who can be told that there is no room.
+    /// The same, for those who can be told that it is refused.
     ///
     /// # Errors
-    /// [`Refused::Full`]: a coordinator that may hear it does not keep up. Nobody was told of the event.
-    pub fn offer(&self, event: EventName, from: &str) -> Result<(), Refused> {
+    /// [`NotRaised`].
+    pub fn offer(&self, event: EventName, from: &str) -> Result<(), NotRaised> {
         self.deliver(event, from, 0, |_| true).map(drop)
     }
 
@@ -37,7 +48,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::offer`].
-    pub fn offer_to(&self, event: EventName, to: &[Ident], from: &str) -> Result<(), Refused> {
+    pub fn offer_to(&self, event: EventName, to: &[Ident], from: &str) -> Result<(), NotRaised> {
         self.deliver(event, from, 0, |name| to.contains(&name)).map(drop)
     }
 
@@ -46,7 +57,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::offer`].
-    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<Offered, Refused> {
+    pub fn offer_watched(&self, event: EventName, from: &str) -> Result<Offered, NotRaised> {
         let ticket = self.hub().ticket(self.parts().len());
         let acted = self.deliver(event, from, ticket, |_| true).inspect_err(|_| self.hub().forget(ticket))?;
         Ok(Offered { ticket, acted })
@@ -58,7 +69,8 @@ impl Session {
         from: &str,
         ticket: u64,
         to: impl Fn(Ident) -> bool,
-    ) -> Result<Option<Vec<RequestId>>, Refused> {
+    ) -> Result<Option<Acted>, NotRaised> {
+        self.may_raise(event.as_str())?;
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts().len()), false);
@@ -67,7 +79,7 @@ impl Session {
                 Ok(()) => held.push(part),
                 Err(Refused::Full) if part.may_hear(event) => {
                     held.iter().for_each(|part| part.coordinator.release(incoming.class));
-                    return Err(Refused::Full);
+                    return Err(Refused::Full.into());
                 }
                 Err(Refused::Full) => {}
                 Err(Refused::Detached) => gone = true,
@@ -76,7 +88,7 @@ impl Session {
         self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned() });
         self.configurator().event(event);
         self.junction().tell_leaving(self.configurator(), event);
-        let acted = make_safe(self.hub(), self.configurator(), event);
+        let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
         (held.len()..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let mut unwatched = false;
         for part in held {
@@ -92,6 +104,6 @@ impl Session {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
-        if unwatched { Err(Refused::Full) } else { Ok(acted) }
+        if unwatched { Err(Refused::Full.into()) } else { Ok(acted) }
     }
 }

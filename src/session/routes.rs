@@ -1,12 +1,13 @@
 //! The ways between coordinator, configurator and platform: names raised become requests, answers and reports become
 //! events. Called in the threads of those who raise; nothing here waits.
 
+use super::halt::Heeded;
 use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
 use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
-use crate::model::{Ask, ConfigId, Deployment, EventName, RequestId, Verdict};
+use crate::model::{Ask, Deployment, EventName, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
@@ -297,23 +298,33 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     hub.halt().report(event);
     if let Some(configurator) = &configurator {
         junction.tell_leaving(configurator, event);
-        make_safe(hub, configurator, event);
+        make_safe(hub, configurator, event, Class::Report);
     }
     for coordinator in junction.all() {
         hub.taken(coordinator.deliver(junction.incoming(Class::Report, event)));
     }
 }
 
-/// A safety event that no coordinator hears any more acts by itself: everything safe is applied. Answers these requests, of
-/// which there are none where it has acted just before.
-pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName) -> Option<Vec<RequestId>> {
-    let safe = hub.halt().heed(event, hub.now())?;
-    let make = |id: &ConfigId| {
+/// What a safety event did that acted by itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Acted {
+    /// What it asked for.
+    pub requests: Vec<RequestId>,
+    /// Another one had asked for that just before, and this one is one with it.
+    pub before: bool,
+}
+
+/// A safety event that no coordinator hears any more acts by itself: everything safe is applied. Who sends one again where that
+/// failed wants it tried again; a component may raise it in each update, and is heeded once in a while.
+pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName, class: Class) -> Option<Acted> {
+    let failed = |id: &RequestId| hub.answer(*id).is_some_and(|answered| !answered.ok);
+    let anew = |requests: &[RequestId]| class == Class::Outside && requests.iter().any(failed);
+    let Heeded { requests, apply } = hub.halt().heed(event, hub.now(), anew, || hub.number())?;
+    for (id, request) in apply.iter().zip(&requests) {
         let ask = Ask::Apply(*id);
-        let request = Request::new(hub.request(ask, &Requester::Safety.to_string()), ask, Requester::Safety);
+        hub.requested(*request, ask, &Requester::Safety.to_string());
         // A full queue has answered it already.
-        let _ = configurator.submit(Batch::one(request));
-        request.id
-    };
-    Some(safe.iter().map(make).collect())
+        let _ = configurator.submit(Batch::one(Request::new(*request, ask, Requester::Safety)));
+    }
+    Some(Acted { before: apply.is_empty() && !requests.is_empty(), requests })
 }

@@ -5,12 +5,12 @@ use super::log::Answered;
 use super::members::NoMember;
 use super::names::instead;
 use super::raising::Offered;
+use super::routes::Acted;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
-use super::{Command, NO_FORWARD, Session, recovery};
-use crate::coordinator::Refused;
+use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, recovery};
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, EventName, RequestId};
+use crate::model::{Ask, ConfigId, RequestId};
 use serde_json::{Value as Json, json};
 use std::sync::Weak;
 use std::time::Duration;
@@ -218,32 +218,37 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
     let wait_for: Option<String> = optional(params, "wait_for")?;
     let waits: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params, WITHIN)?;
-    let known = session.events();
-    let near = || did_you_mean(&name, "events", known.iter().map(EventName::as_str));
     let mut answer = json!({ "accepted": true });
-    let event = session.named(&name).map_err(|why| refused(why.to_string(), near()))?;
-    if !known.contains(&event) {
-        answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {}", near()));
+    let event = session.named(&name).map_err(|why| match why {
+        NotNamed::NotFromOutside(why) => not_from_outside(why),
+        other => refused(other.to_string(), session.near_event(&name)),
+    })?;
+    if !session.events().contains(&event) {
+        let near = session.near_event(&name);
+        answer["note"] = json!(format!("no transition lists `{name}`, only functions may see it; {near}"));
     }
     if let Some(why) = wait_for.as_ref().and_then(|name| session.never_heard(name)) {
         return Err(refused(why, "wait for an answer that may come, or for an event".to_owned()));
     }
     let since = session.hub().heard();
     if let Some(wait_for) = wait_for {
-        session.offer(event, "operator").map_err(no_room)?;
+        session.offer(event, "operator").map_err(not_raised)?;
         let late = format!("`{wait_for}` was not heard in time");
         let mut ends = instead(&wait_for);
         ends.push(wait_for);
         let heard = wait(session, within, gone, || late, |hub| hub.first_heard(&ends, since))?;
         answer["heard"] = json!(heard);
     } else if waits {
-        let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(no_room)?;
-        if let Some(requests) = acted {
+        let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(not_raised)?;
+        if let Some(Acted { requests, before }) = acted {
             session.hub().forget(ticket);
             let all = |hub: &Hub| requests.iter().map(|request| hub.answer(*request)).collect::<Option<Vec<_>>>();
             let late = || format!("what `{name}` does by itself was not over in time");
             let answers: Vec<Answered> = wait(session, within, gone, late, all)?;
             answer["taken"] = json!(true);
+            if before {
+                answer["before"] = json!(true);
+            }
             answer["acted"] = json!(answers.iter().map(|answered| &answered.answer).collect::<Vec<_>>());
             return Ok(answer);
         }
@@ -253,13 +258,23 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
         // What confirms a configuration need not move a coordinator.
         answer["taken"] = json!(taken? || session.confirms(event));
     } else {
-        session.offer(event, "operator").map_err(no_room)?;
+        session.offer(event, "operator").map_err(not_raised)?;
     }
     Ok(answer)
 }
 
-fn no_room(why: Refused) -> RpcError {
-    refused(why.to_string(), "events come faster than it reacts: wait, and send it again".to_owned())
+fn not_from_outside(why: NotFromOutside) -> RpcError {
+    let data = json!({ "help": why.help, "code": NotFromOutside::CODE });
+    RpcError { data, ..RpcError::new(REFUSED, why.to_string()) }
+}
+
+fn not_raised(why: NotRaised) -> RpcError {
+    match why {
+        NotRaised::NotFromOutside(why) => not_from_outside(why),
+        NotRaised::Refused(why) => {
+            refused(why.to_string(), "events come faster than it reacts: wait, and send it again".to_owned())
+        }
+    }
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {

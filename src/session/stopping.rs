@@ -133,8 +133,8 @@ impl Session {
         if let Err(refused) = &ticket {
             hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
         }
-        let ticket = ticket.map(|offered| offered.ticket);
-        let unheard = || ticket.is_ok_and(|ticket| hub.was_heard(ticket) == Some(false));
+        let ticket = ticket.map(|offered| offered.ticket).ok();
+        let unheard = || ticket.is_some_and(|ticket| hub.was_heard(ticket) == Some(false));
         let came = loop {
             if self.is_down() {
                 // As the platform shows it: it may have said that something is gone.

@@ -110,3 +110,60 @@ fn the_log_is_followed_to_the_end() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(deployed.end().code(), Some(0));
 }
+
+#[test]
+fn the_log_of_one_that_is_killed_ends_and_says_so() {
+    for json in [false, true] {
+        let demo = Demo::new();
+        crate::kept::deploy(&demo, "deployment.yaml");
+        let mut command = demo.command(&["log", "--follow"]);
+        command.args(json.then_some("--json"));
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
+        assert!(lines.any(|line| line.contains("e_ready")));
+        crate::kept::kill(&demo, "demo");
+        let last = lines.last().expect("a last line");
+        let said = if json { "\"phase\":\"died\"" } else { "demo  died  killed, or crashed" };
+        assert!(last.contains(said), "{last}");
+        assert_eq!(child.wait().unwrap().code(), Some(4));
+    }
+}
+
+/// What tells what has happened is raised by nobody from outside, whichever way it comes; and what may be raised is suggested.
+#[test]
+fn an_answer_is_given_by_nobody_else() {
+    let (demo, deployed) = deployed();
+    for (forged, instead) in [
+        ("slow.failed", "`davit apply slow`"),
+        ("slow.lost", "`davit apply slow`"),
+        ("create_all.undone", "`davit undo create_all`"),
+        ("start_all.undo.failed", "`davit undo start_all`"),
+        ("create_all.undo", "`davit undo create_all`"),
+        ("undo.done", "`davit undo`"),
+        ("commit.ok", "`davit commit`"),
+        ("e_done@root.idle", "a transition waits for"),
+    ] {
+        for args in [&["event", forged][..], &["event", forged, "--no-wait"], &["event", forged, "--wait", "e_ready"]] {
+            let ran = demo.run(args);
+            assert_eq!(ran.code, 1, "{args:?}: {}{}", ran.out, ran.err);
+            assert!(ran.err.contains("run::not_from_outside"), "{args:?}: {}", ran.err);
+            let said = ran.err.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(said.contains(instead), "{args:?}: {said}");
+        }
+    }
+    let status = demo.run(&["status", "--json"]).json();
+    assert_eq!(status["coordinator"].as_array().and_then(|all| all.last()), Some(&"root.operational.slow_mode".into()));
+    assert_eq!(demo.run(&["explain", "run::not_from_outside"]).code, 0);
+    let unknown = demo.run(&["event", "what"]);
+    assert!(unknown.err.contains("`e_fast`") && !unknown.err.contains("failed"), "{}", unknown.err);
+    assert!(demo.run(&["event", "fast"]).err.contains("`davit apply fast`"));
+    // What a component may raise, anybody may.
+    assert!(demo.run(&["event", "source.faulted"]).err.contains("knows no event"));
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    assert_eq!(deployed.end().code(), Some(0));
+    demo.write("forge.lua", "deploy('deployment.yaml')\nraise('slow.failed')\n");
+    let script = demo.run(&["run", "forge.lua", "--clock", "simulated"]);
+    assert_eq!(script.code, 1, "{}", script.out);
+    let said = script.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("`slow.failed` is an answer") && said.contains("apply(\"slow\")"), "{said}");
+}

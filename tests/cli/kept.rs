@@ -7,15 +7,19 @@ use std::process::Stdio;
 
 /// Kills what runs in the background without a word, and waits until it is gone.
 pub fn kill(demo: &Demo, name: &str) {
-    let text = demo.read(&format!("state/davit/{name}.life"));
-    let life: Value = serde_json::from_str(text.lines().next().expect("a line")).expect("JSON");
-    let pid = i32::try_from(life["pid"].as_i64().expect("a number")).expect("of a process");
     // SAFETY: a signal to a process of ours.
-    assert_eq!(unsafe { libc::kill(pid, libc::SIGKILL) }, 0);
+    assert_eq!(unsafe { libc::kill(process(demo, name), libc::SIGKILL) }, 0);
     until("its name is free", || {
         let ran = demo.command(&["event", "e_fast", "--on", name]).output().expect("the program starts");
         String::from_utf8_lossy(&ran.stderr).contains("cli::not_running").then_some(())
     });
+}
+
+/// The process that runs a deployment.
+pub fn process(demo: &Demo, name: &str) -> i32 {
+    let text = demo.read(&format!("state/davit/{name}.life"));
+    let life: Value = serde_json::from_str(text.lines().next().expect("a line")).expect("JSON");
+    i32::try_from(life["pid"].as_i64().expect("a number")).expect("of a process")
 }
 
 pub fn deploy(demo: &Demo, file: &str) -> Ran {
@@ -115,4 +119,25 @@ fn one_in_the_foreground_is_kept_too_also_when_a_third_signal_ends_it() {
     assert_eq!(child.end().code(), Some(4));
     let status = demo.run(&["status", "demo"]);
     assert!(status.code == 1 && status.err.contains("by a third signal"), "{}{}", status.out, status.err);
+}
+
+/// What a process wrote down of itself was damaged, at its beginning or behind it: that it was there is told all the same.
+#[test]
+fn of_one_whose_record_is_damaged_it_is_told_that_it_died() {
+    let demo = Demo::new();
+    deploy(&demo, "deployment.yaml");
+    kill(&demo, "demo");
+    let whole = demo.read("state/davit/demo.life");
+    for damaged in ["", "\u{1}garbage", "{\"pid\": 3", &format!("{whole}{{\"at\": ")] {
+        demo.write("state/davit/demo.life", damaged);
+        let status = demo.run(&["status", "demo"]);
+        assert_eq!(status.code, 4, "{damaged:?}: {}{}", status.out, status.err);
+        for words in ["demo  died  its record is damaged", "it was       up", "look at the hardware"] {
+            assert!(status.out.contains(words), "{damaged:?}, {words}: {}", status.out);
+        }
+        assert_eq!(demo.run(&["status", "--json"]).json()["damaged"], true);
+        assert!(demo.run(&["list"]).out.contains("demo  died"), "{damaged:?}");
+    }
+    assert_eq!(demo.run(&["list", "--forget", "demo"]).code, 0);
+    assert_eq!(demo.run(&["list"]).out, "no deployment is running\n");
 }

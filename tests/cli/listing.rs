@@ -52,12 +52,24 @@ fn what_runs_and_what_died_is_listed_until_it_is_forgotten() {
     assert!(demo.run(&["list"]).out.contains("other  died  killed, or crashed"), "{list}");
     // One runs, and is meant; the other is not kept quiet about.
     let status = demo.run(&["status"]);
-    assert!(status.code == 0 && status.out.starts_with("demo  up"), "{}", status.out);
+    assert!(status.code == 4 && status.out.starts_with("demo  up"), "{} {}", status.code, status.out);
     assert!(status.err.contains("`other` died") && !status.err.contains("`demo`"), "{}", status.err);
     assert_eq!(demo.run(&["status", "demo", "other"]).code, 4);
 
+    // One that there is not hides none that there is, and how it ends tells of the worst.
+    let three = demo.run(&["status", "none", "demo", "other"]);
+    assert_eq!(three.code, 4, "{}", three.err);
+    for words in ["none  not seen  no deployment named `none` is running", "demo  up", "other  died"] {
+        assert!(three.out.contains(words), "{words}: {}", three.out);
+    }
+    let two = demo.run(&["status", "demo", "none", "--json"]);
+    let seen = two.json();
+    assert_eq!((two.code, &seen[0]["phase"], &seen[1]["phase"]), (1, &"up".into(), &Value::Null), "{seen}");
+    assert_eq!(seen[1]["name"], "none");
+
     let runs = demo.run(&["list", "--forget", "demo"]);
     assert!(runs.code == 1 && runs.err.contains("cli::nothing_kept"), "{}", runs.err);
+    assert!(runs.err.contains("`demo` runs, and nothing of it is forgotten"), "{}", runs.err);
     assert_eq!(demo.run(&["list", "--forget", "other"]).code, 0);
     assert_eq!(demo.run(&["list", "--json"]).json().as_array().map(Vec::len), Some(1));
     assert_eq!(demo.run(&["status", "other"]).code, 1);

@@ -132,3 +132,50 @@ fn it_ends_with_the_deployment_and_says_how_that_was() {
         assert!(last.contains(said), "{last}");
     }
 }
+
+#[test]
+fn one_that_stands_still_is_said_not_to_answer_until_it_does() {
+    let deployed = Deployed(Demo::new());
+    let demo = &deployed.0;
+    deploy(demo, "deployment.yaml");
+    let mut command = demo.command(&["watch", "--every", "0.05"]);
+    let (read, write) = std::io::pipe().expect("a pipe");
+    let watch = Foreground::start(command.stdout(write).stderr(Stdio::null()));
+    drop(command);
+    let mut lines = BufReader::new(read).lines();
+    let mut until = |words: &str| {
+        let mut seen = lines.by_ref().map(|line| line.expect("a line"));
+        seen.find(|line| line.contains(words)).unwrap_or_else(|| panic!("no `{words}`"))
+    };
+    until("up  root.operational.slow_mode");
+    let pid = crate::kept::process(demo, "demo");
+    let stopped = Stopped::new(pid);
+    let said = until("does not answer");
+    assert!(said.starts_with("demo  does not answer for "), "{said}");
+    // So does one that begins to look.
+    let look = demo.run(&["watch", "--count", "1", "--json"]);
+    assert_eq!((look.code, &look.json()["phase"]), (1, &serde_json::Value::Null), "{}", look.out);
+    assert!(look.json()["why"].as_str().is_some_and(|why| why.contains("does not answer")), "{}", look.out);
+    drop(stopped);
+    until("up  root.operational.slow_mode");
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    assert_eq!(watch.end().code(), Some(0));
+}
+
+/// A process stands still, until this is dropped.
+struct Stopped(i32);
+
+impl Stopped {
+    fn new(process: i32) -> Self {
+        // SAFETY: a signal to a process of ours.
+        assert_eq!(unsafe { libc::kill(process, libc::SIGSTOP) }, 0);
+        Self(process)
+    }
+}
+
+impl Drop for Stopped {
+    fn drop(&mut self) {
+        // SAFETY: a signal to a process of ours.
+        unsafe { libc::kill(self.0, libc::SIGCONT) };
+    }
+}

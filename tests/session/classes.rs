@@ -8,7 +8,7 @@ use davit::libraries;
 use davit::limits;
 use davit::model::{Ask, ComponentName, EventName};
 use davit::platform::simulated::{Options, Simulated};
-use davit::session::{Happening, Session, Setup};
+use davit::session::{Happening, NotRaised, Session, Setup};
 use davit::statechart::compile;
 use davit::time::Clock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -213,7 +213,7 @@ fn a_flood_from_outside_is_refused_and_displaces_no_answer_and_no_shutdown() {
         let crowd = crowd.clone();
         std::thread::spawn(move || {
             let sent = (0..EACH).map(|_| crowd.session.offer(event("e_click"), "test"));
-            let refused = sent.filter(|sent| *sent == Err(Refused::Full)).count();
+            let refused = sent.filter(|sent| *sent == Err(Refused::Full.into())).count();
             EACH - refused
         })
     };
@@ -227,6 +227,27 @@ fn a_flood_from_outside_is_refused_and_displaces_no_answer_and_no_shutdown() {
     crowd.until("it leaves", || leaves.load(Ordering::SeqCst) != usize::MAX);
     assert!(leaves.load(Ordering::SeqCst) <= 1, "the shutdown event is next: {leaves:?}");
     // It comes down by its own answers, of which none was lost.
+    crowd.down();
+}
+
+/// Also one that is embedded tells no coordinator what only the configurator knows.
+#[test]
+fn what_an_answer_tells_comes_from_nobody_else() {
+    let crowd = Crowd::up(1);
+    let heard = Arc::new(AtomicUsize::new(0));
+    let count = heard.clone();
+    crowd.observe(move |event| _ = count.fetch_add(usize::from(event == "word"), Ordering::SeqCst), |_| {});
+    for name in ["ask.ok", "ask.failed"] {
+        assert!(matches!(crowd.session.offer(event(name), "test"), Err(NotRaised::NotFromOutside(_))), "{name}");
+        assert!(crowd.session.offer_watched(event(name), "test").is_err(), "{name}");
+        assert!(crowd.session.offer_to(event(name), &crowd.session.coordinators(), "test").is_err(), "{name}");
+        crowd.session.raise(event(name), "test");
+    }
+    let log = crowd.session.hub().log(usize::MAX);
+    let noted = |what: &Happening| matches!(what, Happening::Forced { note } if note.contains("`ask.ok` is an answer"));
+    assert!(log.iter().any(|entry| noted(&entry.what)), "{log:?}");
+    crowd.session.raise(event("e_begin"), "test");
+    crowd.until("the first word", || heard.load(Ordering::SeqCst) > 0);
     crowd.down();
 }
 

@@ -405,7 +405,7 @@ fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
     let (ended, _) = small.stop();
     let answered = std::mem::take(&mut *answered.lock().unwrap());
     assert_eq!(answered[0], json!({"accepted": true, "taken": true, "acted": ["calm.ok"]}), "{ended:?}");
-    assert_eq!(answered[1], json!({"accepted": true, "taken": true, "acted": []}));
+    assert_eq!(answered[1], json!({"accepted": true, "taken": true, "acted": ["calm.ok"], "before": true}));
     let log = small.session.hub().log(usize::MAX);
     let by = log.iter().find_map(|entry| match &entry.what {
         Happening::Answered(answer) if answer.answer == "calm.ok" => Some(answer.by.clone()),
@@ -415,6 +415,37 @@ fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
     let delivered =
         log.iter().any(|entry| matches!(&entry.what, Happening::Forced { note } if note.contains("was not delivered")));
     assert!(!delivered, "it did what it is for");
+}
+
+/// Who asks again where what was safe failed is not put off: it is tried again, and the sender is told what came of that.
+#[test]
+fn a_safety_event_that_failed_acts_again_when_it_is_sent_again() {
+    let small = Small::new("deaf", vec![FaultRule::on("property_set a.g", Fault::Fail).times(1)]);
+    small.session.bring_up().unwrap_or_else(|not| panic!("{not:#?}"));
+    let service = SessionService::new(Arc::downgrade(&small.session));
+    let answered = Arc::new(Mutex::new(Vec::new()));
+    let told = answered.clone();
+    small.after(6.0, move |session| {
+        let asked = std::thread::spawn(move || {
+            for _ in 0..3 {
+                let params = json!({"event": "e_estop", "wait": true});
+                told.lock().unwrap().push(service.call(1, "event", &params).unwrap());
+            }
+        });
+        // Less than a second apart on the deployment's clock.
+        let began = session.clock().now();
+        while !asked.is_finished() && (session.clock().now() < began + Duration::from_millis(500)) {
+            session.clock().sleep(Duration::from_micros(10));
+        }
+        asked.join().unwrap();
+        force(session);
+    });
+    let (ended, _) = small.stop();
+    let all = std::mem::take(&mut *answered.lock().unwrap());
+    assert_eq!(all[0], json!({"accepted": true, "taken": true, "acted": ["calm.broken"]}));
+    assert_eq!(all[1], json!({"accepted": true, "taken": true, "acted": ["calm.ok"]}));
+    assert_eq!(all[2], json!({"accepted": true, "taken": true, "acted": ["calm.ok"], "before": true}));
+    assert!(ended.is_clean() && small.heard("calm.ok"), "{ended:?} {:?}", small.heard.lock().unwrap());
 }
 
 /// From the first moment on; what makes safe, what shuts down and what only looks stays open.

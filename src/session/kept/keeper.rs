@@ -60,7 +60,10 @@ impl Keeper {
         let log = Rotating::open(log_file(name).ok_or_else(missing)?, limits::KEPT_BYTES)?;
         // Last of what may fail: what says that it began has all that is needed to say how it ended.
         life.set_len(0)?;
-        say(&life, &serde_json::to_string(&began).expect("plain data"))?;
+        say(&life, &serde_json::to_string(&began).expect("plain data")).inspect_err(|_| {
+            // Half a word would be told as that of one that died.
+            let _ = file(name, "life").map(std::fs::remove_file);
+        })?;
         let begins = json!({ "at": 0.0, "what": "began", "when": began.began.to_string(), "pid": began.pid });
         let mut writer = Writer { log, story: Story::default(), missing: 0, begins: Some(begins) };
         writer.begin();

@@ -17,7 +17,7 @@ pub use story::{Story, entries};
 use super::Ended;
 use super::place;
 use crate::limits;
-use crate::time::Wall;
+use crate::time::{Clock, Wall};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, TryLockError};
 use std::path::{Path, PathBuf};
@@ -43,11 +43,13 @@ pub fn log_file(name: &str) -> Option<PathBuf> {
 
 /// A deployment's process, as it wrote itself down.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Began {
-    pid: u32,
-    began: Wall,
+pub struct Began {
+    /// Its number.
+    pub pid: u32,
+    /// When it began.
+    pub began: Wall,
     /// The deployment's file.
-    file: PathBuf,
+    pub file: PathBuf,
     /// Which start of the machine it was.
     boot: Option<String>,
 }
@@ -68,12 +70,10 @@ pub struct End {
 pub struct Life {
     /// The deployment's name.
     pub name: String,
-    /// Its process.
-    pub pid: u32,
-    /// When it began.
-    pub began: Wall,
-    /// The deployment's file.
-    pub file: PathBuf,
+    /// Its process; none: what it wrote down of itself cannot be read.
+    pub process: Option<Began>,
+    /// It wrote something after that, which cannot be read.
+    pub torn: bool,
     /// When it was seen alive last.
     pub seen: Wall,
     /// Whether it lives.
@@ -85,6 +85,11 @@ pub struct Life {
 }
 
 impl Life {
+    /// Whether what it wrote down of itself cannot be read, or not all of it.
+    pub fn is_damaged(&self) -> bool {
+        self.process.is_none() || self.torn
+    }
+
     /// Whether it ended without a word: killed, crashed, or the machine went down under it.
     pub fn died(&self) -> bool {
         !self.alive && self.end.is_none()
@@ -99,11 +104,25 @@ pub fn life(name: &str) -> Option<Life> {
     let text = String::from_utf8_lossy(&text);
     let seen = file.metadata().ok()?.modified().ok()?.into();
     let mut lines = text.lines();
-    let began: Began = serde_json::from_str(lines.next()?).ok()?;
-    let end = lines.next().and_then(|line| serde_json::from_str(line).ok());
-    let rebooted = began.boot.is_some() && began.boot != boot();
-    let Began { pid, began, file, .. } = began;
-    Some(Life { name: name.to_owned(), pid, began, file, seen, alive, end, rebooted })
+    // That it was there is known also where what it wrote is damaged.
+    let process: Option<Began> = lines.next().and_then(|line| serde_json::from_str(line).ok());
+    let last = lines.next();
+    let end: Option<End> = last.and_then(|line| serde_json::from_str(line).ok());
+    let torn = last.is_some() && end.is_none();
+    let rebooted = process.as_ref().is_some_and(|began| began.boot.is_some() && began.boot != boot());
+    Some(Life { name: name.to_owned(), process, torn, seen, alive, end, rebooted })
+}
+
+/// The same of a deployment that has just gone: what its process held is free a moment after it has closed its connections.
+pub fn life_after(name: &str) -> Option<Life> {
+    let clock = Clock::real();
+    loop {
+        let life = life(name)?;
+        if !life.alive || clock.now().as_secs_f64() >= limits::KEPT_LOCK.as_secs_f64() {
+            return Some(life);
+        }
+        clock.sleep(limits::SOCKET_STEP);
+    }
 }
 
 /// The last life of every name, in the order of their names.
