@@ -1,12 +1,12 @@
 //! What does not come any more once stopping has begun: where a deployment declares `safety:`, an ordinary event that somebody
 //! raises from outside is refused then ([`Deployment::stays_open`](crate::model::Deployment::stays_open)). What components
-//! and monitors report comes all the same.
+//! and monitors report comes all the same, where they have reason to: [`bars`](super::bars).
 
 use super::explore::Barred;
 use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Move, State};
-use crate::model::{EventName, Monitor};
+use crate::model::{Ask, EventName, Monitor, Verdict};
 use crate::statechart::EventId;
 
 /// Who may still raise an event from outside while the deployment is being stopped.
@@ -14,9 +14,11 @@ use crate::statechart::EventId;
 pub enum Raises {
     /// Nobody.
     Nobody,
+    /// A component that fails, or one or a monitor that reports it where it has reason to.
+    Sometimes,
     /// A component, if one does: the types of this platform do not say what they raise.
     Perhaps,
-    /// Somebody from outside, a component or a monitor.
+    /// Somebody from outside; or it comes by itself.
     Somebody,
 }
 
@@ -25,17 +27,20 @@ impl Product<'_> {
     pub(super) fn raises_while_stopping(&self, by: Move) -> Raises {
         let of = |name: EventName| self.may_raise(name);
         match by {
-            // One is followed for all that no coordinator tells from it.
-            Move::Event(at) => {
-                let alike = (0..self.outside.len()).filter(|other| self.alike[*other] == usize::from(at));
-                alike.map(|other| of(self.outside[other])).max().unwrap_or(Raises::Nobody)
-            }
+            Move::Event(at) => self.alike_to(at).map(of).max().unwrap_or(Raises::Nobody),
             Move::Confirmed(id) => {
                 let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
                 confirm.map_or(Raises::Somebody, |confirm| of(confirm.event))
             }
+            Move::Lost(_) => Raises::Sometimes,
             _ => Raises::Somebody,
         }
+    }
+
+    /// The events that are followed as one from outside, since no coordinator tells them apart.
+    pub(super) fn alike_to(&self, at: u16) -> impl Iterator<Item = EventName> + '_ {
+        let alike = (0..self.outside.len()).filter(move |other| self.alike[*other] == usize::from(at));
+        alike.map(|other| self.outside[other])
     }
 
     /// Why a move leads no deployment down that is being stopped.
@@ -45,6 +50,7 @@ impl Product<'_> {
         }
         match self.raises_while_stopping(by) {
             Raises::Nobody => return Some(Barred::Closed),
+            Raises::Sometimes => return Some(Barred::Gone),
             Raises::Perhaps => return Some(Barred::Reported),
             Raises::Somebody => {}
         }
@@ -75,23 +81,32 @@ impl Product<'_> {
                 let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
                 confirm.map(|confirm| confirm.event.to_string()).unwrap_or_default()
             }
+            Move::Lost(id) => Verdict::Lost.event(Ask::Apply(id)).to_string(),
             _ => String::new(),
         }
     }
 
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
-        let reacts = deployment.reactions.iter().any(|reaction| reaction.raise == name);
-        let faults = name.as_str().ends_with(".faulted");
-        let reported =
-            reacts || faults || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
-        match deployment.stays_open(name.as_str()) || reported {
-            true => Raises::Somebody,
+        let simulated = deployment.platform.as_str() == "simulated";
+        let reacts = simulated && deployment.reactions.iter().any(|reaction| reaction.raise == name);
+        let watched = || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
+        if deployment.stays_open(name.as_str()) {
+            Raises::Somebody
+        } else if reacts || fails(name) || watched() {
+            Raises::Sometimes
+        } else if simulated {
             // There components raise what `simulated: { reactions }` says, and nothing else.
-            false if deployment.platform.as_str() == "simulated" => Raises::Nobody,
-            false => Raises::Perhaps,
+            Raises::Nobody
+        } else {
+            Raises::Perhaps
         }
     }
+}
+
+/// Whether an event tells that a component has failed.
+pub(super) fn fails(name: EventName) -> bool {
+    name.as_str().ends_with(".faulted")
 }
 
 /// What to do about an event that is refused while the deployment is being stopped.

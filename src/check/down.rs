@@ -1,7 +1,6 @@
 //! Whether every way leads down, and what it leaves behind.
 
-use super::bound::Bound;
-use super::closed::still_comes;
+use super::closed::{fails, still_comes};
 use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
 use super::members::Member;
@@ -32,16 +31,9 @@ impl Graph<'_, '_> {
         found.push((finding, trace));
     }
 
-    /// From everywhere there is a way down. Only what was followed to the end counts: where events were not followed since
-    /// too many requests waited, their answers lead on.
+    /// From everywhere there is a way down. What was not followed to its end may lead down.
     pub(super) fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
-        let cut = |bound: &Bound| {
-            matches!(bound, Bound::Budget | Bound::Piled | Bound::Inbox | Bound::Forks | Bound::Entered)
-        };
-        if self.bounds.keys().any(cut) {
-            return;
-        }
-        let reaches = self.reaching_down(|_| true);
+        let reaches = self.reaching_down(|_, _| true);
         let several = self.product.members.len() > 1;
         let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
         let all: Vec<u32> = (0u32..).zip(&self.states).map(|(at, _)| at).filter(lost).collect();
@@ -53,7 +45,10 @@ impl Graph<'_, '_> {
         } else {
             all.into_iter().filter(|at| !leaves.contains(&self.states[*at as usize].leaves[..])).collect()
         };
-        let Some(at) = self.best_first(some).first().copied() else { return self.once_down(&reaches, found) };
+        let Some(at) = self.best_first(some).first().copied() else {
+            let told = self.once_down(&reaches, found);
+            return self.failing(told, found);
+        };
         let deployment = self.product.deployment;
         let state = &self.states[at as usize];
         let finding = if several {
@@ -77,15 +72,16 @@ impl Graph<'_, '_> {
     }
 
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
-    fn reaching_down(&self, counts: impl Fn(&Edge) -> bool) -> Vec<bool> {
+    fn reaching_down(&self, counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
         let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
-        let edges = self.edges.iter().filter(|edge| counts(edge));
-        edges.for_each(|edge| before[edge.to as usize].push(edge.from));
+        let edges = self.edges.iter().enumerate().filter(|(number, edge)| counts(*number, edge));
+        edges.for_each(|(_, edge)| before[edge.to as usize].push(edge.from));
         let forced = |state: &State| self.product.worlds.top(state.world).is_some();
         let mut reaches: Vec<bool> =
             self.states.iter().map(|state| self.product.is_down(state) || forced(state)).collect();
         let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
         ends.for_each(|at| reaches[at as usize] = true);
+        self.followed.iter().zip(&mut reaches).for_each(|(followed, reaches)| *reaches |= !followed);
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
         open.retain(|at| !forced(&self.states[*at as usize]));
@@ -100,40 +96,62 @@ impl Graph<'_, '_> {
     }
 
     /// The event that ends the deployment is raised once, and not all that leads on where it is not being stopped does then:
-    /// one finding, of what is the first of these in the way somewhere.
-    fn once_down(&mut self, reaches: &[bool], found: &mut Traced) {
+    /// one finding, of the worst; of several as bad, of what is the first of these in the way somewhere. The state that is
+    /// warned of; none: none is.
+    fn once_down(&mut self, reaches: &[bool], found: &mut Traced) -> Option<u32> {
+        let (bars, behind_failed) = (self.bars(), self.behind_failed());
         let mut before = reaches.to_vec();
-        for barred in [Barred::Again, Barred::Closed, Barred::Late, Barred::Reported] {
+        let mut worst: Option<(u32, Finding)> = None;
+        for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             let told = self.product.never_down && matches!(barred, Barred::Closed | Barred::Late);
-            let after = self.reaching_down(|edge| edge.barred.is_none_or(|of| of > barred));
+            let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
             let lost = |at: &u32| {
                 let state = &self.states[*at as usize];
                 state.stopping && state.is_at_rest() && before[*at as usize] && !after[*at as usize]
             };
             let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
-            if let Some(at) = self.best_first(some).first().copied().filter(|_| !told) {
-                let finding = self.barred(at, barred, &before);
-                let trace = self.trace(at);
-                return found.push((finding, trace));
+            // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
+            let best = self.best_first(some);
+            let expects = |at: &u32| self.failed[*at as usize] == Failed::Nothing || behind_failed[*at as usize];
+            let at = best.iter().find(|at| expects(at)).or(best.first()).copied().filter(|_| !told);
+            if let Some(at) = at {
+                let severity = match expects(&at) && barred != Barred::Reported {
+                    true => Severity::Warning,
+                    false => Severity::Info,
+                };
+                let finding = Finding { severity, ..self.barred(at, barred, &bars, &before) };
+                if worst.as_ref().is_none_or(|(_, worst)| finding.severity > worst.severity) {
+                    worst = Some((at, finding));
+                }
             }
             before = after;
         }
+        let (at, finding) = worst?;
+        let told = (finding.severity == Severity::Warning).then_some(at);
+        let trace = self.trace(at);
+        found.push((finding, trace));
+        told
     }
 
     /// Nothing but that leads down from a state in which it is being stopped. `reaches`: where it does.
-    fn barred(&self, at: u32, barred: Barred, reaches: &[bool]) -> Finding {
+    fn barred(&self, at: u32, barred: Barred, bars: &[Option<Barred>], reaches: &[bool]) -> Finding {
         let (deployment, state) = (self.product.deployment, &self.states[at as usize]);
-        let severity = match self.failed[at as usize] {
-            Failed::Nothing if barred != Barred::Reported => Severity::Warning,
-            _ => Severity::Info,
-        };
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
-        let by = self.led_on_by(at, barred, reaches);
+        let by = self.led_on_by(at, barred, bars, reaches);
         let named = by.map(|by| self.product.named(by)).unwrap_or_default();
         let message = match barred {
             Barred::Again => format!("from `{place}` only a second `{event}` leads down, and it is raised once"),
             Barred::Closed => {
                 format!("from `{place}` only `{named}` leads down, which is refused when `{event}` has been raised")
+            }
+            Barred::Gone => {
+                let why = match by {
+                    Some(Move::Event(at)) if !fails(self.product.outside[usize::from(at)]) => {
+                        "nothing is sure to raise it there"
+                    }
+                    _ => "that comes only where something fails",
+                };
+                format!("from `{place}` only `{named}` leads down, and {why}")
             }
             Barred::Late => format!(
                 "from `{place}` only a time of {} s leads down, and `shutdown.within_s` gives it {} s",
@@ -161,24 +179,29 @@ impl Graph<'_, '_> {
             Barred::Again => "let an answer or a time lead on from there".to_owned(),
             Barred::Closed => still_comes(&named),
             Barred::Late => "give it more time with `shutdown.within_s`, or let something lead on sooner".to_owned(),
+            Barred::Gone => "let an answer or a time lead on as well".to_owned(),
             Barred::Reported => "let an answer or a time lead on as well, where no component raises it".to_owned(),
         };
-        Finding::new(severity, COORD_NO_WAY_DOWN, message)
+        Finding::warning(COORD_NO_WAY_DOWN, message)
             .at(self.product.members[late].chart.origin(state.leaves[late]))
             .path("shutdown.event")
             .help(format!("{help}; else what is left is taken down without the coordinator"))
     }
 
     /// The first move of that kind on the shortest way down.
-    fn led_on_by(&self, at: u32, barred: Barred, reaches: &[bool]) -> Option<Move> {
-        let mut out: FxHashMap<u32, Vec<&Edge>> = FxHashMap::default();
-        let counts = |edge: &&Edge| edge.barred.is_none_or(|of| of >= barred) && reaches[edge.to as usize];
-        self.edges.iter().filter(counts).for_each(|edge| out.entry(edge.from).or_default().push(edge));
+    fn led_on_by(&self, at: u32, barred: Barred, bars: &[Option<Barred>], reaches: &[bool]) -> Option<Move> {
+        let mut out: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
+        for (number, edge) in self.edges.iter().enumerate() {
+            if bars[number].is_none_or(|of| of >= barred) && reaches[edge.to as usize] {
+                out.entry(edge.from).or_default().push(number);
+            }
+        }
         let mut seen: FxHashSet<u32> = std::iter::once(at).collect();
         let mut queue = VecDeque::from([at]);
         while let Some(at) = queue.pop_front() {
-            for edge in out.get(&at).into_iter().flatten() {
-                if edge.barred == Some(barred) {
+            for number in out.get(&at).into_iter().flatten() {
+                let edge = &self.edges[*number];
+                if bars[*number] == Some(barred) {
                     return Some(edge.by);
                 }
                 if seen.insert(edge.to) {

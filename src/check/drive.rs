@@ -164,6 +164,7 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
     let mut index: FxHashSet<State> = FxHashSet::default();
     let mut queue: VecDeque<usize> = VecDeque::new();
     let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
+    let mut failed: Option<(usize, Vec<Next>, usize)> = None;
     states.push((from.clone(), None, Vec::new()));
     queue.push_back(0);
     let (mut last, mut reached, mut round) = (0, None, None);
@@ -179,7 +180,13 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
         last = at;
         for next in product.outside_moves(&state, tried, at == 0) {
             let mut moves = vec![next.clone()];
-            match product.rest(next.state, goal, &mut moves) {
+            let rest = product.rest(next.state, goal, &mut moves);
+            if let Some((by, last)) = fails(product, tried, &moves) {
+                moves.truncate(last + 1);
+                let _ = failed.get_or_insert((at, moves, by));
+                continue;
+            }
+            match rest {
                 Ok(rest) => {
                     if index.insert(rest.clone()) {
                         // Where answers go round for ever is what keeps it from coming anywhere.
@@ -192,10 +199,10 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
             }
         }
     }
-    let (mut at, mut moves) = match (reached, &refused) {
-        (Some(at), _) => (at, Vec::new()),
-        (None, Some((at, moves, _))) => (*at, moves.clone()),
-        (None, None) => (round.unwrap_or(last), Vec::new()),
+    let (mut at, mut moves) = match (reached, &refused, &failed) {
+        (Some(at), _, _) => (at, Vec::new()),
+        (None, Some((at, moves, _)), _) | (None, None, Some((at, moves, _))) => (*at, moves.clone()),
+        (None, None, None) => (round.unwrap_or(last), Vec::new()),
     };
     while let Some(before) = states[at].1 {
         let mut way = states[at].2.clone();
@@ -204,7 +211,15 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
         at = before;
     }
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
-    Way { from, moves, reached: reached.is_some(), refused, late: None }
+    let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
+    Way { from, moves, reached: reached.is_some(), refused, failed, late: None }
+}
+
+/// The first of these moves after which a bring-up has failed, though every request is answered *ok*: by which coordinator,
+/// and its place.
+pub(super) fn fails(product: &Product<'_>, tried: &Tried, moves: &[Next]) -> Option<(usize, usize)> {
+    let failing = |(at, next): (usize, &Next)| product.failed_in(&next.state).map(|by| (by, at));
+    moves.iter().enumerate().filter(|_| !tried.stopping).find_map(failing)
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round

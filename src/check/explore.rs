@@ -49,6 +49,8 @@ pub enum Barred {
     Again,
     /// An event that is refused then.
     Closed,
+    /// An event that only a fault, or what components and monitors need not report there, would bring.
+    Gone,
     /// A time event that lasts as long as the shutdown may.
     Late,
     /// An event that only a component may raise then, if one does.
@@ -133,19 +135,14 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     };
     match graph.product.start() {
         Some(start) => {
-            graph.reach(start, Failed::Nothing, 0);
+            let at = graph.reach(start, Failed::Nothing, 0);
+            graph.cut_short(at, Failed::Nothing);
             graph.run();
             while graph.go_round() {
                 graph.run();
             }
         }
         None => graph.cut(Bound::Entered, Failed::Nothing),
-    }
-    if graph.product.overflow {
-        graph.cut(Bound::Inbox, Failed::Nothing);
-    }
-    if graph.product.forked {
-        graph.cut(Bound::Forks, Failed::Nothing);
     }
     graph
 }
@@ -180,6 +177,16 @@ impl Graph<'_, '_> {
     pub fn cut(&mut self, bound: Bound, failed: Failed) {
         let known = self.bounds.entry(bound).or_insert(failed);
         *known = failed.min(*known);
+    }
+
+    /// What follows from a state was not followed to its end, if more was on its way than is followed.
+    fn cut_short(&mut self, at: u32, failed: Failed) {
+        let overflow = std::mem::take(&mut self.product.overflow).then_some(Bound::Inbox);
+        let forked = std::mem::take(&mut self.product.forked).then_some(Bound::Forks);
+        for bound in overflow.into_iter().chain(forked) {
+            self.ends.insert(at);
+            self.cut(bound, failed);
+        }
     }
 
     /// The number of a state that is reached with at worst this failing.
@@ -222,7 +229,10 @@ impl Graph<'_, '_> {
                 self.cut(Bound::Lean, so_far);
             }
         }
+        // Going back to a state that is known cuts nothing off.
+        (self.product.overflow, self.product.forked) = (false, false);
         let nexts = self.nexts(at);
+        self.cut_short(at, so_far);
         if nexts.cut && !self.is_lean(at) {
             self.cut(Bound::Waiting, so_far);
         }

@@ -1,5 +1,6 @@
 //! How long a way lasts at least: time events take their time, and everything else is taken to need none.
 
+use super::drive::fails;
 use super::product::Product;
 use super::state::{Move, Next, State};
 use super::tried::{Goal, Tried, Way};
@@ -97,6 +98,9 @@ pub(super) fn soonest(product: &mut Product<'_>, way: &Way, tried: &Tried, goal:
         for next in product.outside_moves(&state, tried, place == 0) {
             let mut moves = vec![next.clone()];
             let Ok(rest) = product.rest(next.state, goal, &mut moves) else { continue };
+            if fails(product, tried, &moves).is_some() {
+                continue;
+            }
             let (mut waits, mut now, mut before) = (waits.clone(), at, &state);
             for next in &moves {
                 let (after, took) = product.waits_after(before, next, &waits);

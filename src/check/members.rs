@@ -19,6 +19,8 @@ pub struct Member<'a> {
     pub up: Option<NodeId>,
     /// The one that means down.
     pub down: Option<NodeId>,
+    /// Those that mean that the bring-up has failed.
+    pub failed: Vec<NodeId>,
     /// The name its frames go by.
     pub by: Requester,
     reactions: Option<Reactions<'a>>,
@@ -102,6 +104,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
             chart,
             up: chart.find(&coordinator.up).ok(),
             down: chart.find(&coordinator.down).ok(),
+            failed: coordinator.failed.iter().filter_map(|state| chart.find(state).ok()).collect(),
             by,
             reactions: None,
         });

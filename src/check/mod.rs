@@ -5,6 +5,7 @@
 
 mod alike;
 mod arrive;
+mod bars;
 mod beside;
 mod bound;
 mod closed;
@@ -17,6 +18,7 @@ mod drive;
 mod endless;
 mod ends;
 mod explore;
+mod failing;
 mod follow;
 mod held;
 mod judge;

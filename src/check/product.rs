@@ -309,6 +309,15 @@ impl<'a> Product<'a> {
         (0..self.members.len()).all(|number| state.down & (1 << number.min(63)) != 0)
     }
 
+    /// The coordinator that is in a state which means that the bring-up has failed: a running deployment is stopped there.
+    pub(super) fn failed_in(&self, state: &State) -> Option<usize> {
+        let within = |number: &usize| {
+            let (member, leaf) = (&self.members[*number], state.leaves[*number]);
+            member.failed.iter().any(|failed| member.chart.is_inside(leaf, *failed))
+        };
+        (0..self.members.len()).find(within)
+    }
+
     pub(super) fn all_in(&self, state: &State, goal: impl Fn(&Member<'_>) -> Option<NodeId>) -> bool {
         let inside = |(member, leaf): (&Member<'_>, &NodeId)| {
             goal(member).is_some_and(|goal| member.chart.is_inside(*leaf, goal))

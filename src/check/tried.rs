@@ -13,6 +13,8 @@ pub struct Way {
     pub moves: Vec<Next>,
     pub reached: bool,
     pub refused: Option<(Request, Findings)>,
+    /// It ends where a coordinator is in a state that means that the bring-up has failed.
+    pub failed: Option<usize>,
     /// No way lasts shorter: so long, and the time events that it waits for. Only where it has less time.
     pub late: Option<(Duration, Vec<(usize, EventId)>)>,
 }

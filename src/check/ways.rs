@@ -86,8 +86,8 @@ fn stops(
     let deployment = product.deployment;
     let at = product.place(way.end());
     let rests = way.end().is_at_rest();
-    let finding = match &way.refused {
-        Some((request, reasons)) => {
+    let finding = match (&way.refused, way.failed) {
+        (Some((request, reasons)), _) => {
             let why = reasons.first().map_or("", |f| f.message.as_str());
             let message = format!("{what} stops at `{at}`: `{}` is refused, because {why}", request.ask);
             let mut finding = Finding::error(code, message);
@@ -96,7 +96,12 @@ fn stops(
             }
             finding
         }
-        None => {
+        (None, Some(by)) => {
+            let message = format!("{what} comes to `{at}`, where `deploy.failed` says that it has failed");
+            let leaf = product.members[by].chart.origin(way.end().leaves[by]);
+            Finding::error(code, message).also(leaf, "comes here, even if every request succeeds")
+        }
+        (None, None) => {
             let goals: Vec<String> = deployment.coordinators.iter().map(|c| format!("`{}`", goal(c))).collect();
             let stops = if rests { "stops at" } else { "goes round for ever at" };
             let message = format!("{what} {stops} `{at}` and never reaches {}", goals.join(", "));
@@ -114,7 +119,9 @@ fn stops(
         "the coordinator wait for at its end"
     };
     let closed = if code == DEPLOY_NEVER_DOWN { product.closed_at(way.end()) } else { Vec::new() };
-    let help = help.unwrap_or_else(|| match closed.first() {
+    let failed =
+        way.failed.map(|_| "take it out of `deploy.failed`, or let the bring-up come up without it".to_owned());
+    let help = help.or(failed).unwrap_or_else(|| match closed.first() {
         Some(event) => still_comes(event.as_str()),
         None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
         None => format!("look at the trace: which event does {several}?"),

@@ -181,7 +181,8 @@ codes! {
         "The coordinator was driven with the deploy event and every request answered `ok` at once, and came to rest somewhere \
          else than in `deploy.up`, or only after `deploy.within_s`, for it waits for times (`e_after`) that last longer. A bring-up \
          that fails when everything goes well cannot work: look at the trace for the place where it stops, and at the event it \
-         waits for there. Events of components were tried where nothing else could go on.";
+         waits for there. Events of components were tried where nothing else could go on. A state listed under `deploy.failed` ends \
+         the bring-up as failed: no way up may come to it.";
     DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down, or not in time",
         "From the state that means up, the coordinator was driven with the shutdown event and every request answered \
          `ok` at once, and did not reach `shutdown.down`, or only after `shutdown.within_s`. It would have to be stopped without its \
@@ -532,7 +533,9 @@ codes! {
          request succeeds from there on. It would have to be stopped without its coordinator (exit status 4). Add the transitions that lead down from there. The event that begins the shutdown \
          is raised once: where nobody hears it in some state, or where a state on the way down waits for it again, what is \
          there is taken down without the coordinator. Hear it in a state around all of those, or let an answer or a time lead \
-         on.";
+         on. What a component or a monitor reports leads on only where it is sure to come then: not where it may have come \
+         before, and not where it tells that something has failed. A bring-up that ends in a state listed under `deploy.failed` is \
+         stopped there.";
     COORD_LEFTOVERS = "coord::leftovers", "a way down leaves components behind",
         "On the way shown the coordinator reaches the state that means down with components still there. They \
          would be taken away without the order that the coordinator knows. Let every way down undo or destroy what was \

@@ -49,21 +49,91 @@ fn an_event_that_is_refused_while_stopping_is_no_way_down() {
     assert_eq!(code, 1, "it is not even started: {told}");
 
     // What stays open leads down: no event is refused without `safety`, and those that it lists are not.
-    for (way, keys) in
-        [("'e_yes'", ""), ("'e_yes'", "safety: [e_estop, e_yes]\n"), ("'a.faulted'", "safety: [e_estop]\n")]
-    {
-        let said = Small::new(BASE, &asking(way), keys).check();
-        assert!(said.of("deploy::never_down").is_empty(), "{way} {keys} {:#}", said.0);
+    for keys in ["", "safety: [e_estop, e_yes]\n"] {
+        let said = Small::new(BASE, &asking("'e_yes'"), keys).check();
+        assert!(said.of("deploy::never_down").is_empty(), "{keys} {:#}", said.0);
+        assert!(said.of("coord::no_way_down").is_empty(), "{keys} {:#}", said.0);
     }
 }
 
+/// What a simulated component reports half a second after a step.
+fn reports(after: &str) -> String {
+    format!(
+        "safety: [e_estop]\nsimulated: {{ reactions: [{{ after: {after}, delay_s: 0.5, raise: e_yes, component: a }}] }}\n"
+    )
+}
+
+/// Up by `base`; stopped from there it comes to `stopped`. From everywhere else an emergency leads on, as the end does.
+fn stopping_at(stopped: &str, more: &str) -> String {
+    format!(
+        "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, {stopped},
+         leaving = state {{ entry = {{ 'step.undo', 'base.undo' }} }}, stays = state {{}},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+         trans {{ src = 'building', tgt = 'up', events = {{ 'base.ok' }} }},
+         trans {{ src = 'building', tgt = 'leaving', events = {{ 'base.failed', 'base.broken', 'e_shutdown', 'e_estop' }} }},
+         trans {{ src = 'up', tgt = 'stopped', events = {{ 'e_shutdown', 'e_estop' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone' }} }},
+         trans {{ src = 'leaving', tgt = 'stays', events = {{ 'step.undo.failed', 'step.undo.broken' }} }},
+         trans {{ src = 'leaving', tgt = 'stays', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},
+         trans {{ src = 'stays', tgt = 'leaving', events = {{ 'e_shutdown' }} }},{more}"
+    )
+}
+
+const STEP: &str =
+    "base = Configuration { create('a', 'Drive') }, step = Configuration { property_set('a.gain', 2.0) }";
+
 #[test]
 fn what_a_component_reports_leads_down_also_while_it_is_stopped() {
-    let keys = "safety: [e_estop]
-simulated: { reactions: [{ after: create a, delay_s: 0.5, raise: e_yes, component: a }] }\n";
-    let said = Small::new(BASE, &asking("'e_yes'"), keys).check();
-    assert!(said.of("deploy::never_down").is_empty(), "{:#}", said.0);
-    assert!(said.of("coord::no_way_down").is_empty(), "{:#}", said.0);
+    let asks = stopping_at(
+        "stopped = state { entry = 'step' }",
+        "trans { src = 'stopped', tgt = 'leaving', events = { 'e_yes', 'step.failed', 'step.broken' } },",
+    );
+    // After a step that is done there; and not after one that was done long ago.
+    for (after, exit, warned) in [("property_set a.gain", 0, 0), ("create a", 4, 1)] {
+        let small = Small::new(STEP, &asks, &reports(after));
+        let said = small.check();
+        assert!(said.of("deploy::never_down").is_empty(), "stopped at once it comes down: {:#}", said.0);
+        assert_eq!(said.of("coord::no_way_down").len(), warned, "{after} {:#}", said.0);
+        small.demo.write("late.lua", "deploy('small.yaml')\nwait(1.0)\nshutdown()\n");
+        let ran = small.demo.run(&["run", "late.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, exit, "{after} {}{}", ran.out, ran.err);
+    }
+}
+
+/// What it reports comes once. Where it may have come before, nothing leads down.
+#[test]
+fn what_a_component_has_reported_already_is_no_way_down() {
+    let small = Small::new(BASE, &asking("'e_yes'"), &reports("create a"));
+    let said = small.check();
+    assert!(said.of("deploy::never_down").is_empty(), "stopped at once it comes down: {:#}", said.0);
+    let finding = only(&said, "coord::no_way_down");
+    let message = "from `root.life.asking` only `e_yes` leads down, and nothing is sure to raise it there";
+    assert_eq!((finding["severity"].as_str(), finding["message"].as_str()), (Some("warning"), Some(message)));
+    assert_eq!(stopped(&small).0, 0);
+    // Where it would have been heard in every place since that step, it is still to come.
+    let waits = stopping_at(
+        "stopped = state {}",
+        "trans { src = 'stopped', tgt = 'leaving', events = { 'e_yes', 'base.failed', 'base.broken' } },",
+    );
+    let waits = waits
+        .replace("tgt = 'up', events = { 'base.ok' }", "tgt = 'up', events = { 'e_yes' }")
+        .replace("'base.broken', 'e_shutdown', 'e_estop' } }", "'base.broken', 'e_estop' } }")
+        .replace("src = 'up', tgt = 'stopped'", "src = 'up', tgt = 'leaving'")
+        + "trans { src = 'building', tgt = 'stopped', events = { 'e_shutdown' } },";
+    let said = Small::new(STEP, &waits.replace("'step.undo', ", ""), &reports("create a")).check();
+    assert!(said.of("coord::no_way_down").iter().all(|found| found["severity"] == "info"), "{:#}", said.0);
+}
+
+/// That something fails, or is lost, is no way down: it may well not.
+#[test]
+fn a_fault_is_no_way_down() {
+    let small = Small::new(BASE, &asking("'a.faulted'"), "safety: [e_estop]\n");
+    let said = small.check();
+    let message = "from `root.life.asking` only `a.faulted` leads down, and that comes only where something fails";
+    assert_eq!(only(&said, "coord::no_way_down")["message"], message);
+    assert_eq!(said.0["verdict"], "warnings");
+    assert_eq!(stopped(&small).0, 4);
 }
 
 #[test]
@@ -82,6 +152,136 @@ fn a_place_beside_the_way_that_only_a_refused_event_leads_down_from_is_told() {
     assert_eq!((said.0["verdict"].as_str(), finding["severity"].as_str()), (Some("warnings"), Some("warning")));
     let said = Small::new(BASE, &aside, "").check();
     assert!(said.of("coord::no_way_down").is_empty(), "{:#}", said.0);
+}
+
+/// What is only noted, since something has failed before, does not hide what is warned of elsewhere.
+#[test]
+fn a_note_about_the_way_down_hides_no_warning() {
+    let life = |aside: &str| {
+        let stopped = "trans { src = 'stopped', tgt = 'leaving', events = { 'step.ok' } },
+            trans { src = 'stopped', tgt = 'stays', events = { 'step.failed', 'step.broken' } },";
+        stopping_at("stopped = state { entry = 'step' }", &format!("{stopped}{aside}"))
+    };
+    let said = Small::new(STEP, &life(""), "safety: [e_estop]\n").check();
+    let message = "from `root.stays` only a second `e_shutdown` leads down, and it is raised once";
+    let finding = only(&said, "coord::no_way_down");
+    assert_eq!((finding["severity"].as_str(), finding["message"].as_str()), (Some("info"), Some(message)));
+    let aside = "aside = state {}, waits = state {}, trans { src = 'up', tgt = 'aside', events = { 'e_aside' } },
+        trans { src = 'aside', tgt = 'waits', events = { 'e_shutdown', 'e_estop' } },
+        trans { src = 'waits', tgt = 'stopped', events = { 'e_yes' } },";
+    let said = Small::new(STEP, &life(aside), "safety: [e_estop]\n").check();
+    let message = "from `root.waits` only `e_yes` leads down, which is refused when `e_shutdown` has been raised";
+    let finding = only(&said, "coord::no_way_down");
+    assert_eq!((finding["severity"].as_str(), finding["message"].as_str()), (Some("warning"), Some(message)));
+}
+
+/// Where an emergency comes on the way down its time stands still, and people lead on: by the event that ends it once more.
+#[test]
+fn after_an_emergency_on_the_way_down_people_lead_on() {
+    let conf = "base = Configuration { create('a', 'Drive') }, step = Configuration { safe = true, property_set('a.gain', 0.0) }";
+    let said = |from: &str, to: &str| {
+        let brakes = format!(
+            "trans {{ src = 'stopped', tgt = 'leaving', events = {{ 'e_after(1.0)' }} }},
+             braking = state {{ entry = 'step' }}, braked = state {{}}, waits = state {{}},
+             trans {{ src = '{from}', tgt = 'braking', events = {{ 'e_estop' }} }},
+             trans {{ src = 'braking', tgt = 'braked', events = {{ 'step.ok', 'step.failed', 'step.broken' }} }},
+             trans {{ src = 'braked', tgt = '{to}', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'braked', tgt = 'leaving', events = {{ 'e_reset' }} }},
+             trans {{ src = 'waits', tgt = 'leaving', events = {{ 'e_shutdown', 'e_reset' }} }},"
+        );
+        let coordinator = stopping_at("stopped = state {}", &brakes);
+        let coordinator = coordinator.replace(
+            "'up', tgt = 'stopped', events = { 'e_shutdown', 'e_estop' }",
+            "'up', tgt = 'stopped', events = { 'e_shutdown' }",
+        );
+        Small::new(conf, &coordinator, "safety: [e_estop]\n").check()
+    };
+    let after = said("stopped", "leaving");
+    let found = after.of("coord::no_way_down");
+    assert!(found.iter().all(|finding| finding["severity"] == "info"), "{found:#?}");
+    // Nobody is asked where it came before.
+    let before = said("up", "waits");
+    let message = "from `root.waits` only `e_reset` leads down, which is refused when `e_shutdown` has been raised";
+    assert_eq!(only(&before, "coord::no_way_down")["message"], message);
+    assert_eq!(before.0["verdict"], "warnings");
+}
+
+/// Up by `base` and, there, `step`: where that fails, to `failed`.
+fn failing(failed: &str, listed: bool) -> Small {
+    let coordinator = stopping_at(
+        "failed = state {}",
+        &format!(
+            "waits = state {{}}, trans {{ src = 'up', tgt = 'failed', events = {{ 'step.failed', 'step.broken' }} }},{failed}"
+        ),
+    );
+    let coordinator = coordinator
+        .replace("up = state {}", "up = state { entry = 'step' }")
+        .replace("tgt = 'stopped'", "tgt = 'leaving'")
+        .replace("'base.failed', 'base.broken', 'e_shutdown', 'e_estop' } }", "'e_shutdown' } }")
+        + "trans { src = 'building', tgt = 'failed', events = { 'base.failed', 'base.broken' } },";
+    let small = Small::new(STEP, &coordinator, "safety: [e_estop]\n");
+    if listed {
+        small.demo.replace("small.yaml", "up: up, within_s", "up: up, failed: [failed], within_s");
+    }
+    small
+}
+
+/// Brings it up, where `step` fails: the exit status.
+fn fails(small: &Small) -> i32 {
+    small.demo.write("fails.lua", "fault('property_set a.gain', 'fail', 1)\ndeploy('small.yaml')\n");
+    small.demo.run(&["run", "fails.lua", "--clock", "simulated", "--platform", "simulated"]).code
+}
+
+/// A bring-up that fails is stopped where `deploy.failed` says so: what nobody hears there leads nowhere, and nothing is waited
+/// for.
+#[test]
+fn a_bring_up_that_has_failed_is_led_down_by_the_event_that_ends_it() {
+    let warned = |small: &Small| -> Vec<String> {
+        let said = small.check();
+        let found = said.of("coord::no_way_down").into_iter().filter(|finding| finding["severity"] == "warning");
+        found.map(|finding| finding["message"].as_str().unwrap().to_owned()).collect()
+    };
+    let deaf = "trans { src = 'failed', tgt = 'leaving', events = { 'e_after(1.0)', 'e_estop' } },";
+    let small = failing(deaf, true);
+    let message = "nobody hears `e_shutdown` in `root.failed`, where the bring-up has failed: it is taken back without its coordinator";
+    assert_eq!((warned(&small), fails(&small)), (vec![message.to_owned()], 4));
+    // What is not known to mean that it failed is waited in, until that takes too long.
+    let small = failing(deaf, false);
+    assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+    // What it leads to is looked at as where nothing has failed.
+    let small = failing(
+        "trans { src = 'failed', tgt = 'waits', events = { 'e_shutdown' } },
+         trans { src = 'waits', tgt = 'leaving', events = { 'e_reset' } },",
+        true,
+    );
+    let message = "from `root.waits` only `e_reset` leads down, which is refused when `e_shutdown` has been raised";
+    assert_eq!((warned(&small), fails(&small)), (vec![message.to_owned()], 4));
+    let small = failing("trans { src = 'failed', tgt = 'leaving', events = { 'e_shutdown' } },", true);
+    assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+}
+
+/// A state listed in `deploy.failed` on the way up.
+#[test]
+fn a_bring_up_that_comes_to_where_it_has_failed_never_comes_up() {
+    let way = stopping_at(
+        "warming = state {}",
+        "trans { src = 'warming', tgt = 'up', events = { 'e_after(1.0)' } },
+         trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown', 'e_estop' } },",
+    );
+    let way = way.replace("tgt = 'up', events = { 'base.ok' }", "tgt = 'warming', events = { 'base.ok' }");
+    let way = way.replace("tgt = 'stopped'", "tgt = 'leaving'").replace("'step.undo', ", "");
+    let of = |failed: &str| {
+        let small = Small::new(STEP, &way, "");
+        small.demo.replace("small.yaml", "up: up, within_s", &format!("up: up, failed: [{failed}], within_s"));
+        small
+    };
+    for (failed, at) in [("warming", "root.warming"), ("up", "root.up")] {
+        let said = of(failed).check();
+        let message = format!("the bring-up comes to `{at}`, where `deploy.failed` says that it has failed");
+        assert_eq!(only(&said, "deploy::never_up")["message"], message.as_str());
+    }
+    let said = of("stays").check();
+    assert!(said.of("deploy::never_up").is_empty(), "{:#}", said.0);
 }
 
 /// Up by a time, and down by one.

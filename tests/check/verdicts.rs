@@ -151,3 +151,22 @@ fn findings_with_equal_words_at_two_places_are_two() {
     let message = Some("nothing leads on from `root.lost`");
     assert_eq!(places, [(Some("first.lua"), message), (Some("second.lua"), message)], "{:#}", said.0);
 }
+
+/// What was cut off may lead down; where all was followed and nothing does, that is told all the same.
+#[test]
+fn a_bound_hides_no_place_that_no_way_leads_down_from() {
+    let configurations = format!("{CONFIGURATIONS} set = Configuration {{ group = \"g\", description = \"rest\" }},");
+    let spins = UP_AND_DOWN.to_owned()
+        + "spins = state { entry = \"set\" }, trans { src = \"up\", tgt = \"spins\", events = { \"e_spin\" } },
+           trans { src = \"spins\", tgt = \"spins\", events = { \"e_done\" } },";
+    let here = "here = state {}, there = state {}, trans { src = \"up\", tgt = \"here\", events = { \"e_here\" } },
+        trans { src = \"here\", tgt = \"there\", events = { \"e_there\" } },
+        trans { src = \"there\", tgt = \"here\", events = { \"e_here\" } },";
+    let said = Small::new(&configurations, &spins, "").check();
+    assert_eq!(said.0["explored"]["complete"], false, "{:#}", said.0);
+    assert!(said.of("coord::no_way_down").is_empty(), "{:#}", said.0);
+    let said = Small::new(&configurations, &(spins + here), "").check();
+    assert_eq!(said.0["explored"]["complete"], false, "{:#}", said.0);
+    let messages: Vec<_> = said.of("coord::no_way_down").iter().map(|found| found["message"].clone()).collect();
+    assert_eq!(messages, ["from `root.here` no way leads to `idle`"], "{:#}", said.0);
+}

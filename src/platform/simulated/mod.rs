@@ -9,7 +9,8 @@ mod faults;
 mod steps;
 mod world;
 
-pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, StepPattern, When};
+pub use crate::model::StepPattern;
+pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, When};
 
 use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
 use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Ident, RunState, Snapshot, Step, Value};

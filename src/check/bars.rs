@@ -1,0 +1,170 @@
+//! Which moves lead a deployment down that is being stopped, where that is up to the way that it has come: what a component or
+//! a monitor reports comes where it has reason to, and people decide where an emergency made it stand still.
+//!
+//! What a simulated component reports after a step (`simulated: { reactions }`) comes once. It is still to come where every way
+//! since that step was quick, or led through places alone that would have heard it.
+
+use super::explore::{Barred, Edge, Graph};
+use super::shows::goes;
+use super::state::{Failed, Move, Next, State};
+use crate::model::monitor::MONITORS_TYPE;
+use crate::model::{EventName, Monitor, RunState, StepPattern, Value};
+use crate::stack::Request;
+use crate::system::View;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+impl Graph<'_, '_> {
+    /// Of each edge, why it leads no deployment down that is being stopped.
+    pub(super) fn bars(&mut self) -> Vec<Option<Barred>> {
+        let people = self.stands_still();
+        let shutdown = self.product.deployment.shutdown.event;
+        let mut bars: Vec<Option<Barred>> = Vec::with_capacity(self.edges.len());
+        let mut watched: FxHashMap<(u16, u32), bool> = FxHashMap::default();
+        let mut asked: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (number, edge) in self.edges.iter().enumerate() {
+            let waits = people[edge.from as usize];
+            let again = || matches!(edge.by, Move::Event(at) if self.product.outside[usize::from(at)] == shutdown);
+            bars.push(match (edge.barred, edge.by) {
+                (Some(Barred::Again), _) if waits && again() => None,
+                (Some(Barred::Late), _) if waits => None,
+                (Some(Barred::Gone), Move::Event(at)) => {
+                    let world = self.states[edge.from as usize].world;
+                    let names = || self.product.alike_to(at);
+                    let watches = || names().any(|name| self.is_watched(world, name));
+                    let comes = *watched.entry((at, world)).or_insert_with(watches);
+                    asked.entry(usize::from(at)).or_default().push(number);
+                    (!comes).then_some(Barred::Gone)
+                }
+                (barred, _) => barred,
+            });
+        }
+        for (at, numbers) in asked {
+            let comes = self.is_to_come(at);
+            for number in numbers.into_iter().filter(|number| comes[self.edges[*number].from as usize]) {
+                bars[number] = None;
+            }
+        }
+        bars
+    }
+
+    /// Where its time stands still while it is stopped: a safe configuration has come since, and people decide how it goes on,
+    /// by the event that ends the deployment once more.
+    fn stands_still(&self) -> Vec<bool> {
+        let safe = |at: u32| {
+            let state = &self.states[at as usize];
+            state.stopping && self.product.worlds.is_safe(state.world)
+        };
+        // What was in force before counts for nothing. Each state is judged by its best way.
+        let begins = |edge: &&Edge| !self.states[edge.from as usize].stopping && safe(edge.to);
+        let open: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).collect();
+        let best = |edge: &Edge| self.failed[edge.from as usize].max(edge.failed) <= self.failed[edge.to as usize];
+        let before = self.spread_from(open, |_, edge| safe(edge.to) && best(edge));
+        (0u32..).zip(before).map(|(at, before)| safe(at) && !before).collect()
+    }
+
+    /// These states, and where such edges lead from them.
+    pub(super) fn spread_from(&self, mut open: Vec<u32>, leads: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
+        let mut out: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
+        for (_, edge) in self.edges.iter().enumerate().filter(|(number, edge)| leads(*number, edge)) {
+            out[edge.from as usize].push(edge.to);
+        }
+        let mut reached = vec![false; self.states.len()];
+        while let Some(at) = open.pop() {
+            if !std::mem::replace(&mut reached[at as usize], true) {
+                open.extend(&out[at as usize]);
+            }
+        }
+        reached
+    }
+
+    /// Whether a monitor watches in a world for what would raise an event: one that runs and is enabled, and something that it
+    /// looks at is there. Where there are no values nothing is raised.
+    fn is_watched(&self, world: u32, name: EventName) -> bool {
+        let deployment = self.product.deployment;
+        let mut raising =
+            deployment.monitors.iter().filter(|monitor| monitor.events().any(|event| event == name)).peekable();
+        if deployment.platform.as_str() == "simulated" || raising.peek().is_none() {
+            return false;
+        }
+        // What is not known may be there.
+        let Some(world) = self.product.worlds.get(world) else { return true };
+        let mut watching: Vec<&Monitor> = Vec::new();
+        world.system.for_each_component(&mut |node| {
+            if node.ty.name.as_str() == MONITORS_TYPE && node.state == RunState::Running {
+                let enabled = |monitor: &&Monitor| {
+                    node.value(monitor.name).map_or(monitor.enabled, |value| *value == Value::Bool(true))
+                };
+                watching.extend(raising.clone().filter(enabled));
+            }
+        });
+        watching.into_iter().any(|monitor| {
+            let (mut named, mut there) = (false, false);
+            monitor.when.for_each_component(&mut |component, _| {
+                named = true;
+                there |= world.system.component(component).is_some();
+            });
+            there || !named
+        })
+    }
+
+    /// In which states a reaction of the simulated platform is still to come that raises an event from outside, or one that
+    /// nobody tells from it.
+    fn is_to_come(&mut self, at: usize) -> Vec<bool> {
+        let mut comes = vec![false; self.states.len()];
+        let deployment = self.product.deployment;
+        let names: Vec<EventName> = self.product.alike_to(u16::try_from(at).unwrap_or(u16::MAX)).collect();
+        let in_time = deployment.reactions.iter().filter(|reaction| reaction.delay < deployment.shutdown.within);
+        let raising: Vec<_> = in_time.filter(|reaction| names.contains(&reaction.raise)).collect();
+        if deployment.platform.as_str() != "simulated" || raising.is_empty() {
+            return comes;
+        }
+        let mut hears = Vec::with_capacity(self.states.len());
+        for state in &self.states {
+            let members = self.product.members.iter_mut().zip(&state.leaves);
+            hears.push(members.into_iter().any(|(member, leaf)| member.takes(*leaf, names[0])));
+        }
+        for reaction in raising {
+            let set_off = self.edges_with(&StepPattern::new(&reaction.after));
+            let is_it = |edge: &Edge| matches!(edge.by, Move::Event(by) if usize::from(by) == at);
+            let passes = |(number, edge): &(usize, &Edge)| {
+                !set_off[*number] && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
+            };
+            let gone = self.edges.iter().enumerate().filter(passes).map(|(_, edge)| edge.to);
+            let gone = self.spread_from(gone.chain([0]).collect(), |number, _| !set_off[number]);
+            comes.iter_mut().zip(gone).for_each(|(comes, gone)| *comes |= !gone);
+        }
+        comes
+    }
+
+    /// The edges on which such a step is done, as far as nothing fails.
+    fn edges_with(&mut self, pattern: &StepPattern) -> Vec<bool> {
+        let mut with = vec![false; self.edges.len()];
+        let mut of: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (number, edge) in self.edges.iter().enumerate() {
+            if edge.by == Move::Answer && edge.failed == Failed::Nothing {
+                of.entry(edge.from).or_default().push(number);
+            }
+        }
+        for (from, numbers) in of {
+            let state = self.states[from as usize].clone();
+            let nexts = self.nexts(from).all;
+            for number in numbers {
+                let next = self.edges[number].place.and_then(|place| nexts.get(place as usize));
+                with[number] = next.is_some_and(|next| self.does(&state, next, pattern));
+            }
+        }
+        with
+    }
+
+    /// Whether such a step is done when these requests are carried out.
+    fn does(&self, before: &State, next: &Next, pattern: &StepPattern) -> bool {
+        let done = next.answers.iter().filter(|(_, verdict)| verdict.is_success());
+        let requests: Vec<Request> = done.map(|(request, _)| *request).collect();
+        if requests.is_empty() {
+            return false;
+        }
+        let steps = self.product.worlds.steps(before.world, &requests, &goes(before, &requests));
+        steps.iter().any(|planned| pattern.matches(&planned.step))
+    }
+}
