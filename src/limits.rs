@@ -159,6 +159,10 @@ pub const CONNECTOR_CHAIN: usize = 200;
 /// answered *failed* at once.
 pub const INBOX_ANSWERS: usize = 1024;
 
+/// Requests of a coordinator that are not answered, from which on no event from outside is taken up: a crowd of these waits, and then
+/// is refused, before it leads to more requests than the configurator's queue holds.
+pub const INBOX_ASKED: usize = 32;
+
 /// Events of monitors, components and other coordinators that may wait for a coordinator: some milliseconds of reacting. What
 /// waits longer is no news any more; of each event that it waits for there is room for one beside them.
 pub const INBOX_REPORT: usize = 4096;
@@ -232,6 +236,8 @@ pub const SQUASHED_CALLS: usize = 256;
 /// Requests that may wait for the configurator. A coordinator raises a few per step; hundreds waiting mean that it asks
 /// faster than anything can be done, and the answer *failed* tells it so.
 pub const REQUEST_QUEUE: usize = 256;
+/// Requests that may wait where an operator asks for one more: the rest of the queue is the coordinators'.
+pub const REQUEST_OPERATORS: usize = REQUEST_QUEUE / 2;
 
 /// Requests for safe configurations that may wait beside them: these get in when the queue is full.
 pub const SAFE_QUEUE: usize = 64;
@@ -329,7 +335,6 @@ pub const SCRIPT_RECOVERY: Duration = Duration::from_secs(10);
 
 /// Bytes of memory of one script.
 pub const SCRIPT_MEMORY: usize = 256 << 20;
-
 /// Instructions of one script: hours of stories, and a few seconds of an endless loop.
 pub const SCRIPT_INSTRUCTIONS: u64 = 500_000_000;
 
@@ -344,7 +349,6 @@ pub const TURN_INSTRUCTIONS: u32 = 20;
 
 /// Instructions between two looks at a call's budget.
 pub const CALL_LOOK: u32 = 1_000;
-
 /// The same where every instruction is counted, in simulated time: single ones may take long, so looks are closer. What
 /// costs is that there are looks at all.
 pub const CALL_LOOK_EXACT: u32 = 100;

@@ -1,4 +1,4 @@
-local force = "Dynamics.f_raw_norm"
+local force = "Cart_Impedance.f_raw_norm"
 
 Monitors {
   aligned = monitor {

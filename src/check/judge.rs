@@ -1,17 +1,16 @@
 //! What is judged of everything that was followed: findings, each with its own shortest way.
 
-use super::coordinator::{answers, place};
+use super::coordinator::place;
 use super::explore::Graph;
-use super::reactions::triggers;
 use super::state::{Failed, Move, Next, State, Trouble};
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
     COORD_LOST_UNHEARD, COORD_REFUSED_BY_OTHER, COORD_REQUEST_REFUSED, COORD_REVERTED_UNHEARD, COORD_STACK_GROWS,
-    COORD_STUCK, STACK_FULL,
+    STACK_FULL,
 };
 use crate::model::{
-    Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, EventName, Finding, Findings, Severity, Verdict,
+    Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, Finding, Findings, Severity, Verdict,
 };
 use crate::stack::{Request, Requester, claims};
 use crate::statechart::{NodeId, RaiseSite, When};
@@ -437,34 +436,12 @@ impl Graph<'_, '_> {
             let leaves = self.states[at as usize].leaves.to_vec();
             let leaf = leaves[0];
             if told.insert(leaves) {
-                let finding = self.nothing_leads_on(leaf);
+                let finding = self.product.nothing_leads_on(leaf);
                 let trace = self.trace(at);
                 found.push((finding, trace));
             }
         }
         stuck
-    }
-
-    fn nothing_leads_on(&self, leaf: NodeId) -> Finding {
-        let (member, deployment) = (&self.product.members[0], self.product.deployment);
-        let (chart, fqn) = (member.chart, member.chart.fqn(leaf).to_string());
-        let awaited = answers(deployment, chart);
-        let names: BTreeSet<EventName> = triggers(chart, leaf).0.iter().filter_map(|e| member.name_of(*e)).collect();
-        let waits: Vec<String> = names.intersection(&awaited).map(|name| format!("`{name}`")).collect();
-        let finding = if waits.is_empty() {
-            Finding::warning(COORD_STUCK, format!("nothing leads on from `{fqn}`"))
-                .help(format!("add a transition from it, at least on `{}`", deployment.shutdown.event))
-        } else {
-            let message = format!(
-                "what `{fqn}` waits for never comes: {}, for on this way nothing is asked for that would be answered so",
-                waits.join(", ")
-            );
-            Finding::warning(COORD_STUCK, message).help(
-                "ask for it on the entry of the state, so that it is asked for on every way there; or add a transition on \
-                 an event from outside",
-            )
-        };
-        finding.at(chart.origin(leaf)).path(format!("coordinator.{fqn}"))
     }
 }
 

@@ -26,6 +26,7 @@ mod lasts;
 mod loss;
 mod members;
 mod monitors;
+mod nowhere;
 mod outcome;
 mod outside;
 mod product;

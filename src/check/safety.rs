@@ -7,7 +7,7 @@ use super::product::Product;
 use super::state::{Failed, Move, Next, State};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{count, did_you_mean};
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -70,7 +70,7 @@ impl Graph<'_, '_> {
             let Some(at) = self.best_first(bad).first().copied() else { continue };
             let more = places.len().saturating_sub(6);
             places.truncate(6);
-            let more = if more > 0 { format!(" and {more} more places") } else { String::new() };
+            let more = if more > 0 { format!(" and {}", count(more, "more place")) } else { String::new() };
             let unknown = self.product.worlds.top(self.states[at as usize].world).is_some();
             let severity = if unknown { Severity::Warning } else { Severity::Error };
             let message = format!(

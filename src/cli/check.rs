@@ -8,6 +8,7 @@ use crate::check::{self, Explored, Report, TraceStep, Verdict, why_no_way};
 use crate::diagnostics::{SourceMap, to_json};
 use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS};
 use crate::model::codes::CLI_WHICH_COORDINATOR;
+use crate::model::finding::count as plural;
 use crate::model::{Deployment, Finding, Severity};
 use serde_json::json;
 use std::path::PathBuf;
@@ -116,9 +117,13 @@ impl Run for Args {
         let explored = report.explored;
         let reach = match (explored.states, explored.complete) {
             (0, _) => String::new(),
-            (n, true) => format!("; followed through all {n} states and {} transitions", explored.transitions),
+            (1, true) => format!("; followed through its one state and {}", plural(explored.transitions, "transition")),
+            (n, true) => {
+                format!("; followed through all {n} states and {}", plural(explored.transitions, "transition"))
+            }
             (n, false) => {
-                format!("; followed through {n} states and {} transitions, not all there are", explored.transitions)
+                let (states, transitions) = (plural(n, "state"), plural(explored.transitions, "transition"));
+                format!("; followed through {states} and {transitions}, not all there are")
             }
         };
         out.line(format!("{name}: {verdict}{reach}"));

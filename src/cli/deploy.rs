@@ -11,6 +11,7 @@ use super::signals::Watch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
+use crate::model::finding::count;
 use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
@@ -232,13 +233,13 @@ pub(super) fn short(error: std::io::Error) -> Failure {
 fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {
     let status = session.status();
     progress.line(format!(
-        "{} {} after {:.3} s: {} components, {} connections, {} frames on the stack",
+        "{} {} after {:.3} s: {}, {}, {} on the stack",
         out.paint(Style::Bold, &status.name),
         out.paint(Style::Good, "up"),
         status.at,
-        status.system.components.len(),
-        status.system.connections.len(),
-        status.stack.len(),
+        count(status.system.components.len(), "component"),
+        count(status.system.connections.len(), "connection"),
+        count(status.stack.len(), "frame"),
     ));
     let way = if in_background { "`davit shutdown` takes it down in order" } else { "Ctrl-C shuts it down in order" };
     progress.line(out.paint(Style::Dim, way));

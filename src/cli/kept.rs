@@ -1,8 +1,8 @@
 //! What is known of deployments that do not run any more: how they ended, and of those that died how far they were.
 
 use super::exit::Exit;
-use super::log::count;
 use super::output::{Output, Style};
+use crate::model::finding::count;
 use crate::session::client::ClientError;
 use crate::session::kept::{self, Began, Life, Story, entries};
 use crate::session::{Ended, Stage};

@@ -7,6 +7,7 @@ use super::remote::ASK;
 use super::status::{state_style, text};
 use super::{Answer, Context, Failure, Run};
 use crate::model::codes::CLI_NOTHING_KEPT;
+use crate::model::finding::count;
 use crate::session::client::Client;
 use crate::session::kept::{Life, forget, life};
 use crate::session::{owner, place};
@@ -90,9 +91,7 @@ impl Overview {
                 out.paint(Style::Bold, text(&one["name"])),
                 out.paint(state_style(phase), phase),
                 if one["why"].is_null() { out.paint(Style::Name, states) } else { text(&one["why"]).to_owned() },
-                faults.map_or_else(String::new, |faults| {
-                    out.paint(Style::Bad, super::log::count(usize::try_from(faults).unwrap_or(usize::MAX), "fault"))
-                }),
+                faults.map_or_else(String::new, |faults| out.paint(Style::Bad, count(faults, "fault"))),
                 one["pid"].as_u64().map_or_else(String::new, |pid| format!("process {pid}")),
                 one["began"].as_str().map_or_else(String::new, |began| out.paint(Style::Dim, format!("since {began}"))),
             ]);

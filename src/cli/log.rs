@@ -7,6 +7,7 @@ use super::remote::{ASK, ask, failure};
 use super::status::text;
 use super::{Answer, Context, Failure, Run, output};
 use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING};
+use crate::model::finding::count;
 use crate::session::Stage;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::entries;
@@ -200,14 +201,14 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
         }
         "returned" => format!("returned   {}", text(&entry["component"])),
         "missed" => format!(
-            "{}     {} entries are not shown: they came faster than they were read",
+            "{}     not shown: {}, which came faster than they were read",
             out.paint(Style::Care, "missed"),
-            entry["entries"]
+            count(&entry["entries"], "entry")
         ),
         "dropped" => format!(
-            "{}    {} events: the coordinator does not keep up",
+            "{}    {}: the coordinator does not keep up",
             out.paint(Style::Care, "dropped"),
-            entry["events"]
+            count(&entry["events"], "event")
         ),
         "slow" => format!(
             "{}       coordinator `{}` has been in a function for {:.1} s",
@@ -251,11 +252,6 @@ fn below(out: &Output, entry: &Json) -> String {
         format!("\n{:>12}           {took:>10}  {}{outcome}", "", text(&step["step"]))
     };
     entry["steps"].as_array().into_iter().flatten().map(line).collect()
-}
-
-/// `3 steps`, `1 step`.
-pub fn count(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Microseconds as a person reads them.

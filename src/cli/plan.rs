@@ -8,7 +8,7 @@ use super::{Answer, Context, Failure, Run};
 use crate::app::Read;
 use crate::check::{self, Drive, Happening, Until};
 use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
-use crate::model::finding::{configuration, did_you_mean, has_errors};
+use crate::model::finding::{configuration, count, did_you_mean, has_errors};
 use crate::model::{Ask, ConfigId, Finding, Findings, Ident, Snapshot};
 use crate::plan::PlannedStep;
 use crate::stack::{Op, Requester, Stack, transaction};
@@ -286,9 +286,9 @@ fn show(out: &Output, planned: &Planned) {
 fn summary(out: &Output, last: &Planned) {
     let running = last.result.components.values().filter(|c| c.state == crate::model::RunState::Running).count();
     out.line(format!(
-        "then: {} components, {running} of them running, {} connections, {} written ports",
-        last.result.components.len(),
-        last.result.connections.len(),
-        last.result.ports.len()
+        "then: {}, {running} of them running, {}, {}",
+        count(last.result.components.len(), "component"),
+        count(last.result.connections.len(), "connection"),
+        count(last.result.ports.len(), "written port")
     ));
 }

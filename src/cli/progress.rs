@@ -4,9 +4,10 @@
 //! pipe that nobody reads, keeps nobody waiting who acts.
 
 use super::detach;
-use super::log::{count, duration};
+use super::log::duration;
 use super::output::{Output, Style};
 use crate::limits;
+use crate::model::finding::count;
 use crate::session::log::Entry;
 use crate::session::tap::{Hears, News, Tap};
 use crate::session::{Happening, Phase};
@@ -212,7 +213,7 @@ impl Screen {
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");
-                self.line(format!("{time}  {word}  {events} events: the coordinator does not keep up"));
+                self.line(format!("{time}  {word}  {}: the coordinator does not keep up", count(events, "event")));
             }
             Happening::Slow { coordinator, seconds } => {
                 let word = out.paint(Style::Care, "slow");

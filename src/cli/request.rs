@@ -1,12 +1,13 @@
 //! `davit event`, `davit apply`, `davit undo`, `davit commit`: what is asked of a running deployment.
 
 use super::exit::Exit;
-use super::log::{count, duration};
+use super::log::duration;
 use super::output::Style;
 use super::remote::{ASK, Wait, Which, ask};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
 use crate::configurator::WAY_OUT;
+use crate::model::finding::count;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
 

@@ -7,6 +7,7 @@ use super::list::{Overview, of_phase, silent};
 use super::output::{Output, Style, Table};
 use super::remote::{ASK, failure};
 use super::{Answer, Context, Failure, Run};
+use crate::model::finding::count;
 use crate::session::StoppingView;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::Life;
@@ -184,19 +185,19 @@ fn print(out: &Output, status: &Json) {
     }
     if let Some(inside) = status["dropped"]["inside"].as_u64().filter(|inside| *inside > 0) {
         let word = out.paint(Style::Care, "dropped");
-        out.line(format!("{word}      {inside} events that a coordinator sent to itself: too many at once"));
+        out.line(format!("{word}      {} that a coordinator sent to itself: too many at once", count(inside, "event")));
     }
     for (kind, what) in [("report", "lost"), ("outside", "from outside, refused")] {
-        if let Some(count) = status["dropped"][kind].as_u64().filter(|count| *count > 0) {
+        if let Some(dropped) = status["dropped"][kind].as_u64().filter(|dropped| *dropped > 0) {
             let word = out.paint(Style::Care, "dropped");
-            out.line(format!("{word}      {count} events {what}: the coordinator does not keep up"));
+            out.line(format!("{word}      {} {what}: the coordinator does not keep up", count(dropped, "event")));
         }
     }
     let empty = Vec::new();
     let stack = status["stack"].as_array().unwrap_or(&empty);
     out.line(format!(
-        "stack        {} frames{}",
-        stack.len(),
+        "stack        {}{}",
+        count(stack.len(), "frame"),
         match stack.last() {
             Some(top) => format!(", newest {}", text(&top["configuration"])),
             None => String::new(),

@@ -6,11 +6,12 @@
 use super::exit::Exit;
 use super::kept;
 use super::list::silent;
-use super::log::{count, duration};
+use super::log::duration;
 use super::output::{self, Output, Style, Table};
 use super::remote::{connect, failure, seconds};
 use super::status::{state_style, text};
 use super::{Answer, Context, Run};
+use crate::model::finding::count;
 use crate::session::client::{Client, ClientError};
 use crate::session::owner;
 use crate::time::Clock;
@@ -260,7 +261,7 @@ fn drawn(out: &Output, look: &Json) -> String {
         let overruns = activity["overruns"].as_u64().unwrap_or_default();
         activities.row([
             text(&activity["name"]).to_owned(),
-            format!("{} rounds", activity["cycles"]),
+            count(&activity["cycles"], "round"),
             out.paint(if overruns > 0 { Style::Care } else { Style::Dim }, format!("{overruns} missed")),
             format!("late {} (at most {})", us("latency_last_s"), us("latency_max_s")),
             format!("takes {} (at most {})", us("duration_last_s"), us("duration_max_s")),

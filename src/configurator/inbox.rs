@@ -7,6 +7,7 @@ use super::request::{Batch, Request};
 use crate::limits;
 use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
 use crate::platform::{Ended, ObserveError, PlatformEvent};
+use crate::stack::Requester;
 use crate::time::{Clock, Receiver, Sender, TrySendError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -100,7 +101,10 @@ impl Post {
     pub fn batch(&self, batch: Batch, safe: usize) -> Result<(), Batch> {
         self.tell_leaving();
         let plain = batch.requests.len() - safe;
-        if plain > 0 && !reserve(&self.counts.requests, plain, limits::REQUEST_QUEUE) {
+        // However much an operator asks for, a coordinator finds room: it cannot wait for another time.
+        let by_operator = batch.requests.iter().any(|request| request.requester == Requester::Operator);
+        let room = if by_operator { limits::REQUEST_OPERATORS } else { limits::REQUEST_QUEUE };
+        if plain > 0 && !reserve(&self.counts.requests, plain, room) {
             return Err(batch);
         }
         if safe > 0 && !reserve(&self.counts.safe, safe, limits::SAFE_QUEUE) {

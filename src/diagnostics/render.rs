@@ -1,6 +1,7 @@
 //! The one rendering of findings, for terminals and as JSON.
 
 use super::source_map::{FileId, Location, SourceMap};
+use crate::model::finding::count;
 use crate::model::{Finding, Origin, Severity, codes};
 use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode,
@@ -50,7 +51,7 @@ pub fn render_with(findings: &[Finding], sources: &SourceMap, options: RenderOpt
         out.push('\n');
     }
     if findings.len() > options.most {
-        let _ = writeln!(out, "… and {} more findings", findings.len() - options.most);
+        let _ = writeln!(out, "… and {}", count(findings.len() - options.most, "more finding"));
     }
     out
 }

@@ -15,7 +15,7 @@ use super::tree::{Cx, Entry, Kind, Node, Reading};
 use crate::diagnostics::{FileId, Language};
 use crate::functions::{self, Field, NotOpened, Short, Spot};
 use crate::limits;
-use crate::model::finding::nearest;
+use crate::model::finding::{count, nearest};
 use crate::model::program::{Openings, Program};
 use crate::model::{Code, Finding, Findings, Origin, Statechart, codes};
 use crate::statechart::{Printer, Said};
@@ -234,7 +234,7 @@ fn printed(file: &str, said: &[Said]) -> Option<Finding> {
     message.push_str(&shown.join("; "));
     match lines.len().checked_sub(PRINTS_SHOWN) {
         None | Some(0) => {}
-        Some(more) => message.push_str(&format!("; and {more} more lines")),
+        Some(more) => message.push_str(&format!("; and {}", count(more, "more line"))),
     }
     (!lines.is_empty()).then(|| Finding::info(codes::LUA_PRINT, message))
 }

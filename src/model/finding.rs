@@ -175,6 +175,16 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
+/// `3 steps`, `1 step`, `2 properties`.
+pub fn count(number: impl std::fmt::Display, what: &str) -> String {
+    let number = number.to_string();
+    match what.strip_suffix('y') {
+        _ if number == "1" => format!("{number} {what}"),
+        Some(stem) if !stem.ends_with(['a', 'e', 'o', 'u']) => format!("{number} {stem}ies"),
+        _ => format!("{number} {what}s"),
+    }
+}
+
 /// The usual help for an unknown name: the nearest known one, else the list of known ones (at most eight of them).
 pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
@@ -192,6 +202,18 @@ pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_one_thing_there_is_no_plural() {
+        assert_eq!(
+            [count(1, "step"), count(0, "step"), count(2_u64, "property")],
+            ["1 step", "0 steps", "2 properties"]
+        );
+        assert_eq!(
+            [count(1, "entry"), count("1,000", "entry"), count(2, "key")],
+            ["1 entry", "1,000 entries", "2 keys"]
+        );
+    }
 
     #[test]
     fn near_names_are_found_as_a_whole_and_by_their_last_part() {

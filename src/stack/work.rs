@@ -2,6 +2,7 @@
 
 use super::share::{self, HandOver};
 use super::{Edits, Frame, FrameId, Inverse, Requester, Scope, Stack, net, newest, squash};
+use crate::model::finding::count;
 use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
 use crate::plan::undo::{Item, Script, undo};
 use crate::plan::{Context, Plan, PlannedStep, Refusal, StepId, plan_on};
@@ -406,7 +407,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             let own = taken + frames.iter().filter(|f| f.requester == frame.requester).count();
             let fits = || squash::fit(&mut frames.clone(), frame.requester, stack.bound.saturating_sub(taken), &busy);
             if own > stack.bound && !fits() {
-                let message = format!("there are {own} frames of `{}`, and none can be squashed", frame.requester);
+                let message =
+                    format!("`{}` would have {}, and none can be squashed", frame.requester, count(own, "frame"));
                 let finding = Finding::error(codes::STACK_FULL, message)
                     .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");
                 return Err(Refusal { findings: vec![finding], request: parts.len().saturating_sub(1) });

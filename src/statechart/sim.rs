@@ -6,7 +6,7 @@ use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
 use super::outcome::{Ended, Mode, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
-use crate::model::finding::nearest;
+use crate::model::finding::{count, nearest};
 use crate::model::names::{EventName, NameError};
 use crate::time::Time;
 use serde::Serialize;
@@ -130,7 +130,7 @@ impl<'c, F: Hook> Sim<'c, F> {
         };
         if lost > 0 {
             let most = limits::CHART_QUEUE;
-            trace.note(format!("{lost} events found no room: a set holds at most {most}"));
+            trace.note(format!("{} found no room: a set holds at most {most}", count(lost, "event")));
         }
         Ok(self.observe(stepped, trace))
     }
@@ -165,7 +165,7 @@ impl<'c, F: Hook> Sim<'c, F> {
             trace.notes_after.push(last);
         };
         if trace.left_out > 0 {
-            end(format!("{} more notes are left out", trace.left_out));
+            end(format!("left out: {}", count(trace.left_out, "more note")));
         }
         if stepped.ended == Ended::Endless {
             end(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));

@@ -211,6 +211,37 @@ fn advice_names_what_never_comes() {
     assert!(stuck[0]["help"].as_str().unwrap().contains("on the entry"), "{:#}", stuck[0]);
 }
 
+/// What a state does already is no advice: it asks itself for what it waits for, or hears the event that ends the deployment, which
+/// a connector then holds up.
+#[test]
+fn no_advice_is_what_is_done_already() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, park = Configuration { property_set(\"a.gain\", 0.0) },";
+    let parks = STATES.replace(
+        "trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },",
+        "parks = state { entry = \"park\" }, trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+         trans { src = \"up\", tgt = \"parks\", events = { \"e_go\" } },
+         trans { src = \"parks\", tgt = \"up\", events = { \"park.failed\", \"park.broken\" } },",
+    );
+    let said = Small::new(configurations, &parks, "").check();
+    let stuck = said.of("coord::stuck");
+    assert_eq!(stuck.len(), 1, "{:#}", said.0);
+    let (message, help) = (stuck[0]["message"].as_str().unwrap(), stuck[0]["help"].as_str().unwrap());
+    assert!(message.contains("nothing leads on from `root.parks`: `park` is answered otherwise"), "{message}");
+    assert_eq!(help, "add a transition on the answers that it does not hear: `park.ok`");
+
+    let held_up = STATES.replace(
+        "trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },",
+        "half = conn {}, trans { src = \"up\", tgt = \"half\", events = { \"e_shutdown\" } },
+         trans { src = \"half\", tgt = \"leaving\", events = { \"e_also\" } },",
+    );
+    let said = Small::new(configurations, &held_up, "").check();
+    let stuck = said.of("coord::stuck");
+    assert!(stuck.iter().any(|found| found["message"] == "nothing leads on from `root.up`"), "{:#}", said.0);
+    let no_help = |found: &&serde_json::Value| found["help"].as_str().unwrap().contains("add a transition from it");
+    assert!(!stuck.iter().any(|found| no_help(&found)), "{:#}", said.0);
+}
+
 /// What a configuration stands for is known beforehand where it rests on run states: applied where that is false, it can only
 /// fail. The script of the way sees it fail.
 #[test]

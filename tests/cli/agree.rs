@@ -161,4 +161,18 @@ fn readme_shows_what_check_says() {
     for line in ran.out.lines() {
         assert!(readme.contains(line.trim_end()), "README does not show: {line}");
     }
+    // And of a mistake.
+    let demo = Demo::new();
+    for folder in ["deployments", "configs/hello"] {
+        std::fs::create_dir_all(demo.path(folder)).unwrap();
+    }
+    for file in ["deployments/hello.yaml", "configs/hello/configurations.lua", "configs/hello/coordinator.lua"] {
+        let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        demo.write(file, &text.replace("property_set(\"gain.k\", 0.5)", "property_set(\"gain.kk\", 0.5)"));
+    }
+    let ran = demo.run(&["check", "deployments/hello.yaml"]);
+    assert!(ran.code == 1 && ran.err.contains("unknown_property"), "{}", ran.err);
+    for line in ran.err.lines() {
+        assert!(readme.contains(line.trim_end()), "README does not show: {line}");
+    }
 }

@@ -3,6 +3,7 @@
 use crate::demo::Demo;
 use crate::foreground::Foreground;
 use davit::limits;
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::process::Stdio;
 
@@ -38,4 +39,34 @@ fn idle_connections_do_not_lock_the_operator_out() {
     assert_eq!(demo.run(&["shutdown", "--force"]).code, 4);
     assert!(deployed.end().code().is_some());
     drop(crowd);
+}
+
+/// One client sends events faster than what they lead to is carried out: they wait, and some are refused, and no request fails for it.
+#[test]
+fn a_burst_of_events_fails_no_request() {
+    const EVENTS: usize = 10_000;
+    let demo = Demo::new();
+    let mut command = demo.command(&["deploy", "deployment.yaml"]);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let deployed = Foreground::start(&mut command);
+    demo.until_phase("up");
+    let mut client = UnixStream::connect(demo.path("davit/demo.sock")).expect("a place");
+    let answers = BufReader::new(client.try_clone().expect("both ends"));
+    let sends = std::thread::spawn(move || {
+        for number in 0..EVENTS {
+            let event = ["e_fast", "e_slow"][number % 2];
+            let params = serde_json::json!({ "event": event });
+            let call = serde_json::json!({ "jsonrpc": "2.0", "id": number, "method": "event", "params": params });
+            client.write_all(format!("{call}\n").as_bytes()).expect("it is read");
+        }
+        client
+    });
+    assert_eq!(answers.lines().take(EVENTS).filter(|line| line.is_ok()).count(), EVENTS, "each is answered");
+    drop(sends.join().expect("all are sent"));
+    let down = demo.run(&["shutdown", "--json"]);
+    assert_eq!((down.code, &down.json()["stage"]), (0, &"led".into()), "{}{}", down.out, down.err);
+    assert_eq!(deployed.end().code(), Some(0));
+    let log = demo.read("state/davit/demo.log")
+        + &std::fs::read_to_string(demo.path("state/davit/demo.log.1")).unwrap_or_default();
+    assert!(log.contains("fast.ok") && !log.contains(".failed"), "no request failed");
 }

@@ -6,7 +6,8 @@
 //!    (`ID.lost`, `ID.reverted`, answers for which there was no room), one of each at most.
 //! 2. Reports: events of components, monitors and other coordinators. When their room is full there is still room for one of
 //!    each event that the chart waits for: the last of a name is never lost. The others are lost and counted.
-//! 3. Events from outside. When their room is full they are refused to whoever sends them.
+//! 3. Events from outside. When their room is full they are refused to whoever sends them. None of them is taken up while
+//!    [`limits::INBOX_ASKED`] requests of the coordinator are not answered: it would only ask for more.
 //!
 //! The first class goes first, after [`limits::INBOX_ROW`] in a row one of the other two; between these what came first, and
 //! after as many in a row of one class the other. Of the first class, after as many urgent ones a word.
@@ -134,6 +135,7 @@ struct Bounds {
     outside: usize,
     joined: usize,
     row: usize,
+    asked: usize,
 }
 
 const BOUNDS: Bounds = Bounds {
@@ -142,6 +144,7 @@ const BOUNDS: Bounds = Bounds {
     outside: limits::INBOX_OUTSIDE,
     joined: limits::INBOX_JOINED,
     row: limits::INBOX_ROW,
+    asked: limits::INBOX_ASKED,
 };
 
 /// All classes.
@@ -319,7 +322,7 @@ impl Inbox {
     /// Which list goes next; none: nothing waits.
     fn turn(&mut self) -> Option<List> {
         let waits = |list| !self.lists.is_empty(list);
-        let low = waits(List::Reports) || waits(List::Outside);
+        let low = waits(List::Reports) || self.takes_from_outside();
         let (urgent, words) = (waits(List::Urgent), waits(List::Words));
         if (urgent || words) && !(low && self.row >= self.bounds.row) {
             self.row = if low { self.row + 1 } else { 0 };
@@ -334,9 +337,15 @@ impl Inbox {
         low.then(|| self.low_turn())
     }
 
+    /// Whether an event from outside waits that may have its turn.
+    fn takes_from_outside(&self) -> bool {
+        self.held.answers < self.bounds.asked && !self.lists.is_empty(List::Outside)
+    }
+
     /// Which of the two lower classes goes next; one of them waits.
     fn low_turn(&mut self) -> List {
-        let first = match (self.lists.came(List::Reports), self.lists.came(List::Outside)) {
+        let outside = self.lists.came(List::Outside).filter(|_| self.takes_from_outside());
+        let first = match (self.lists.came(List::Reports), outside) {
             (Some(report), Some(outside)) if report < outside => List::Reports,
             (Some(_), Some(_)) => List::Outside,
             (alone, _) => {

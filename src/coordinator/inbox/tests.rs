@@ -3,7 +3,7 @@
 use super::*;
 use proptest::prelude::*;
 
-const SMALL: Bounds = Bounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3 };
+const SMALL: Bounds = Bounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
 
 /// Names that the chart waits for, and as many that it does not.
 const DECLARED: usize = 3;
@@ -300,4 +300,23 @@ fn between_the_lower_classes_what_came_first_goes_first() {
     }
     let out: Vec<Class> = std::iter::from_fn(|| inbox.pop(&mut tickets)).map(|incoming| incoming.class).collect();
     assert_eq!(out, [Class::Outside, Class::Report, Class::Report, Class::Outside]);
+}
+
+/// A coordinator that asks for more than is carried out takes up no event from outside, and goes on with everything else.
+#[test]
+fn while_much_is_asked_for_what_comes_from_outside_waits() {
+    let (mut inbox, mut tickets) = (Inbox::new([name(1)]), Vec::new());
+    (0..limits::INBOX_ASKED).for_each(|_| inbox.hold(Class::Answer).unwrap());
+    for class in [Class::Outside, Class::Report, Class::Outside, Class::Urgent] {
+        inbox.push(Incoming::new(class, name(1))).unwrap();
+    }
+    let mut out = |inbox: &mut Inbox| inbox.pop(&mut tickets).map(|incoming| incoming.class);
+    assert_eq!([out(&mut inbox), out(&mut inbox), out(&mut inbox)], [Some(Class::Urgent), Some(Class::Report), None]);
+    assert!(!inbox.is_empty());
+    inbox.push(Incoming::new(Class::Answer, name(0))).unwrap();
+    assert_eq!([out(&mut inbox), out(&mut inbox)], [Some(Class::Answer), Some(Class::Outside)]);
+    inbox.hold(Class::Answer).unwrap();
+    assert_eq!(out(&mut inbox), None);
+    inbox.release(Class::Answer);
+    assert_eq!([out(&mut inbox), out(&mut inbox)], [Some(Class::Outside), None]);
 }
