@@ -50,7 +50,7 @@ impl Graph<'_, '_> {
 
     /// Where its time stands still while it is stopped: a safe configuration has come since, and people decide how it goes on,
     /// by the event that ends the deployment once more.
-    fn stands_still(&self) -> Vec<bool> {
+    pub(super) fn stands_still(&self) -> Vec<bool> {
         let safe = |at: u32| {
             let state = &self.states[at as usize];
             state.stopping && self.product.worlds.is_safe(state.world)

@@ -77,11 +77,7 @@ impl Graph<'_, '_> {
         let edges = self.edges.iter().enumerate().filter(|(number, edge)| counts(*number, edge));
         edges.for_each(|(_, edge)| before[edge.to as usize].push(edge.from));
         let forced = |state: &State| self.product.worlds.top(state.world).is_some();
-        let mut reaches: Vec<bool> =
-            self.states.iter().map(|state| self.product.is_down(state) || forced(state)).collect();
-        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
-        ends.for_each(|at| reaches[at as usize] = true);
-        self.followed.iter().zip(&mut reaches).for_each(|(followed, reaches)| *reaches |= !followed);
+        let mut reaches = self.arrives();
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
         open.retain(|at| !forced(&self.states[*at as usize]));
@@ -95,36 +91,52 @@ impl Graph<'_, '_> {
         reaches
     }
 
+    /// Which states are *down*, or not followed further, or nothing is known of them.
+    pub(super) fn arrives(&self) -> Vec<bool> {
+        let of = |(state, followed): (&State, &bool)| {
+            !followed || self.product.is_down(state) || self.product.worlds.top(state.world).is_some()
+        };
+        let mut arrives: Vec<bool> = self.states.iter().zip(&self.followed).map(of).collect();
+        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
+        ends.for_each(|at| arrives[at as usize] = true);
+        arrives
+    }
+
     /// The event that ends the deployment is raised once, and not all that leads on where it is not being stopped does then:
     /// one finding, of the worst; of several as bad, of what is the first of these in the way somewhere. The state that is
     /// warned of; none: none is.
     fn once_down(&mut self, reaches: &[bool], found: &mut Traced) -> Option<u32> {
         let (bars, behind_failed) = (self.bars(), self.behind_failed());
-        let mut before = reaches.to_vec();
+        // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
+        let expects = |failed: &[Failed], at: u32| failed[at as usize] == Failed::Nothing || behind_failed[at as usize];
         let mut worst: Option<(u32, Finding)> = None;
+        let mut found_at = |graph: &mut Self, some: Vec<u32>, certain: bool, tell: &dyn Fn(&Self, u32) -> Finding| {
+            let best = graph.best_first(some);
+            let expected = best.iter().find(|at| expects(&graph.failed, **at)).filter(|_| certain);
+            let Some(at) = expected.or(best.first()).copied() else { return };
+            let severity = if expected.is_some() { Severity::Warning } else { Severity::Info };
+            if worst.as_ref().is_none_or(|(_, worst)| severity > worst.severity) {
+                worst = Some((at, Finding { severity, ..tell(graph, at) }));
+            }
+        };
+        let mut before = reaches.to_vec();
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
-            let told = self.product.never_down && matches!(barred, Barred::Closed | Barred::Late);
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
             let lost = |at: &u32| {
                 let state = &self.states[*at as usize];
                 state.stopping && state.is_at_rest() && before[*at as usize] && !after[*at as usize]
             };
             let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
-            // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
-            let best = self.best_first(some);
-            let expects = |at: &u32| self.failed[*at as usize] == Failed::Nothing || behind_failed[*at as usize];
-            let at = best.iter().find(|at| expects(at)).or(best.first()).copied().filter(|_| !told);
-            if let Some(at) = at {
-                let severity = match expects(&at) && barred != Barred::Reported {
-                    true => Severity::Warning,
-                    false => Severity::Info,
-                };
-                let finding = Finding { severity, ..self.barred(at, barred, &bars, &before) };
-                if worst.as_ref().is_none_or(|(_, worst)| finding.severity > worst.severity) {
-                    worst = Some((at, finding));
-                }
+            if !(self.product.never_down && matches!(barred, Barred::Closed | Barred::Late)) {
+                let tell = |graph: &Self, at| graph.barred(at, barred, &bars, &before);
+                found_at(self, some, barred != Barred::Reported, &tell);
             }
             before = after;
+        }
+        if !self.product.never_down {
+            let slow = self.slow(&bars);
+            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow[&at]);
+            found_at(self, slow.keys().copied().collect(), true, &tell);
         }
         let (at, finding) = worst?;
         let told = (finding.severity == Severity::Warning).then_some(at);

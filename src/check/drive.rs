@@ -181,7 +181,7 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
         for next in product.outside_moves(&state, tried, at == 0) {
             let mut moves = vec![next.clone()];
             let rest = product.rest(next.state, goal, &mut moves);
-            if let Some((by, last)) = fails(product, tried, &moves) {
+            if let Some((by, last)) = tried.fails(product, &moves) {
                 moves.truncate(last + 1);
                 let _ = failed.get_or_insert((at, moves, by));
                 continue;
@@ -213,13 +213,6 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
     let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
     Way { from, moves, reached: reached.is_some(), refused, failed, late: None }
-}
-
-/// The first of these moves after which a bring-up has failed, though every request is answered *ok*: by which coordinator,
-/// and its place.
-pub(super) fn fails(product: &Product<'_>, tried: &Tried, moves: &[Next]) -> Option<(usize, usize)> {
-    let failing = |(at, next): (usize, &Next)| product.failed_in(&next.state).map(|by| (by, at));
-    moves.iter().enumerate().filter(|_| !tried.stopping).find_map(failing)
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round

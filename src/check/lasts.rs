@@ -1,6 +1,5 @@
 //! How long a way lasts at least: time events take their time, and everything else is taken to need none.
 
-use super::drive::fails;
 use super::product::Product;
 use super::state::{Move, Next, State};
 use super::tried::{Goal, Tried, Way};
@@ -13,7 +12,7 @@ use std::time::Duration;
 
 /// What is still to wait for time events of states that were entered on the way. Those of states that were entered before may
 /// be over at any moment.
-type Waits = Vec<(usize, EventId, Duration)>;
+pub(super) type Waits = Vec<(usize, EventId, Duration)>;
 
 impl Product<'_> {
     /// How long a time event takes from the entry of its state.
@@ -25,28 +24,28 @@ impl Product<'_> {
     }
 
     /// What is to wait for after a move, and how long the move took.
-    fn waits_after(&self, before: &State, next: &Next, waits: &Waits) -> (Waits, Duration) {
+    pub(super) fn waits_after(&self, before: &State, by: Move, after: &State, waits: &Waits) -> (Waits, Duration) {
         let due = |number: usize, event: EventId| waits.iter().find(|(n, e, _)| (*n, *e) == (number, event));
-        let took = match next.by {
+        let took = match by {
             Move::Time(number, event) => due(usize::from(number), event).map_or(Duration::ZERO, |(_, _, left)| *left),
             _ => Duration::ZERO,
         };
-        let mut after = Waits::new();
+        let mut still = Waits::new();
         for (number, member) in self.members.iter().enumerate() {
-            let (from, to) = (before.leaves[number], next.state.leaves[number]);
+            let (from, to) = (before.leaves[number], after.leaves[number]);
             let mut at: Option<NodeId> = Some(to);
             while let Some(state) = at {
                 at = member.chart.parent(state);
                 let Some(event) = member.chart.time_event(state) else { continue };
-                let fired = matches!(next.by, Move::Time(n, e) if (usize::from(n), e) == (number, event));
+                let fired = matches!(by, Move::Time(n, e) if (usize::from(n), e) == (number, event));
                 if fired || !member.chart.is_inside(from, state) {
-                    after.push((number, event, member.chart.time_of(event).unwrap_or_default()));
+                    still.push((number, event, member.chart.time_of(event).unwrap_or_default()));
                 } else if let Some((_, _, left)) = due(number, event) {
-                    after.push((number, event, left.saturating_sub(took)));
+                    still.push((number, event, left.saturating_sub(took)));
                 }
             }
         }
-        (after, took)
+        (still, took)
     }
 
     /// How long these moves last at least, and the time events that they wait for.
@@ -54,7 +53,7 @@ impl Product<'_> {
         let (mut waits, mut all, mut times) = (Waits::new(), Duration::ZERO, Vec::new());
         let mut before = from;
         for next in moves {
-            let (after, took) = self.waits_after(before, next, &waits);
+            let (after, took) = self.waits_after(before, next.by, &next.state, &waits);
             if let (Move::Time(number, event), false) = (next.by, took.is_zero()) {
                 times.push((usize::from(number), event));
             }
@@ -98,12 +97,12 @@ pub(super) fn soonest(product: &mut Product<'_>, way: &Way, tried: &Tried, goal:
         for next in product.outside_moves(&state, tried, place == 0) {
             let mut moves = vec![next.clone()];
             let Ok(rest) = product.rest(next.state, goal, &mut moves) else { continue };
-            if fails(product, tried, &moves).is_some() {
+            if tried.fails(product, &moves).is_some() {
                 continue;
             }
             let (mut waits, mut now, mut before) = (waits.clone(), at, &state);
             for next in &moves {
-                let (after, took) = product.waits_after(before, next, &waits);
+                let (after, took) = product.waits_after(before, next.by, &next.state, &waits);
                 waits = after;
                 now += took;
                 before = &next.state;

@@ -13,6 +13,7 @@ mod comes;
 mod configurations;
 mod coordinator;
 mod declared;
+mod detours;
 mod down;
 mod drive;
 mod endless;

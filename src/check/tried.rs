@@ -1,6 +1,7 @@
 //! A way up or down that is tried with every request answered *ok*, and what is tried.
 
 use super::members::Member;
+use super::product::Product;
 use super::state::{Next, State};
 use crate::model::{EventName, Findings};
 use crate::stack::Request;
@@ -35,6 +36,15 @@ impl Way {
     /// The state at the end.
     pub fn end(&self) -> &State {
         self.moves.last().map_or(&self.from, |next| &next.state)
+    }
+}
+
+impl Tried {
+    /// The first of these moves after which a bring-up has failed, though every request is answered *ok*: by which
+    /// coordinator, and its place.
+    pub(super) fn fails(&self, product: &Product<'_>, moves: &[Next]) -> Option<(usize, usize)> {
+        let failing = |(at, next): (usize, &Next)| product.failed_in(&next.state).map(|by| (by, at));
+        moves.iter().enumerate().filter(|_| !self.stopping).find_map(failing)
     }
 }
 

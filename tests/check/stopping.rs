@@ -352,6 +352,58 @@ fn a_place_beside_the_way_that_a_time_leads_down_from_too_late_is_told() {
     assert_eq!(said.0["verdict"], "warnings");
 }
 
+/// Times that add up beside the way on which everything goes well.
+#[test]
+fn a_way_down_whose_times_add_up_to_more_than_there_is_is_told() {
+    let aside = |states: &str, ways: &str| {
+        let more = format!(
+            "stays = state {{}}, hot = state {{}}, {states}, trans {{ src = 'up', tgt = 'hot', events = {{ 'e_hot' }} }},
+             trans {{ src = 'hot', tgt = 'vents', events = {{ 'e_shutdown' }} }},{ways}"
+        );
+        Small::new(BASE, &timed("'e_done'", "'e_done'").replace("stays = state {},", &more), "")
+    };
+    let two = |second: &str| {
+        let ways = format!(
+            "trans {{ src = 'vents', tgt = 'airs', events = {{ 'e_after(3.0)' }} }},
+             trans {{ src = 'airs', tgt = 'leaving', events = {{ {second} }} }},"
+        );
+        aside("vents = state {}, airs = state {}", &ways)
+    };
+    let one_in_the_other = aside(
+        "vents = state { first = state {}, second = state {}, trans { src = 'initial', tgt = 'first' },
+         trans { src = 'first', tgt = 'second', events = { 'e_after(3.0)' } } }",
+        "trans { src = 'vents', tgt = 'leaving', events = { 'e_after(4.0)' } },",
+    );
+    let message = "the way down by `root.vents` lasts 5.5 s at least, and `shutdown.within_s` gives it 5 s";
+    let aside = [(two("'e_after(2.5)'"), vec![message], 4), (two("'e_after(1.5)'"), vec![], 0)];
+    for (small, told, exit) in aside.into_iter().chain([(one_in_the_other, vec![], 0)]) {
+        let said = small.check();
+        let found = said.of("coord::no_way_down");
+        let messages: Vec<_> = found.iter().map(|finding| finding["message"].as_str().unwrap()).collect();
+        assert_eq!(messages, told, "{:#}", said.0);
+        small.demo.write("hot.lua", "deploy('small.yaml')\nraise('e_hot')\nwait(0.1)\nshutdown()\n");
+        let ran = small.demo.run(&["run", "hot.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, exit, "{}{}", ran.out, ran.err);
+    }
+    // Nothing need be waited for where something else may lead on.
+    let said = two("'e_after(2.5)', 'e_cool'").check();
+    assert!(said.of("coord::no_way_down").is_empty(), "{:#}", said.0);
+    // Where something has failed before it is noted.
+    let parks = "stays = state {}, parks = state { entry = 'park' }, again = state {}, rests = state {},
+        trans { src = 'parks', tgt = 'leaving', events = { 'park.ok' } },
+        trans { src = 'parks', tgt = 'again', events = { 'park.failed', 'park.broken' } },
+        trans { src = 'again', tgt = 'rests', events = { 'e_after(3.0)' } },
+        trans { src = 'rests', tgt = 'leaving', events = { 'e_after(3.0)' } },";
+    let parks = timed("'e_done'", "'e_done'").replace("stays = state {},", parks);
+    let parks = parks.replace("'cooling', tgt = 'leaving'", "'cooling', tgt = 'parks'");
+    let parks = parks.replace("entry = 'base.undo'", "entry = { 'park.undo', 'base.undo' }");
+    let conf = format!("{BASE}, park = Configuration {{ property_set('a.gain', 2.0) }}");
+    let said = Small::new(&conf, &parks, "").check();
+    let message = "the way down by `root.again` lasts 6 s at least, and `shutdown.within_s` gives it 5 s";
+    let finding = only(&said, "coord::no_way_down");
+    assert_eq!((finding["severity"].as_str(), finding["message"].as_str()), (Some("info"), Some(message)));
+}
+
 #[test]
 fn one_event_for_both_ends_is_told_as_what_it_is() {
     let small = Small::new(BASE, &timed("'e_done'", "'e_done'").replace("'e_start'", "'e_shutdown'"), "");
