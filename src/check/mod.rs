@@ -34,6 +34,7 @@ mod report;
 mod rounds;
 mod run;
 mod safety;
+mod settings;
 mod shape;
 mod shown;
 mod shows;

@@ -78,7 +78,7 @@ impl Ask {
     /// What its status events begin with.
     pub fn subject(&self) -> &str {
         match self {
-            Self::Apply(id) | Self::UndoOf(id) => id.as_str(),
+            Self::Apply(id) | Self::UndoOf(id) => id.sets().map_or(id.as_str(), |(member, _)| member),
             Self::Undo | Self::UndoTo(_) => "undo",
             Self::Commit { .. } => "commit",
         }
