@@ -158,6 +158,7 @@ pub const FUNCTIONS: &[&str] = &[
     "raise",
     "apply",
     "undo",
+    "set",
     "commit",
     "drift",
     "recover",
@@ -204,6 +205,12 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     });
     function!("undo", (Option<String>, Option<Table>), |h, _lua, (id, options)| {
         request(h, id.as_deref(), Ask::UndoOf, options::flag(options, "force")?)
+    });
+    function!("set", (String, LuaValue, Option<Table>), |h, _lua, (member, value, options)| {
+        let (session, value) = (session(h)?, values::from_lua(&value)?);
+        listen_anew(h, &session);
+        let set = session.set(LINE, &member, &value, options::flag(options, "force")?);
+        set.map(|_| ()).map_err(|why| error(format!("{}: {}", why.message, why.help)))
     });
     function!("commit", Option<Table>, |h, _lua, options| {
         let session = session(h)?;
@@ -400,7 +407,8 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: boo
         None => Ask::Undo,
         Some(id) => {
             let known = session.configurations();
-            ask(known.iter().find(|k| k.as_str() == id).copied().ok_or_else(|| {
+            let set = || session.setting(id).filter(|id| ask(*id).is_undo());
+            ask(known.iter().find(|k| k.as_str() == id).copied().or_else(set).ok_or_else(|| {
                 let help = did_you_mean(id, "configurations", known.iter().map(ConfigId::as_str));
                 error(format!("there is no configuration `{id}`: {help}"))
             })?)

@@ -1,13 +1,14 @@
-//! Several coordinators side by side: what each of them is checked as by itself, and what they touch in common.
+//! Several coordinators side by side: what each of them is checked as by itself, what they and an operator touch in common,
+//! and who is therefore followed together.
 
 use super::coordinator::ask_of;
-use super::members::requester;
+use super::members::hears_loss;
 use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
 use crate::model::{
     Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, RequestId, Severity, Target,
 };
-use crate::stack::Request;
-use crate::stack::claims::{self, Claims};
+use crate::stack::claims::{self, Claim, Claims};
+use crate::stack::{Request, Requester};
 use crate::statechart::{Chart, EventId};
 use std::collections::BTreeSet;
 
@@ -29,12 +30,6 @@ pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option
     Some(seen)
 }
 
-/// Components that a configuration names, and whether it may touch all by `_default`.
-fn touched(configuration: &Configuration) -> (BTreeSet<ComponentName>, bool) {
-    let mut entries = configuration.pre.iter().chain(configuration.post.iter());
-    (claims::components(configuration), entries.any(|entry| entry.target == Target::Default))
-}
-
 /// Configurations that a coordinator asks for.
 pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
     let asks = chart.raises().iter().filter_map(|site| ask_of(deployment, site.name));
@@ -45,41 +40,40 @@ pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
     .collect()
 }
 
-/// What the configurations of different coordinators touch together: one finding for each pair of coordinators. `verified`:
-/// they were followed together, so that what comes of it is told by findings of its own.
+/// What an operator may ask for at any time.
+fn by_operator(deployment: &Deployment) -> BTreeSet<ConfigId> {
+    let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id);
+    let listed = deployment.operator_applies().filter(|id| deployment.configuration(*id).is_some());
+    safe.chain(listed).collect()
+}
+
+/// What the configurations of different coordinators touch together, or what an operator may apply touches of both: one
+/// finding for each pair of coordinators. `verified`: they were followed together, so that what comes of it is told by
+/// findings of its own.
 pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], verified: bool) -> Findings {
     if numbers.len() < 2 {
         return Vec::new();
     }
     let names: Vec<Ident> = numbers.iter().map(|number| deployment.coordinators[*number].name).collect();
-    let of = |chart: &Chart| -> Vec<(&Configuration, BTreeSet<ComponentName>, bool)> {
-        let ids = asked(deployment, chart);
-        let configurations = deployment.configurations.iter().filter(|c| ids.contains(&c.id));
-        configurations.map(|c| (c, touched(c).0, touched(c).1)).collect()
+    let of = |ids: BTreeSet<ConfigId>| -> Vec<Touched<'_>> {
+        deployment.configurations.iter().filter(|c| ids.contains(&c.id)).map(Touched::by).collect()
     };
-    let all: Vec<_> = numbers.iter().map(|number| of(charts[*number])).collect();
+    let all: Vec<_> = numbers.iter().map(|number| of(asked(deployment, charts[*number]))).collect();
+    let operated = of(by_operator(deployment));
+    let (severity, rest) = match verified {
+        true => (Severity::Info, "they were followed together"),
+        false => (Severity::Warning, "what they do together was not followed to the end"),
+    };
     let mut findings = Vec::new();
     for (a, mine) in all.iter().enumerate() {
         for (b, theirs) in all.iter().enumerate().skip(a + 1) {
-            let found = mine.iter().find_map(|(one, components, everything)| {
-                theirs.iter().find_map(|(other, touches, all)| {
-                    let what = match components.intersection(touches).next() {
-                        Some(component) => format!("`{component}`"),
-                        None if one.id == other.id => "the same, being one configuration".to_owned(),
-                        None if *everything || *all => "every component, by `_default`".to_owned(),
-                        None if one.group.is_some() && one.group == other.group => {
-                            format!("the group `{}`", one.group.map_or("", |g| g.as_str()))
-                        }
-                        None => return None,
-                    };
-                    Some((*one, *other, what))
-                })
-            });
-            if let Some((one, other, what)) = found {
-                let (severity, rest) = match verified {
-                    true => (Severity::Info, "they were followed together"),
-                    false => (Severity::Warning, "what they do together was not followed to the end"),
-                };
+            let both = mine.iter().find_map(|one| theirs.iter().find_map(|other| Some((one, other, one.with(other)?))));
+            let between = || {
+                let met = |of: &Touched<'_>, all: &[Touched<'_>]| all.iter().find_map(|own| of.with(own));
+                operated.iter().find_map(|of| Some((of, met(of, mine)?, met(of, theirs)?)))
+            };
+            if let Some((one, other, what)) = both {
+                let (one, other) = (one.of, other.of);
                 let message = format!(
                     "`{}` of the coordinator `{}` and `{}` of `{}` touch {what}: {rest}",
                     one.id, names[a], other.id, names[b]
@@ -90,10 +84,48 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], ver
                         .also(other.origin, "the other one")
                         .help("give each coordinator components of its own, or let one ask the other by an event"),
                 );
+            } else if let Some((of, what, other)) = between() {
+                let message = format!(
+                    "`{}`, which an operator may apply, touches {what} like the coordinator `{}`, and {other} like `{}`: {rest}",
+                    of.of.id, names[a], names[b]
+                );
+                findings.push(
+                    Finding::new(severity, COORD_SHARED, message)
+                        .at(of.of.origin)
+                        .labelled("touches what both touch")
+                        .help("give the operator one for what each coordinator touches"),
+                );
             }
         }
     }
     findings
+}
+
+/// What a configuration may touch, for words.
+struct Touched<'d> {
+    of: &'d Configuration,
+    components: BTreeSet<ComponentName>,
+    /// All there is, by `_default`.
+    all: bool,
+}
+
+impl<'d> Touched<'d> {
+    fn by(of: &'d Configuration) -> Self {
+        let mut entries = of.pre.iter().chain(of.post.iter());
+        let all = entries.any(|entry| entry.target == Target::Default);
+        Self { of, components: claims::components(of), all }
+    }
+
+    /// What it touches that another one touches as well.
+    fn with(&self, other: &Self) -> Option<String> {
+        let group = self.of.group.filter(|group| other.of.group == Some(*group));
+        match self.components.intersection(&other.components).next() {
+            Some(component) => Some(format!("`{component}`")),
+            None if self.of.id == other.of.id => Some("the same, being one configuration".to_owned()),
+            None if self.all || other.all => Some("every component, by `_default`".to_owned()),
+            None => group.map(|group| format!("the group `{group}`")),
+        }
+    }
 }
 
 /// Takes back that a coordinator does not wait for the event that starts or ends the deployment, if another one does.
@@ -105,30 +137,67 @@ pub fn forgive_unheard(deployment: &Deployment, charts: &[&Chart], findings: &mu
     }
 }
 
+/// What coordinators and an operator may meet in, known from the text of what they ask for.
+struct Meeting<'a> {
+    deployment: &'a Deployment,
+    charts: &'a [&'a Chart],
+    claims: Claims,
+    /// What each coordinator may ask for, and what that claims.
+    asked: Vec<(BTreeSet<ConfigId>, Claim)>,
+}
+
+impl<'a> Meeting<'a> {
+    fn of(deployment: &'a Deployment, charts: &'a [&'a Chart]) -> Self {
+        let claims = Claims::new(deployment.configurations.iter());
+        let asked = |chart: &&Chart| {
+            let ids = asked(deployment, chart);
+            let claim = claimed(&claims, &ids);
+            (ids, claim)
+        };
+        let asked = charts.iter().map(asked).collect();
+        Self { deployment, charts, claims, asked }
+    }
+
+    /// Whether two coordinators have to do with each other.
+    fn meets(&self, a: usize, b: usize) -> bool {
+        let ((own, claim), (other, theirs)) = (&self.asked[a], &self.asked[b]);
+        let is_safe = |id: &ConfigId| self.deployment.configuration(*id).is_some_and(|c| c.safe);
+        let hears = |a: usize, b: usize| {
+            let mut raises = self.charts[a].raises().iter();
+            raises.any(|site| self.charts[b].event(site.name) != EventId::OTHER)
+        };
+        let safe = own.iter().chain(other).any(is_safe);
+        let same = own.intersection(other).next().is_some();
+        same || safe || hears(a, b) || hears(b, a) || claim.meets(theirs)
+    }
+
+    /// Whether what a coordinator does and this, done by an operator, have to do with each other.
+    fn is_met(&self, number: usize, id: ConfigId) -> bool {
+        let own = claimed(&self.claims, &BTreeSet::from([id]));
+        own.meets(&self.asked[number].1) || hears_loss(self.charts, &[number], id)
+    }
+}
+
+/// What these claim together.
+fn claimed(claims: &Claims, ids: &BTreeSet<ConfigId>) -> Claim {
+    let request = |id: &ConfigId| Request::new(RequestId(0), Ask::Apply(*id), Requester::Operator);
+    claims.of(&ids.iter().map(request).collect::<Vec<_>>())
+}
+
 /// The coordinators in groups that have nothing to do with each other: they touch nothing in common, hear nothing of each
-/// other, and no safe configuration of one interrupts another. What holds of each group holds of all together.
+/// other, no safe configuration of one interrupts another, and nothing that an operator may apply touches what both touch. What
+/// holds of each group holds of all together.
 pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
     if charts.len() < 2 {
         return (0..charts.len()).map(|number| vec![number]).collect();
     }
-    let claims = Claims::new(deployment.configurations.iter());
-    let requests = |chart: &Chart| -> Vec<Request> {
-        let ids = asked(deployment, chart).into_iter();
-        ids.map(|id| Request::new(RequestId(0), Ask::Apply(id), requester(deployment.coordinators[0].name))).collect()
-    };
-    let all: Vec<_> = charts.iter().map(|chart| claims.of(&requests(chart))).collect();
-    let hears = |a: &Chart, b: &Chart| a.raises().iter().any(|site| b.event(site.name) != EventId::OTHER);
-    let is_safe = |id: &ConfigId| deployment.configuration(*id).is_some_and(|c| c.safe);
-    let safe: Vec<bool> = charts.iter().map(|chart| asked(deployment, chart).iter().any(is_safe)).collect();
-    let own: Vec<_> = charts.iter().map(|chart| asked(deployment, chart)).collect();
+    let meeting = Meeting::of(deployment, charts);
+    let met = |id| (0..charts.len()).filter(|number| meeting.is_met(*number, id)).collect::<Vec<_>>();
+    let between: Vec<Vec<usize>> = by_operator(deployment).into_iter().map(met).collect();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for number in 0..charts.len() {
-        let meets = |other: &usize| {
-            let (a, b) = (number, *other);
-            let same = own[a].intersection(&own[b]).next().is_some();
-            let heard = hears(charts[a], charts[b]) || hears(charts[b], charts[a]);
-            same || heard || safe[a] || safe[b] || all[a].meets(&all[b])
-        };
+        let operated = |other: usize| between.iter().any(|met| met.contains(&number) && met.contains(&other));
+        let meets = |other: &usize| meeting.meets(number, *other) || operated(*other);
         let (with, without): (Vec<_>, Vec<_>) = groups.into_iter().partition(|group| group.iter().any(meets));
         groups = without;
         let mut group: Vec<usize> = with.into_iter().flatten().chain([number]).collect();
@@ -137,4 +206,20 @@ pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
     }
     groups.sort_unstable();
     groups
+}
+
+/// What of an operator is followed with a group: what touches something that it touches, and what is safe, since that
+/// interrupts everybody. What touches nothing that anybody touches is followed with the first coordinator.
+pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Vec<ConfigId> {
+    let ids = by_operator(deployment);
+    if numbers.len() == charts.len() {
+        return ids.into_iter().collect();
+    }
+    let meeting = Meeting::of(deployment, charts);
+    let followed = |id: &ConfigId| {
+        let mut met = (0..charts.len()).filter(|number| meeting.is_met(*number, *id)).peekable();
+        let nobody = met.peek().is_none() && numbers.contains(&0);
+        nobody || met.any(|number| numbers.contains(&number)) || deployment.configuration(*id).is_some_and(|c| c.safe)
+    };
+    ids.into_iter().filter(followed).collect()
 }

@@ -455,7 +455,7 @@ fn severity_of(failed: Failed) -> Severity {
 }
 
 /// Components that a configuration makes.
-fn created(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
+pub(super) fn created(configuration: &Configuration) -> impl Iterator<Item = ComponentName> + '_ {
     configuration.changes.iter().filter_map(|change| match &change.kind {
         ChangeKind::Create { component, .. } => Some(*component),
         _ => None,

@@ -38,6 +38,7 @@ mod report;
 mod rounds;
 mod run;
 mod safety;
+mod settings;
 mod shape;
 mod shown;
 mod shows;

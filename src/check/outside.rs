@@ -1,5 +1,6 @@
 //! What comes from outside when nothing lies in the inboxes: events, time, confirmations, losses, operators.
 
+use super::judge::created;
 use super::members::Member;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
@@ -230,10 +231,15 @@ impl Product<'_> {
             Some(id) => vec![Ask::UndoOf(id)],
             None => self.operator.iter().map(|id| Ask::Apply(*id)).collect(),
         };
-        // Nobody has anything to do with what is not there.
-        if self.worlds.get(state.world).is_some_and(|world| world.system.is_empty()) && state.desk.is_empty() {
-            return;
-        }
+        // Nobody has anything to do with what is not there, but to make it.
+        let empty = self.worlds.get(state.world).is_some_and(|world| world.system.is_empty()) && state.desk.is_empty();
+        let makes = |ask: &Ask| match ask {
+            Ask::Apply(id) => {
+                self.worlds.configuration(*id).is_some_and(|configuration| created(configuration).next().is_some())
+            }
+            _ => false,
+        };
+        let asks: Vec<Ask> = asks.into_iter().filter(|ask| !empty || makes(ask)).collect();
         for ask in asks {
             let request = Request::new(RequestId(0), ask, Requester::Operator);
             let by_hand = matches!(ask, Ask::Apply(id) if self.is_safe(id));

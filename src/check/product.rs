@@ -10,6 +10,7 @@
 //! in that one's inbox, and so does what another one emits. Answers go first. The next event from outside comes when all
 //! inboxes are empty.
 
+use super::beside;
 use super::coordinator::outside_events;
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
@@ -79,11 +80,7 @@ impl<'a> Product<'a> {
         for number in numbers {
             outside.extend(outside_of(&views[*number], charts, *number));
         }
-        let mut operator: Vec<ConfigId> = Vec::new();
-        operator.extend(deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id));
-        operator.extend(deployment.operator_applies().filter(|id| deployment.configuration(*id).is_some()));
-        operator.sort_unstable();
-        operator.dedup();
+        let operator = beside::operated(deployment, charts, numbers);
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
         let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
         let minds_stopping = !operator.is_empty() || members.len() == 1;

@@ -8,8 +8,8 @@ use super::report::{Checked, Explored, Report};
 use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
-    beside, configurations as single, coordinator, declared, monitors as watched, purity, safety, simulated, types,
-    unheard, universe, ways,
+    beside, configurations as single, coordinator, declared, monitors as watched, purity, safety, settings, simulated,
+    types, unheard, universe, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -60,7 +60,8 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
             replayed = Some(Checked::new(shared.clone()));
-            explored = follow(deployment, &views, &charts, catalogue, &mut traced, &mut left);
+            let followed = settings::followed(deployment, &universe);
+            explored = follow(&followed, &views, &charts, catalogue, &mut traced, &mut left);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
                 traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))

@@ -10,7 +10,7 @@ use crate::statechart::{EventId, NodeId};
 impl Product<'_> {
     /// Where all coordinators are.
     pub fn places(&self, state: &State) -> Vec<Place> {
-        let several = self.members.len() > 1;
+        let several = self.deployment.coordinators.len() > 1;
         let place = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| Place {
             coordinator: several.then(|| member.name.to_string()),
             state: member.chart.fqn(*leaf).to_string(),
@@ -37,7 +37,7 @@ impl Product<'_> {
     /// What coordinators hear with a move, in order, as it is told.
     pub fn hears(&mut self, before: &State, next: &Next) -> Vec<Hears> {
         let heard = self.heard(before, next);
-        let several = self.members.len() > 1;
+        let several = self.deployment.coordinators.len() > 1;
         let told = |(number, event): (usize, EventId)| Hears {
             coordinator: several.then(|| self.members[number].name.to_string()),
             event: self.members[number].chart.event_text(event),

@@ -164,8 +164,11 @@ impl Lines {
             Does::Ask(ask) => {
                 self.wait_until(replay.at);
                 self.line(match ask {
-                    Ask::Apply(id) => format!("apply({})", quoted(id.as_str())),
-                    Ask::UndoOf(id) => format!("undo({})", quoted(id.as_str())),
+                    Ask::Apply(id) => match id.sets() {
+                        Some((member, value)) => format!("set({}, {value})", quoted(member)),
+                        None => format!("apply({})", quoted(id.as_str())),
+                    },
+                    Ask::UndoOf(_) => format!("undo({})", quoted(ask.subject())),
                     other => format!("-- {other}"),
                 });
             }

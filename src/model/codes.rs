@@ -541,7 +541,8 @@ codes! {
          would be taken away without the order that the coordinator knows. Let every way down undo or destroy what was \
          applied on the way up.";
     COORD_SHARED = "coord::shared", "two coordinators touch the same component",
-        "The configurations of one coordinator touch a component that those of another touch. At run time one of them may be \
+        "The configurations of one coordinator touch a component that those of another touch, or one that an operator may apply \
+         touches what both touch. At run time one of them may be \
          refused something because of the other's frames (nothing is broken by that: a conflict is refused and named). The \
          coordinators are followed together; what comes of it is told by findings of its own, and this is a note. Where they \
          were not followed to the end, it is a warning. Give each coordinator components of its own, or let one coordinator \

@@ -61,6 +61,11 @@ impl Configuration {
             origin: Origin::NONE,
         }
     }
+
+    /// What an operator sets: one change.
+    pub fn setting(id: ConfigId, kind: ChangeKind) -> Self {
+        Self { changes: vec![Change { kind, origin: Origin::NONE }], ..Self::new(id) }
+    }
 }
 
 /// What a failure of a step leads to.

@@ -76,8 +76,11 @@ impl Ask {
     /// How it is asked for on the command line.
     pub fn command(self) -> String {
         match self {
-            Self::Apply(id) => format!("apply {id}"),
-            Self::UndoOf(id) => format!("undo {id}"),
+            Self::Apply(id) => match id.sets() {
+                Some((member, value)) => format!("set {member} {value}"),
+                None => format!("apply {id}"),
+            },
+            Self::UndoOf(_) => format!("undo {}", self.subject()),
             Self::Undo | Self::UndoTo(_) | Self::Commit { .. } => self.to_string(),
         }
     }
@@ -90,7 +93,7 @@ impl Ask {
     /// What its status events begin with.
     pub fn subject(&self) -> &str {
         match self {
-            Self::Apply(id) | Self::UndoOf(id) => id.as_str(),
+            Self::Apply(id) | Self::UndoOf(id) => id.sets().map_or(id.as_str(), |(member, _)| member),
             Self::Undo | Self::UndoTo(_) => "undo",
             Self::Commit { .. } => "commit",
         }

@@ -7,6 +7,7 @@
 //! Grammar (design §2): a plain name is `[A-Za-z_][A-Za-z0-9_]*`; subsystems are separated by `/`, a member by `.`:
 //! `left/Dynamics.force_gain`.
 
+use super::value::Value;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use ustr::Ustr;
@@ -154,6 +155,16 @@ impl ConfigId {
     /// called so.
     pub fn setting(member: MemberRef) -> Self {
         Self(Ustr::from(&member.to_string()))
+    }
+
+    /// The same to this value: of what an operator may set `check` follows several, and each is answered like that one.
+    pub fn setting_to(member: MemberRef, value: &Value) -> Self {
+        Self(Ustr::from(&format!("{member}={value}")))
+    }
+
+    /// What it sets, and to what as Lua has it, if it sets one property or port to a value.
+    pub fn sets(&self) -> Option<(&'static str, &'static str)> {
+        self.as_str().split_once('=')
     }
 
     /// The subsystem's path before the last `/`, empty at the top.

@@ -5,8 +5,8 @@ use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Part, PortSignal};
 use crate::model::{
-    Ask, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef,
-    OperatorMay, Origin, RequestId, Value, ValueType,
+    Ask, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef, OperatorMay,
+    RequestId, Value, ValueType,
 };
 use crate::monitor::{Input, Sample};
 use crate::time::lock;
@@ -125,8 +125,7 @@ impl Session {
             }
         };
         let id = ConfigId::setting(member);
-        let change = Change { kind: change, origin: Origin::NONE };
-        let configuration = Configuration { changes: vec![change], ..Configuration::new(id) };
+        let configuration = Configuration::setting(id, change);
         let listed = self.deployment().operator.iter().any(|(may, _)| *may == OperatorMay::Set(member));
         // One at a time: what is asked for and has not begun must not become another value.
         let mut set = lock(self.settings());
@@ -141,7 +140,7 @@ impl Session {
     }
 
     /// The one of that name that an operator has set.
-    pub(super) fn setting(&self, name: &str) -> Option<ConfigId> {
+    pub fn setting(&self, name: &str) -> Option<ConfigId> {
         lock(self.settings()).iter().find(|id| id.as_str() == name).copied()
     }
 

@@ -196,3 +196,92 @@ fn which_of_two_frames_is_squashed_first_is_kept_apart() {
         assert!(refused.iter().any(|(severity, _)| *severity == "error"), "{request} {refused:?} {:#}", said.0);
     }
 }
+
+/// It brings a drive, and more with it in `high`; it goes back on its own and when it is shut down.
+fn goes_back(more: &str, keys: &str) -> Small {
+    let configurations = format!(
+        "base = Configuration {{ create('a', 'Drive') }}, high = Configuration {{ property_set('a.gain', 5.0) }},{more}"
+    );
+    let states =
+        "idle = state {}, building = state { entry = 'base' }, up = state {}, high = state { config = 'high' },
+        leaving = state { entry = 'base.undo' }, stays = state {},
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'building', events = { 'e_start' } },
+        trans { src = 'building', tgt = 'up', events = { 'base.ok' } },
+        trans { src = 'building', tgt = 'leaving', events = { 'base.failed', 'base.broken', 'e_shutdown' } },
+        trans { src = 'up', tgt = 'high', events = { 'e_high' } },
+        trans { src = 'high', tgt = 'up', events = { 'e_low' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_off', 'e_shutdown' } },
+        trans { src = 'high', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },
+        trans { src = 'leaving', tgt = 'stays', events = { 'base.undo.failed', 'base.undo.broken' } },
+        trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown', 'e_off' } },";
+    Small::new(&configurations, states, keys)
+}
+
+/// What stands in the way of a request that is refused because of an operator.
+fn barred<'s>(said: &'s Said, request: &str) -> Vec<&'s str> {
+    let found = said.of("coord::refused_by_other").into_iter();
+    let messages = found.map(|finding| finding["message"].as_str().unwrap());
+    messages.filter(|message| message.starts_with(&format!("`{request}` of"))).collect()
+}
+
+/// Runs a story from where `base` is there.
+#[track_caller]
+fn goes(small: &Small, story: &str) {
+    let story = format!("deploy('small.yaml', {{ replay = true }}) raise('e_start') wait_answer('base.ok', 1) {story}");
+    small.demo.write("story.lua", &story);
+    let ran = small.demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert!(!ran.err.contains("davit::script"), "{story}: {}{}", ran.out, ran.err);
+}
+
+/// What an operator may set is followed like what it may apply.
+#[test]
+fn what_an_operator_may_set_is_followed() {
+    let alone = goes_back("", "").check();
+    assert!(barred(&alone, "base.undo").is_empty(), "{:#}", alone.0);
+    for (member, value) in [("a.gain", "2.5"), ("a.in", "2.5"), ("a.mode", "7")] {
+        let small = goes_back("", &format!("operator: [{member}]\n"));
+        let said = small.check();
+        assert!(!barred(&said, "base.undo").is_empty(), "{member}: {:#}", said.0);
+        goes(
+            &small,
+            &format!(
+                "set('{member}', {value}) wait_answer('{member}.ok', 1) raise('e_off') wait_answer('base.undo.failed', 1)"
+            ),
+        );
+    }
+}
+
+/// What it is set to makes no difference to anybody else: one value is followed, and any other bars the same.
+#[test]
+fn any_value_that_is_set_bars_the_same() {
+    let small = goes_back("", "operator: [a.gain]\n");
+    let said = small.check();
+    assert!(barred(&said, "high.undo").is_empty() && !barred(&said, "base.undo").is_empty(), "{:#}", said.0);
+    for value in ["5.0", "4.0", "1.0"] {
+        let set = format!("set('a.gain', {value}) wait_answer('a.gain.ok', 1)");
+        let low = "raise('e_low') wait_answer('high.undone', 1) raise('e_off') wait_answer('base.undo.failed', 1)";
+        goes(
+            &small,
+            &format!(
+                "raise('e_high') wait_answer('high.ok', 1) {set} {low} undo('a.gain') wait_answer('a.gain.undone', 1)"
+            ),
+        );
+        goes(&small, &format!("{set} raise('e_high') wait_answer('high.ok', 1) {low}"));
+    }
+}
+
+/// An operator may make what somebody else would make, also where nothing is there.
+#[test]
+fn what_an_operator_makes_first_is_followed() {
+    let small = goes_back("mine = Configuration { create('a', 'Drive') },", "operator: [mine]\n");
+    let said = small.check();
+    assert!(!barred(&said, "base").is_empty(), "{:#}", said.0);
+    small.demo.write(
+        "story.lua",
+        "deploy('small.yaml', { replay = true }) apply('mine') wait_answer('mine.ok', 1) raise('e_start') wait_answer('base.failed', 1)",
+    );
+    let ran = small.demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
+}

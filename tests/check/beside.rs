@@ -1,6 +1,6 @@
 //! Several coordinators: who is blamed, and what is said of them together.
 
-use crate::support::Small;
+use crate::support::{Said, Small};
 
 fn holder(name: &str, also: &str) -> String {
     format!(
@@ -91,4 +91,78 @@ fn all_coordinators_are_driven_together() {
             assert!(asked.contains(request), "{way}: {request}: {json:#}");
         }
     }
+}
+
+/// Two coordinators with a component each, which share nothing but what an operator may apply.
+fn two_apart(both: &str, keys: &str) -> Small {
+    let own = |name: &str, component: &str| format!("{name} = Configuration {{ create('{component}', 'Drive') }},");
+    // Back to where it was without being shut down: what an operator has put in the way is not taken along.
+    let coordinator = |name: &str| {
+        format!(
+            "idle = state {{}}, up = state {{ config = '{name}' }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'up', events = {{ 'e_start' }} }},
+             trans {{ src = 'up', tgt = 'idle', events = {{ 'e_shutdown', 'e_{name}_off' }} }},"
+        )
+    };
+    Small::several(
+        &format!("{}{}{both}", own("left", "a"), own("right", "b")),
+        &[("left", &coordinator("left")), ("right", &coordinator("right"))],
+        keys,
+    )
+}
+
+/// What `check` says, the ways to what it finds not gone: of two coordinators these are many.
+fn said(small: &Small) -> Said {
+    Said(small.demo.run(&["check", "small.yaml", "--json"]).json())
+}
+
+/// Whether a request is refused because of an operator.
+fn is_refused(said: &Said, request: &str) -> bool {
+    let found = said.of("coord::refused_by_other");
+    let mut messages = found.iter().map(|finding| finding["message"].as_str().unwrap());
+    messages.any(|m| m.starts_with(&format!("`{request}` of ")) && m.contains("because of the frames of an operator"))
+}
+
+/// What an operator may apply touches what both touch: they are followed together with it, and what it bars is found, as it is
+/// where it runs.
+#[test]
+fn what_an_operator_applies_to_both_is_followed_with_both() {
+    for changes in [
+        "property_set('a.gain', 2.0), property_set('b.gain', 2.0)",
+        "connect('a.out', 'b.in')",
+        "safe = true, post_conf_state = { 'a:stopped', 'b:stopped' }",
+    ] {
+        let small = two_apart(&format!("both = Configuration {{ {changes} }},"), "operator: [both]\n");
+        let said = said(&small);
+        assert!(is_refused(&said, "left.undo") && is_refused(&said, "right.undo"), "{changes}: {:#}", said.0);
+        let shared = said.of("coord::shared");
+        assert_eq!(shared.len(), 1, "{changes}: {:#}", said.0);
+        let message = shared[0]["message"].as_str().unwrap();
+        let why = "`both`, which an operator may apply, touches `a` like the coordinator `left`, and `b` like `right`:";
+        assert!(message.starts_with(why), "{message}");
+        // And so it goes.
+        let story = "deploy('small.yaml', { replay = true }) raise('e_start') wait_answer('left.ok', 1) wait_answer('right.ok', 1)
+            apply('both') wait_answer('both.ok', 1) raise('e_left_off') wait_answer('left.undo.failed', 1)
+            raise('e_right_off') wait_answer('right.undo.failed', 1)";
+        small.demo.write("story.lua", story);
+        let ran = small.demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert!(!ran.err.contains("davit::script"), "{changes}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// What an operator applies to one of them is followed with that one, and what touches nobody with nobody else.
+#[test]
+fn what_an_operator_applies_to_one_joins_nobody() {
+    let soft = "soft = Configuration { property_set('a.gain', 2.0) }, own = Configuration { create('c', 'Drive') },";
+    let small = two_apart(soft, "operator: [soft, own]\n");
+    // Each of the ways is gone: a script of one of several names the coordinator whose state it waits for.
+    let found = small.check();
+    assert!(found.of("coord::shared").is_empty(), "{:#}", found.0);
+    assert!(is_refused(&found, "left.undo") && !is_refused(&found, "right.undo"), "{:#}", found.0);
+    // Safe ones stop everybody, whatever they touch: nothing that moves is done for `right` while one is in force.
+    let stop = "stop = Configuration { safe = true, post_conf_state = { 'a:stopped' } },";
+    let found = said(&two_apart(stop, ""));
+    assert!(found.of("coord::shared").is_empty(), "{:#}", found.0);
+    assert!(is_refused(&found, "left.undo") && !is_refused(&found, "right.undo"), "{:#}", found.0);
 }
