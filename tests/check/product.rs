@@ -210,12 +210,15 @@ fn a_value_that_decides_whether_a_step_is_needed_tells_worlds_apart() {
 /// What nobody undoes by its name counts where it keeps something else from being undone.
 #[test]
 fn a_frame_in_the_way_tells_worlds_apart() {
-    let configurations = "made = Configuration { create(\"d\", \"Drive\") },
-        same = Configuration { property_set(\"d.gain\", 1.0) },";
-    for ways in [["\"made\"", "\"made\", \"same\""], ["\"made\", \"same\"", "\"made\""]] {
+    let configurations = "made = Configuration { create(\"d\", \"Drive\"), post_conf_state = { \"d:running\" } },
+        call = Configuration { operation_call(\"d.lower\") },";
+    let (alone, under) = ("\"made\"", "\"made\", \"call\"");
+    let in_the_way = |ways: [&str; 2]| {
         let said = two_ways(configurations, ways, "\"made.undo\"");
-        assert!(said.refused("made.undo").iter().any(|(severity, _)| *severity == "error"), "{ways:?}: {:#}", said.0);
-    }
+        said.refused("made.undo").iter().filter(|(_, message)| message.contains("`call`")).count()
+    };
+    assert_eq!(in_the_way([alone, alone]), 0);
+    assert!(in_the_way([alone, under]) > 0);
 }
 
 /// What nobody undoes by its name counts where it takes over a value: undone below it, that value stays.
