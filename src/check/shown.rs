@@ -24,6 +24,7 @@ pub const FOLLOWED: &[Code] = &[
     // Why a request is refused, or can only fail.
     CONF_HOLDS_NEVER,
     STACK_GROUP,
+    STACK_SQUASHED,
     CLASH,
     PRE_ON_CREATED,
     POST_ON_DESTROYED,

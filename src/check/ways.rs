@@ -7,7 +7,7 @@ use super::product::Product;
 use super::state::{Next, State};
 use super::trace::TraceStep;
 use super::tried::Way;
-use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
+use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
 use crate::model::{Code, Coordinator, Finding, Severity};
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;
@@ -18,8 +18,14 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     let ways = drive::ways(product);
     product.operator = operator;
     let Some((rise, fall)) = ways else { return Traced::new() };
-    // The reasons of a refusal are findings of their own, each at its place.
-    let reasons = |way: &Way| way.refused.iter().flat_map(|(_, reasons)| reasons.clone()).collect::<Vec<_>>();
+    // The reasons of a refusal are findings of their own, each at its place; the stack is bounded where its limit stands.
+    let deployment = product.deployment;
+    let placed = |reason: Finding| match reason.code == STACK_SQUASHED {
+        true if !reason.origin.is_some() => reason.at(deployment.key_origin("limits.stack")).path("limits.stack"),
+        _ => reason,
+    };
+    let reasons =
+        |way: &Way| way.refused.iter().flat_map(|(_, reasons)| reasons.clone()).map(placed).collect::<Vec<_>>();
     let mut up = reasons(&rise);
     if !rise.reached {
         up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"));

@@ -239,7 +239,29 @@ fn no_advice_is_what_is_done_already() {
     let stuck = said.of("coord::stuck");
     assert!(stuck.iter().any(|found| found["message"] == "nothing leads on from `root.up`"), "{:#}", said.0);
     let no_help = |found: &&serde_json::Value| found["help"].as_str().unwrap().contains("add a transition from it");
-    assert!(!stuck.iter().any(|found| no_help(&found)), "{:#}", said.0);
+    assert!(!stuck.iter().any(no_help), "{:#}", said.0);
+}
+
+/// A frame that the bound of the stack has squashed is told where that bound is written.
+#[test]
+fn what_is_squashed_is_told_where_the_bound_stands() {
+    let configurations =
+        "base = Configuration { create(\"a\", \"Drive\") }, one = Configuration { property_set(\"a.gain\", 2.0) },
+        two = Configuration { property_set(\"a.gain\", 3.0) },";
+    let states = "idle = state {}, building = state { entry = \"base\" }, first = state { entry = \"one\" },
+        second = state { entry = \"two\" }, up = state {}, leaving = state { entry = \"base.undo\" },
+        trans { src = \"initial\", tgt = \"idle\" },
+        trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
+        trans { src = \"building\", tgt = \"first\", events = { \"base.ok\" } },
+        trans { src = \"first\", tgt = \"second\", events = { \"one.ok\" } },
+        trans { src = \"second\", tgt = \"up\", events = { \"two.ok\" } },
+        trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },
+        trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },";
+    let said = Small::new(configurations, states, "limits: { stack: 2 }\n").check();
+    let squashed = said.of("stack::squashed");
+    assert_eq!(squashed.len(), 1, "{:#}", said.0);
+    let file = squashed[0]["file"].as_str().expect("a place");
+    assert!(file.ends_with("small.yaml") && squashed[0]["line"].is_u64(), "{:#}", squashed[0]);
 }
 
 /// What a configuration stands for is known beforehand where it rests on run states: applied where that is false, it can only

@@ -368,6 +368,26 @@ fn coordinators() -> Vec<Row> {
             &["base.undone"],
         ),
         row(
+            "stack::squashed",
+            "squashed together with others",
+            Small::new(
+                "base = Configuration { create('a', 'Drive') }, one = Configuration { property_set('a.gain', 2.0) },
+                 two = Configuration { property_set('a.gain', 3.0) },",
+                "idle = state {}, building = state { entry = 'base' }, first = state { entry = 'one' },
+                 second = state { entry = 'two' }, up = state {}, leaving = state { entry = 'base.undo' },
+                 trans { src = 'initial', tgt = 'idle' },
+                 trans { src = 'idle', tgt = 'building', events = { 'e_start' } },
+                 trans { src = 'building', tgt = 'first', events = { 'base.ok' } },
+                 trans { src = 'first', tgt = 'second', events = { 'one.ok' } },
+                 trans { src = 'second', tgt = 'up', events = { 'two.ok' } },
+                 trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+                 trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },",
+                "limits: { stack: 2 }\n",
+            ),
+            "wait(2) wait_state('leaving', 0)",
+            &["base.undo.failed"],
+        ),
+        row(
             "deploy::leftovers",
             "the shutdown leaves a behind",
             Small::new(
