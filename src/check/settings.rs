@@ -89,7 +89,7 @@ fn some(ty: &ValueType, bounds: (Option<f64>, Option<f64>), n: usize) -> Option<
     #[allow(clippy::cast_precision_loss)]
     let count = n as f64;
     Some(match ty {
-        ValueType::Bool => Value::Bool(n % 2 == 0),
+        ValueType::Bool => Value::Bool(n.is_multiple_of(2)),
         #[allow(clippy::cast_possible_truncation)]
         ValueType::Int => Value::Int(match bounds {
             (None, Some(max)) => (max - count).floor() as i64,

@@ -160,6 +160,14 @@ fn what_an_operator_applies_to_one_joins_nobody() {
     let found = small.check();
     assert!(found.of("coord::shared").is_empty(), "{:#}", found.0);
     assert!(is_refused(&found, "left.undo") && !is_refused(&found, "right.undo"), "{:#}", found.0);
+    // What each of them is followed with is its own alone.
+    let soft =
+        "one = Configuration { property_set('a.gain', 2.0) }, other = Configuration { property_set('b.gain', 2.0) },";
+    let states = |operator: &str| {
+        let found = said(&two_apart(soft, &format!("operator: [{operator}]\n")));
+        found.0["explored"]["states"].as_u64().unwrap()
+    };
+    assert_eq!(states("one, other") - states("other"), states("one") - states(""));
     // Safe ones stop everybody, whatever they touch: nothing that moves is done for `right` while one is in force.
     let stop = "stop = Configuration { safe = true, post_conf_state = { 'a:stopped' } },";
     let found = said(&two_apart(stop, ""));
