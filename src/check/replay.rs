@@ -23,6 +23,9 @@ use std::time::Duration;
 /// For moves of a way: what is raised with them, for which coordinators alone, and whether that is later than what comes before.
 pub(super) type Split = FxHashMap<usize, (EventName, Vec<String>, bool)>;
 
+/// A step by its text, what goes wrong with it, and how long it takes.
+type Armed = (String, FaultKind, Duration);
+
 /// A batch that begins on a way.
 pub(super) struct Begun {
     /// At which move.
@@ -36,16 +39,6 @@ pub(super) struct Begun {
 
 /// Why no script makes what was interrupted or given up wait.
 const GOES_BACK: &str = "what was interrupted or given up goes back at once";
-
-/// Whether a batch is the rest of one of which something was given up that had begun.
-fn gone_back_before(way: &[(&State, &Next)], begun: &[Begun], batch: &Begun) -> bool {
-    let cancelled = way[batch.at].1.answers.iter().filter(|(_, verdict)| *verdict == Verdict::Cancelled);
-    let began = |request: &Request| {
-        let before = begun.iter().filter(|before| before.over == Some(batch.at) && !before.idle);
-        before.flat_map(|before| &before.requests).any(|of| of == request)
-    };
-    cancelled.into_iter().any(|(request, _)| began(request))
-}
 
 impl Product<'_> {
     /// What each move of a way needs. `way` has the state before each move.
@@ -142,7 +135,7 @@ impl Product<'_> {
             let takes = until.saturating_sub(times[batch.at]).saturating_sub(stands);
             match self.arms(state, &batch.requests, answers, takes) {
                 // They would meet the steps of what goes back just then.
-                Ok(arms) if !arms.is_empty() && gone_back_before(way, &begun, batch) => {
+                Ok(arms) if self.meets_what_goes_back(way, &begun, batch, &arms) => {
                     all[batch.at].does = Does::Cannot(GOES_BACK);
                 }
                 Ok(mut arms) => {
@@ -167,6 +160,20 @@ impl Product<'_> {
         let Some(alone) = (batch.at + 1..over).find(|k| way[*k].1.state.safe.len() == 1) else { return false };
         let group = self.worlds.group(way[alone].1.state.world, &batch.requests, &Beside::default());
         times[over] > times[alone] && group.is_some_and(|g| g.planned.is_none_or(|planned| planned.steps.is_empty()))
+    }
+
+    /// Whether what is armed for the rest of a batch would meet a step with which what was given up of it goes back just then.
+    fn meets_what_goes_back(&self, way: &[(&State, &Next)], begun: &[Begun], batch: &Begun, arms: &[Armed]) -> bool {
+        let given_up = way[batch.at].1.answers.iter().filter(|(_, verdict)| *verdict == Verdict::Cancelled);
+        let of = |request: &Request| {
+            begun.iter().find(|of| of.over == Some(batch.at) && !of.idle && of.requests.contains(request))
+        };
+        given_up.filter_map(|(request, _)| of(request)).any(|before| {
+            let state = &way[before.at].1.state;
+            let steps = self.worlds.steps(state.world, &before.requests, &goes(state, &before.requests));
+            let back: Vec<String> = steps.iter().flat_map(|planned| planned.undo.steps()).map(pattern).collect();
+            arms.iter().any(|(step, ..)| back.contains(step))
+        })
     }
 
     /// Whether it makes no difference that a request which is given up, and has nothing to do, is through before that: nobody
@@ -260,7 +267,7 @@ impl Product<'_> {
         requests: &[Request],
         answers: &[(Request, Verdict)],
         takes: Duration,
-    ) -> Result<Vec<(String, FaultKind, Duration)>, &'static str> {
+    ) -> Result<Vec<Armed>, &'static str> {
         let mut arms = Vec::new();
         let Some(group) = self.worlds.group(state.world, requests, &goes(state, requests)) else { return Ok(arms) };
         let Some(planned) = &group.planned else { return Ok(arms) };

@@ -12,6 +12,15 @@ use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
 
 impl Transaction {
+    /// Safe configurations are over that came in between, and have touched this.
+    pub(super) fn release(&mut self, touched: Touched) {
+        self.held = false;
+        if self.back.is_some() {
+            self.touched_since.get_or_insert_default().join(touched.clone());
+        }
+        self.touched.join(touched);
+    }
+
     /// Tells of each step of a best effort that was done when that was.
     pub fn note_done(&self, touched: &mut Touched) {
         let forward = self.forward.as_ref().expect("something was carried out");

@@ -298,13 +298,7 @@ impl Transaction {
                     self.phase = Phase::Stopping;
                 }
             }
-            Input::Release(touched) => {
-                self.held = false;
-                if self.back.is_some() {
-                    self.touched_since.get_or_insert_default().join(touched.clone());
-                }
-                self.touched.join(touched);
-            }
+            Input::Release(touched) => self.release(touched),
             Input::Stop => {
                 if matches!(self.phase, Phase::Forward | Phase::Standing) {
                     self.stopped_by.get_or_insert(Reason::TakenDown);
