@@ -16,8 +16,10 @@ fn is_for_room(why: &Findings) -> bool {
 
 impl Product<'_> {
     /// A coordinator hears an event, and comes to rest again.
-    pub(super) fn react(&mut self, state: State, by: usize, event: EventId) -> Vec<State> {
+    pub(super) fn react(&mut self, mut state: State, by: usize, event: EventId) -> Vec<State> {
         let reaction = self.members[by].react(state.leaves[by], event);
+        let (chart, deployment) = (self.members[by].chart, self.deployment);
+        state.leaving &= !(reaction.taken && event == chart.event(deployment.deploy.event) && event != EventId::OTHER);
         self.follow(state, by, &reaction)
     }
 
@@ -305,7 +307,7 @@ impl Product<'_> {
             if let Some(number) = self.member(first.requester) {
                 state.down |= 1 << number.min(63);
             }
-            state.leaving &= !self.all_down(state) || self.others;
+            state.leaving &= !self.all_down(state) || self.others || state.desk.asks_on();
             if self.all_down(state)
                 && !self.others
                 && let Some(world) = self.worlds.settle_down(state.world)

@@ -62,7 +62,7 @@ impl Product<'_> {
     pub(super) fn closed_at(&self, state: &State) -> Vec<EventName> {
         let leads = |(at, _): &(usize, &EventName)| {
             let by = Move::Event(u16::try_from(*at).unwrap_or(u16::MAX));
-            self.raises_while_stopping(by) == Raises::Nobody
+            !self.is_first_or_last(by) && self.raises_while_stopping(by) == Raises::Nobody
         };
         let heard = |(_, name): &(usize, &EventName)| {
             self.members.iter().zip(&state.leaves).any(|(member, leaf)| {

@@ -100,7 +100,6 @@ impl Product<'_> {
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
         next.leaving |= name == self.deployment.shutdown.event && self.minds_operators();
-        next.leaving &= name != self.deployment.deploy.event;
         self.confirm(&mut next, name);
         self.spread(&mut next, name, None);
         // If one alone hears it, there is nothing to wait for.

@@ -99,7 +99,8 @@ impl Engine {
             }
             if group.down {
                 self.down.insert(requests[0].requester);
-                if self.all_down() {
+                // Who asks on is led anew since, and may be led down anew.
+                if self.all_down() && !self.desk.asks_on() {
                     self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
                     self.counts.told.store(false, std::sync::atomic::Ordering::Release);
                     self.leaving = false;

@@ -35,6 +35,11 @@ pub trait Listener {
         let _ = (chart, active);
     }
 
+    /// An event is delivered; what it leads to is told next.
+    fn delivers(&mut self, event: EventName) {
+        let _ = event;
+    }
+
     /// The event with this ticket was taken up, and what became of it.
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         let _ = (ticket, delivered);
@@ -194,6 +199,7 @@ impl<F: Hook> Core<F> {
             listener.stale(self.machine.chart(&self.chart), event, tag);
             return Delivered::Stale;
         }
+        listener.delivers(event);
         let id = self.functions.event(&self.chart, event);
         let at_once = if F::TURNS {
             AtOnce::No

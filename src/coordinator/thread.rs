@@ -425,6 +425,10 @@ impl<L: Listener> Listener for Told<'_, L> {
         self.tell(|listener| listener.unmatched(event));
     }
 
+    fn delivers(&mut self, event: EventName) {
+        self.tell(|listener| listener.delivers(event));
+    }
+
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         self.tell(|listener| listener.taken_up(ticket, delivered));
     }

@@ -235,12 +235,11 @@ impl Default for DeploymentLimits {
 
 impl Deployment {
     /// Whether an event from outside is heard also while the deployment is being stopped: those of safety, and the one that
-    /// shuts down. Where nobody has said which are those of safety, it may be any. Events of components and monitors always
-    /// are: nobody asks them to be silent.
+    /// shuts down. Where nobody has said which are those of safety, it may be any but the one that begins the deployment. Events
+    /// of components and monitors always are: nobody asks them to be silent.
     pub fn stays_open(&self, event: &str) -> bool {
-        self.safety.is_empty()
-            || self.shutdown.event.as_str() == event
-            || self.safety.iter().any(|(safety, _)| safety.as_str() == event)
+        let safety = || self.safety.is_empty() || self.safety.iter().any(|(safety, _)| safety.as_str() == event);
+        self.shutdown.event.as_str() == event || self.deploy.event.as_str() != event && safety()
     }
 
     /// Whether an event is spelt like an answer of the configurator: it ends like one, or is about a configuration or `undo`.

@@ -52,6 +52,7 @@ impl Part {
                 down: chart.find(&own.down).ok(),
                 is_down: false,
                 untold: false,
+                begins: false,
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
             let sees_all = functions.is_some();

@@ -4,7 +4,7 @@ use super::Session;
 use super::log::Happening;
 use super::names::NotFromOutside;
 use super::parts::Part;
-use super::routes::{Acted, make_safe};
+use super::routes::{Acted, NO_MORE, make_safe};
 use crate::coordinator::{Class, Refused};
 use crate::model::{EventName, Ident};
 
@@ -23,6 +23,9 @@ pub enum NotRaised {
     /// Nobody outside may raise it.
     #[error(transparent)]
     NotFromOutside(#[from] NotFromOutside),
+    /// It begins the deployment, which is being stopped.
+    #[error("{NO_MORE}")]
+    Stopping,
     /// [`Refused::Full`]: a coordinator that may hear it does not keep up.
     #[error(transparent)]
     Refused(#[from] Refused),
@@ -71,6 +74,9 @@ impl Session {
         to: impl Fn(Ident) -> bool,
     ) -> Result<Option<Acted>, NotRaised> {
         self.may_raise(event.as_str())?;
+        if self.hub().is_stopping() && self.junction().begins(event) {
+            return Err(NotRaised::Stopping);
+        }
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts().len()), false);

@@ -15,6 +15,9 @@ use rustc_hash::FxHashSet;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
+/// Why the event that begins the deployment is heard by nobody then.
+pub(super) const NO_MORE: &str = "the deployment is being stopped, and does not come up again";
+
 /// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
 /// neither keeps the other alive.
 #[derive(Default)]
@@ -38,17 +41,25 @@ impl Junction {
         Self { urgent, ends, ..Self::default() }
     }
 
-    /// An event came from outside: from the one that ends the deployment on it is led down, until it is down or brought up.
+    /// Whether an event is the one that begins the deployment.
+    pub fn begins(&self, event: EventName) -> bool {
+        self.ends.is_some_and(|(begins, _)| event == begins)
+    }
+
+    /// An event came: from the one that ends the deployment on it is led down, until it is down, or a coordinator takes a
+    /// transition on the one that begins it ([`Listener::moved`]).
     pub fn tell_leaving(&self, configurator: &ConfiguratorHandle, event: EventName) {
-        let Some((begins, ends)) = self.ends else { return };
-        if event == ends || event == begins {
-            configurator.leaving(event != begins);
+        if self.ends.is_some_and(|(_, ends)| event == ends) {
+            configurator.leaving(true);
         }
     }
 
     /// An event of a class, unless it is one that goes before all others.
     pub fn incoming(&self, class: Class, event: EventName) -> Incoming {
-        Incoming::new(if self.urgent.contains(&event) { Class::Urgent } else { class }, event)
+        let incoming = Incoming::new(if self.urgent.contains(&event) { Class::Urgent } else { class }, event);
+        // Which of both came last says where it is to go.
+        let last = self.ends.is_some_and(|(begins, ends)| event == begins || event == ends);
+        Incoming { last, ..incoming }
     }
 
     /// The coordinator that asks under that name.
@@ -74,6 +85,8 @@ pub(super) struct ToConfigurator {
     /// Whether it is in that, and whether that has not been told yet.
     pub is_down: bool,
     pub untold: bool,
+    /// The event that begins the deployment was delivered, and nothing has moved since.
+    pub begins: bool,
 }
 
 impl Listener for ToConfigurator {
@@ -118,8 +131,22 @@ impl Listener for ToConfigurator {
         self.tell_down();
     }
 
+    fn delivers(&mut self, event: EventName) {
+        let Some(junction) = self.junction.upgrade() else { return };
+        self.begins = junction.begins(event);
+        if let Some(configurator) = self.configurator() {
+            // It may wait behind the one that begins it.
+            junction.tell_leaving(&configurator, event);
+        }
+    }
+
     fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
         self.tell_down();
+        if std::mem::take(&mut self.begins)
+            && let Some(configurator) = self.configurator()
+        {
+            configurator.leaving(false);
+        }
         let is_down = self.down.is_some_and(|down| active.contains(&down));
         self.untold = is_down && !self.is_down;
         self.is_down = is_down;
@@ -198,6 +225,9 @@ impl ToConfigurator {
     /// coordinators that answer each other for ever delay neither an operator nor an answer.
     fn tell_others(&self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
+        if self.hub.is_stopping() && junction.begins(event) {
+            return;
+        }
         let others: Vec<Coordinator> = lock(&junction.coordinators)
             .iter()
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
@@ -294,6 +324,10 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
             return;
         }
     };
+    if hub.is_stopping() && junction.begins(event) {
+        hub.note(Happening::Forced { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
+        return;
+    }
     hub.report(Happening::Event { event: event.to_string(), from });
     hub.halt().report(event);
     if let Some(configurator) = &configurator {

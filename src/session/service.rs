@@ -271,6 +271,9 @@ fn not_from_outside(why: NotFromOutside) -> RpcError {
 fn not_raised(why: NotRaised) -> RpcError {
     match why {
         NotRaised::NotFromOutside(why) => not_from_outside(why),
+        NotRaised::Stopping => {
+            RpcError { code: GOING_DOWN, ..refused(why.to_string(), "deploy it again when it is down".to_owned()) }
+        }
         NotRaised::Refused(why) => {
             refused(why.to_string(), "events come faster than it reacts: wait, and send it again".to_owned())
         }

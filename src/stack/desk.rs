@@ -100,6 +100,12 @@ impl Desk {
         self.waiting.iter().map(|batch| batch.requests.len()).sum()
     }
 
+    /// Whether a coordinator has asked for something since it told that it is down, if it has: what waits came after that.
+    pub fn asks_on(&self) -> bool {
+        let asks = |r: &Request| r.why == Why::Asked && matches!(r.requester, Requester::Coordinator(_));
+        self.waiting.iter().flat_map(|batch| &batch.requests).any(asks)
+    }
+
     /// Whether nothing waits and nothing is under way.
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty() && self.under_way.is_empty()

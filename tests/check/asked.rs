@@ -295,3 +295,26 @@ fn what_an_operator_makes_first_is_followed() {
     let ran = small.demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
     assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
 }
+
+/// What tells that it is down may wait behind what was asked for before: where it has been led up and down again since, that
+/// tells of the life before, and what an operator applied goes with what is undone.
+#[test]
+fn that_it_was_down_before_does_not_count_where_it_is_led_down_again() {
+    let configurations = "base = Configuration { create('a', 'Drive'), create('b', 'Drive') },
+        one = Configuration { property_set('a.mode', 2) },
+        mine = Configuration { group = 'g', property_set('b.gain', 5.0) },";
+    let states = "idle = state {}, building = state { entry = 'base' }, up = state {}, bad = state {},
+        leaving = state { entry = { 'one.undo', 'base.undo' } }, stays = state {},
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'building', events = { 'e_start' } },
+        trans { src = 'building', tgt = 'up', events = { 'base.ok' } },
+        trans { src = 'building', tgt = 'bad', events = { 'base.failed', 'base.broken' } },
+        trans { src = 'building', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'bad', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },
+        trans { src = 'leaving', tgt = 'stays', events = { 'base.undo.failed', 'base.undo.broken' } },";
+    let said = Small::new(configurations, states, "operator: [mine]\n").check();
+    assert!(said.of("coord::refused_by_other").is_empty(), "{:#}", said.0);
+}

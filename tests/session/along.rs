@@ -3,7 +3,7 @@
 use crate::stopping::{Small, event, force};
 use davit::model::{Ask, ConfigId};
 use davit::platform::simulated::{Fault, FaultRule, Faults};
-use davit::session::Stage;
+use davit::session::{NotRaised, Stage};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -46,6 +46,28 @@ fn who_raises_the_event_that_ends_it_takes_along_too_and_once_it_is_up_again_not
     assert_eq!(Small::in_force(&small.session), ["base", "lift", "soft"]);
     let (ended, _) = small.stop();
     assert!(ended.is_orderly(), "{ended:?}");
+}
+
+/// Who wants it up again while it is being led down, and is heard by nobody, changes nothing; while it is being stopped that is
+/// refused from the first moment on.
+#[test]
+fn an_event_that_begins_it_and_that_nobody_hears_changes_nothing() {
+    let small = Small::up("lowering").with(&["soft"]);
+    small.session.raise(event("e_stop"), "operator");
+    small.clock.sleep(Duration::from_millis(500));
+    small.session.raise(event("e_start"), "operator");
+    small.clock.sleep(Duration::from_secs(4));
+    assert!(small.heard("base.undone"), "{}", small.why("base.undo.failed"));
+    let small = Small::up("lowering").with(&["soft"]);
+    let refused = Arc::new(Mutex::new(None));
+    let told = refused.clone();
+    small.after(0.5, move |session| {
+        *told.lock().unwrap() = Some(session.offer(event("e_start"), "operator"));
+    });
+    let (ended, _) = small.stop();
+    assert!(ended.is_orderly() && ended.forced.is_empty(), "{ended:?} {}", small.why("base.undo.failed"));
+    let refused = refused.lock().unwrap().take();
+    assert!(matches!(refused, Some(Err(NotRaised::Stopping))), "{refused:?}");
 }
 
 /// Both or none: when the undo fails, what was undone with it is in force as before.

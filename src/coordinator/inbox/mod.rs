@@ -1,7 +1,8 @@
 //! Where events wait for the coordinator: in classes with room of their own (design §7), so that no flood of one kind
 //! displaces another, and each waits for a bounded number of turns.
 //!
-//! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most; then the words of
+//! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most, of the latter two in the
+//!    order in which they came last; then the words of
 //!    the configurator, in its order: answers, whose room was taken when they were asked for, and what it says unasked
 //!    (`ID.lost`, `ID.reverted`, answers for which there was no room), one of each at most.
 //! 2. Reports: events of components, monitors and other coordinators. When their room is full there is still room for one of
@@ -50,12 +51,14 @@ pub struct Incoming {
     pub class: Class,
     /// Whose number is told with what became of it; 0: nobody wants to know.
     pub ticket: u64,
+    /// Of an urgent one that waits already: it waits where it came last, behind what came between.
+    pub last: bool,
 }
 
 impl Incoming {
     /// An event of a class, for nobody in particular.
     pub fn new(class: Class, event: EventName) -> Self {
-        Self { event, tag: None, class, ticket: 0 }
+        Self { event, tag: None, class, ticket: 0, last: false }
     }
 
     /// The same, for whoever asked.
@@ -250,6 +253,14 @@ impl Inbox {
             let at = self.lists.push(List::Urgent, incoming);
             self.singles.insert(single, at);
             return Ok(Put::Waits);
+        };
+        let at = if incoming.last {
+            let waits = self.lists.remove(at);
+            let at = self.lists.push(List::Urgent, waits);
+            self.singles.insert(single, at);
+            at
+        } else {
+            at
         };
         let waits = self.lists.at_mut(at);
         match incoming.ticket {

@@ -320,3 +320,15 @@ fn while_much_is_asked_for_what_comes_from_outside_waits() {
     inbox.release(Class::Answer);
     assert_eq!([out(&mut inbox), out(&mut inbox)], [Some(Class::Outside), None]);
 }
+
+/// Of what begins and what ends the deployment the order of the last ones counts; a safety event keeps its place.
+#[test]
+fn what_begins_and_what_ends_come_in_the_order_in_which_they_came_last() {
+    let mut inbox = Inbox::new([]);
+    let urgent = |at: usize, last: bool| Incoming { last, ..Incoming::new(Class::Urgent, name(at)) };
+    for (at, last) in [(0, true), (2, false), (1, true), (0, true), (2, false)] {
+        inbox.push(urgent(at, last)).unwrap();
+    }
+    let order: Vec<_> = std::iter::from_fn(|| inbox.pop(&mut Vec::new())).map(|incoming| incoming.event).collect();
+    assert_eq!(order, [name(2), name(1), name(0)]);
+}
