@@ -155,6 +155,10 @@ impl Listener for ToConfigurator {
         });
     }
 
+    fn unmatched(&mut self, _: EventName) {
+        self.begins = false;
+    }
+
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         self.hub.taken_up(ticket, delivered == Delivered::Taken);
     }

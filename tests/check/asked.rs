@@ -318,3 +318,27 @@ fn that_it_was_down_before_does_not_count_where_it_is_led_down_again() {
     let said = Small::new(configurations, states, "operator: [mine]\n").check();
     assert!(said.of("coord::refused_by_other").is_empty(), "{:#}", said.0);
 }
+
+/// The event that begins the deployment, where nobody hears it: it is led down all the same, and what an operator has set goes
+/// with what is undone.
+#[test]
+fn who_is_led_down_and_not_heard_is_led_down_all_the_same() {
+    let configurations = "base = Configuration { create('a', 'Drive') },";
+    let states = "idle = state {}, up = state { entry = 'base' }, slow = state {}, leaving = state { entry = 'base.undo' }, stays = state {},
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'up', events = { 'e_start' } },
+        trans { src = 'up', tgt = 'slow', events = { 'e_shutdown' } },
+        trans { src = 'slow', tgt = 'leaving', events = { 'e_after(0.5)' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },
+        trans { src = 'leaving', tgt = 'stays', events = { 'base.undo.failed', 'base.undo.broken' } },
+        trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown' } },";
+    let small = Small::new(configurations, states, "operator: [a.gain]\n");
+    let said = small.check();
+    assert!(said.of("coord::refused_by_other").is_empty(), "{:#}", said.0);
+    small.demo.write(
+        "twice.lua",
+        "deploy('small.yaml') set('a.gain', 3.0) wait(0.1) raise('e_shutdown') wait(0.1) raise('e_start') wait(1)",
+    );
+    let ran = small.demo.run(&["run", "twice.lua", "--clock", "simulated"]);
+    assert!(ran.out.contains("base.undone") && !ran.out.contains("base.undo.failed"), "{}{}", ran.out, ran.err);
+}
