@@ -147,6 +147,31 @@ fn a_script_is_stopped_by_signals_and_leaves_nothing() {
     assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
 }
 
+/// Whatever it catches, and also where it calls no function of ours; nobody waits for a bound of its instructions.
+#[test]
+fn a_script_that_catches_its_interruption_is_stopped_all_the_same() {
+    for goes_on in [
+        "while not pcall(wait_state, 'root.failed', 1) do end",
+        "while true do pcall(wait, 1) end",
+        "while true do xpcall(wait, function() return 'no' end, 0.001) end",
+        "while true do end",
+        "while true do pcall(function() while true do end end) end",
+        "while true do ('x'):gsub('x', function() pcall(wait, 1) end) end",
+    ] {
+        let demo = Demo::new();
+        demo.write("story.lua", &format!("deploy('deployment.yaml') say('it is up') {goes_on}"));
+        let mut command = demo.command(&["run", "story.lua", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let running = Foreground::start(&mut command);
+        until("it is up", || demo.read("out").contains("it is up").then_some(()));
+        running.signal(libc::SIGTERM);
+        assert_eq!(running.end().code(), Some(1), "{goes_on}: {}{}", demo.read("out"), demo.read("err"));
+        assert!(demo.read("err").contains("interrupted by a signal"), "{goes_on}: {}", demo.read("err"));
+        assert!(demo.read("out").contains("create_all.undone"), "{goes_on}: {}", demo.read("out"));
+    }
+}
+
 /// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
 #[test]
 fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
