@@ -2,6 +2,7 @@
 
 use crate::demo::Demo;
 use crate::foreground::{Foreground, until};
+use crate::kept::process;
 use std::fs::File;
 use std::process::Stdio;
 
@@ -93,6 +94,32 @@ fn a_second_signal_and_force_begin_with_force() {
         }
         assert_eq!(deployed.end().code(), Some(4));
         assert!(demo.read("out").contains("demo down by force, nothing is left"), "{}", demo.read("out"));
+    }
+}
+
+/// The process in the background is told of the command's signals, and what becomes of it is said.
+#[test]
+fn an_interrupted_command_says_that_what_it_started_is_not_up() {
+    for interrupted in [true, false] {
+        let demo = Demo::new();
+        slow(&demo);
+        waiting(&demo);
+        demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
+        let mut command = demo.command(&["deploy", "deployment.yaml", "--detach", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let command = Foreground::start(&mut command);
+        until("the call", || demo.read("out").contains("slow_mode").then_some(()));
+        if interrupted {
+            command.signal(libc::SIGINT);
+            demo.until_phase("shutting_down");
+        }
+        // SAFETY: a signal to a process of ours.
+        assert_eq!(unsafe { libc::kill(process(&demo, "demo"), libc::SIGKILL) }, 0);
+        let (code, words) = (command.end().code(), demo.read("err"));
+        assert_eq!(code, Some(if interrupted { 1 } else { 3 }), "{words}");
+        assert!(words.contains("not up: ") && words.contains("signal 9"), "{words}");
+        assert_eq!(words.contains("interrupted"), interrupted, "{words}");
     }
 }
 
