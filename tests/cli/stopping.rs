@@ -1,7 +1,7 @@
 //! Signals, `davit shutdown` and a script's end on the program itself: the stages of stopping, and the exit status.
 
 use crate::demo::Demo;
-use crate::foreground::{Foreground, until};
+use crate::foreground::{Foreground, full_pipe, until};
 use crate::kept::process;
 use std::fs::File;
 use std::process::Stdio;
@@ -95,6 +95,22 @@ fn a_second_signal_and_force_begin_with_force() {
         assert_eq!(deployed.end().code(), Some(4));
         assert!(demo.read("out").contains("demo down by force, nothing is left"), "{}", demo.read("out"));
     }
+}
+
+/// From when others can see it on: here it has its socket, and waits for who reads why it is not kept.
+#[test]
+fn a_signal_before_it_comes_up_is_led_down() {
+    let demo = Demo::new();
+    demo.write("state", "no directory");
+    let (_nobody, errors) = full_pipe();
+    let mut command = demo.command(&["deploy", "deployment.yaml", "--in-background"]);
+    command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+    let deployed = Foreground::start(&mut command);
+    until("its socket", || demo.path("davit/demo.sock").exists().then_some(()));
+    deployed.signal(libc::SIGTERM);
+    let ended = deployed.end();
+    assert!(ended.code() == Some(1) && demo.read("out").contains("interrupted"), "{ended} {}", demo.read("out"));
+    assert!(!demo.path("davit/demo.sock").exists(), "it ended in order");
 }
 
 /// The process in the background is told of the command's signals, and what becomes of it is said.
