@@ -12,13 +12,14 @@ use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
 use crate::model::finding::count;
+use crate::session::kept::Leave;
 use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session, Stage};
-use crate::time::Clock;
+use crate::time::{Clock, lock};
 use std::panic::resume_unwind;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Bring a deployment up and stay in the foreground; Ctrl-C shuts it down in order.
 ///
@@ -109,9 +110,13 @@ impl Args {
                 "the text ran when it was read: does it depend on time or chance?",
             ),
         })?;
+        // Before anything of it is to be seen: a signal that ends the process by itself would leave that behind.
+        let leaving = Leaving::default();
+        let watch = watch(&session, progress, &leaving, in_background)?;
         let socket = open(&session)?;
+        lock(&leaving).push(Box::new(socket.leave()));
         let keep = Keep::begin(&session, &self.input.file, clock, in_background)?;
-        let watch = watch(&session, &socket, progress, &keep, in_background)?;
+        lock(&leaving).extend(keep.leave());
         session.hub().attach(progress.observer());
         session.hub().attach(socket.observer(clock).map_err(short)?);
         let driven = session.guarded(|| match session.bring_up() {
@@ -183,11 +188,13 @@ fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
     })
 }
 
+/// What a process does that ends at once, the last first.
+type Leaving = Arc<Mutex<Vec<Leave>>>;
+
 fn watch(
     session: &Arc<Session>,
-    socket: &ControlSocket,
     progress: &Progress,
-    keep: &Keep,
+    leaving: &Leaving,
     in_background: bool,
 ) -> Result<Watch, Failure> {
     let stop = {
@@ -200,12 +207,11 @@ fn watch(
         }
     };
     let leave = {
-        let (leave, kept, progress) = (socket.leave(), keep.leave(), progress.clone());
+        let (leaving, progress) = (leaving.clone(), progress.clone());
         move || {
-            if let Some(kept) = kept {
-                kept();
+            for leave in lock(&leaving).drain(..).rev() {
+                leave();
             }
-            leave();
             progress.finish();
         }
     };

@@ -1,15 +1,18 @@
 //! `davit deploy --detach`: the same command again as a process of its own, watched until it is up.
 //!
 //! The process in the background writes its story to a pipe. A line with [`UP`] says that it is up; the end of the pipe
-//! without that line says that it is not, and its exit status says why.
+//! without that line says that it is not, and its exit status says why. Signals to the command are [passed on](Passed) to it.
 
 use super::exit::Exit;
 use super::output::{self, Output};
+use super::signals::Watch;
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_SYSTEM;
+use crate::time::lock;
 use std::io::{BufRead, BufReader};
-use std::os::unix::process::CommandExt;
-use std::process::{Command, Stdio};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex};
 
 /// The line that says that the deployment is up. Not JSON and not a word anybody prints by chance.
 const UP: &str = "\u{1}davit up\u{1}";
@@ -29,39 +32,145 @@ pub fn run(context: &Context) -> Answer {
     };
     let program = std::env::current_exe().map_err(|e| failed("the program's own file is not known", &e))?;
     let arguments = std::env::args_os().skip(1).filter(|a| a != "--detach");
-    let mut child = Command::new(program)
-        .args(arguments)
-        .arg("--in-background")
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        // A group of its own: Ctrl-C in this terminal is not meant for it any more.
-        .process_group(0)
-        .spawn()
-        .map_err(|e| failed("the process in the background cannot be started", &e))?;
+    // While it comes up, Ctrl-C here is passed on: it is stopped, as in the foreground. Before it is there already: who is
+    // ended by a signal in the moment in which it begins would leave it to come up unasked.
+    let passed = Arc::new(Mutex::new(Passed::by(interrupt)));
+    let _watch = {
+        let (passed, last) = (passed.clone(), passed.clone());
+        Watch::start(true, move |_| lock(&passed).signal(), move || lock(&last).signal())
+            .map_err(super::deploy::unwatched)?
+    };
+    let mut child = {
+        // Also a third signal, which ends the command, waits until there is somebody to be told.
+        let mut passed = lock(&passed);
+        let child = Command::new(program)
+            .args(arguments)
+            .arg("--in-background")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            // A group of its own: Ctrl-C in this terminal is not meant for it any more.
+            .process_group(0)
+            .spawn()
+            .map_err(|e| failed("the process in the background cannot be started", &e))?;
+        passed.to(child.id());
+        child
+    };
     let stdout = child.stdout.take().expect("piped above");
-    // While it comes up, Ctrl-C here is passed on: it is stopped, as in the foreground.
-    let pid = child.id();
-    let _watch = super::signals::Watch::start(true, move |_| interrupt(pid, "INT"), move || interrupt(pid, "INT")).ok();
+    let mut came_up = false;
     for line in BufReader::new(stdout).lines() {
         match line {
             Ok(line) if line == UP => {
-                return Ok(Exit::Done);
+                if lock(&passed).leave_it() {
+                    return Ok(Exit::Done);
+                }
+                came_up = true;
             }
             Ok(line) => context.out.line(line),
             Err(_) => break,
         }
     }
     let status = child.wait().map_err(|e| failed("the process in the background was lost", &e))?;
-    Ok(match status.code() {
+    let interrupted = lock(&passed).interrupted();
+    // Where it has said nothing of its end itself.
+    if let Some(signal) = status.signal() {
+        let why = if interrupted { "interrupted; " } else { "" };
+        context.out.error(format!("not up: {why}the process in the background was ended by signal {signal}\n"));
+    } else if came_up {
+        context
+            .out
+            .error("not up: interrupted in the moment in which it was; `davit status` says how it was shut down\n");
+    }
+    Ok(exit(status, interrupted))
+}
+
+/// Of a process that has ended and did not stay up.
+fn exit(status: ExitStatus, interrupted: bool) -> Exit {
+    match status.code() {
+        // It is not up, however well that went.
+        Some(0) | None if interrupted => Exit::No,
         Some(0) => Exit::Done,
         Some(1) => Exit::No,
         Some(2) => Exit::Usage,
         Some(4) => Exit::Forced,
         _ => Exit::Broken,
-    })
+    }
 }
 
-fn interrupt(pid: u32, signal: &str) {
+fn interrupt(pid: u32) {
     // `kill` is the one program every Unix has for this; the standard library has no call for it.
-    let _ = Command::new("kill").arg(format!("-{signal}")).arg(pid.to_string()).status();
+    let _ = Command::new("kill").arg("-INT").arg(pid.to_string()).status();
+}
+
+/// Passes signals on to a process, also those that came before it was there.
+struct Passed<F> {
+    by: F,
+    /// As long as it is there and meant.
+    process: Option<u32>,
+    signals: u32,
+}
+
+impl<F: FnMut(u32)> Passed<F> {
+    fn by(by: F) -> Self {
+        Self { by, process: None, signals: 0 }
+    }
+
+    fn signal(&mut self) {
+        self.signals += 1;
+        if let Some(process) = self.process {
+            (self.by)(process);
+        }
+    }
+
+    /// It is there.
+    fn to(&mut self, process: u32) {
+        self.process = Some(process);
+        (0..self.signals).for_each(|_| (self.by)(process));
+    }
+
+    /// Nothing more is meant for it, unless something was.
+    fn leave_it(&mut self) -> bool {
+        if !self.interrupted() {
+            self.process = None;
+        }
+        !self.interrupted()
+    }
+
+    fn interrupted(&self) -> bool {
+        self.signals > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_that_comes_before_the_process_is_passed_on_to_it() {
+        let mut told = Vec::new();
+        let mut passed = Passed::by(|process| told.push(process));
+        passed.signal();
+        passed.to(7);
+        assert!(!passed.leave_it(), "it is going down");
+        passed.signal();
+        assert_eq!(told, [7, 7]);
+    }
+
+    #[test]
+    fn what_is_up_is_left_alone() {
+        let mut told = Vec::new();
+        let mut passed = Passed::by(|process| told.push(process));
+        passed.to(7);
+        assert!(passed.leave_it());
+        passed.signal();
+        assert_eq!(told, [0_u32; 0]);
+    }
+
+    #[test]
+    fn what_ended_of_an_interruption_is_not_up() {
+        let of_signal = ExitStatus::from_raw(2);
+        assert_eq!((exit(of_signal, true), exit(of_signal, false)), (Exit::No, Exit::Broken));
+        let well = ExitStatus::from_raw(0);
+        assert_eq!((exit(well, true), exit(well, false)), (Exit::No, Exit::Done));
+        assert_eq!(exit(ExitStatus::from_raw(4 << 8), true), Exit::Forced);
+    }
 }

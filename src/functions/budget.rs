@@ -6,15 +6,18 @@ use super::exact;
 use super::watch::Watch;
 use crate::limits;
 use mlua::{Lua, Result};
-use std::cell::Cell;
-#[cfg(target_os = "linux")]
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 use std::ffi::CStr;
 use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// What an error says inside a call that is over; outside it is [`Budget::error`].
 pub const ENDED: &CStr = c"ended: its instructions are used up";
+
+/// What whatever was [interrupted](Budget::interrupted_by) ends with.
+pub const INTERRUPTED: &CStr = c"interrupted by a signal";
 
 /// Counts the instructions of the call under way. Once they are used up every look fails, and what protects calls in Lua
 /// passes that on, so that the call ends wherever it is.
@@ -38,6 +41,8 @@ pub struct Budget {
     out_of_time: Cell<bool>,
     depth: Cell<u32>,
     over: Cell<bool>,
+    /// Somebody outside ends what is under way, from another thread.
+    interrupt: OnceCell<Arc<AtomicBool>>,
     /// Finds the calls that take long; none: all are counted.
     #[cfg(target_os = "linux")]
     watch: OnceCell<Watch>,
@@ -84,9 +89,23 @@ impl Budget {
         let _ = lua;
     }
 
-    /// Whether the budget of the call under way is used up.
+    /// Once `interrupt` is set a call ends wherever it is, as if its budget were used up, with [`INTERRUPTED`]. For good.
+    pub fn interrupted_by(&self, interrupt: Arc<AtomicBool>) {
+        let _ = self.interrupt.set(interrupt);
+    }
+
+    fn is_interrupted(&self) -> bool {
+        self.interrupt.get().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed))
+    }
+
+    /// Whether the call under way has to end: its budget is used up, or it was interrupted.
     pub fn is_over(&self) -> bool {
-        self.over.get()
+        self.over.get() || self.is_interrupted()
+    }
+
+    /// What an error says inside a call that [is over](Self::is_over).
+    pub fn ended(&self) -> &'static CStr {
+        if !self.over.get() && self.is_interrupted() { INTERRUPTED } else { ENDED }
     }
 
     /// Whether only calls that take long are counted.
@@ -113,7 +132,7 @@ impl Budget {
             self.out_of_time.set(true);
             self.over.set(true);
         }
-        self.look(instructions) || self.over.get()
+        self.look(instructions) || self.is_over()
     }
 
     /// Something goes through so many elements; whether that is too much.
@@ -143,7 +162,7 @@ impl Budget {
         over
     }
 
-    /// Counts the steps of something that is no Lua, each like an instruction; `false`: they are used up.
+    /// Counts the steps of something that is no Lua, each like an instruction; `false`: they are used up, or it has to end.
     pub fn steps(&self) -> impl FnMut() -> bool + '_ {
         let mut steps = 0;
         move || {
@@ -152,12 +171,15 @@ impl Budget {
                 return true;
             }
             steps = 0;
-            !self.more_work(u64::from(limits::CALL_LOOK))
+            !(self.more_work(u64::from(limits::CALL_LOOK)) || self.is_over())
         }
     }
 
-    /// What a call whose budget is used up ends with: what it was used up by.
+    /// What a call that is over ends with: what its budget was used up by, if that is why.
     pub fn error(&self) -> mlua::Error {
+        if !self.over.get() && self.is_interrupted() {
+            return mlua::Error::runtime(INTERRUPTED.to_string_lossy());
+        }
         let (used, millions) = (self.used.get(), self.limit.get() / 1_000_000);
         let text = if self.out_of_time.get() {
             format!("ended after {} s of processor time: {LONG}", self.time.as_secs())
@@ -198,8 +220,10 @@ impl Budget {
         }
         let outcome = exact::during(self, || self.watched(call));
         drop(leave);
-        if self.over.replace(false) {
-            return Err(self.error());
+        if self.over.get() {
+            let error = self.error();
+            self.over.set(false);
+            return Err(error);
         }
         outcome
     }

@@ -72,7 +72,7 @@ unsafe extern "C-unwind" fn count(state: *mut lua_State, _: *mut ffi::lua_Debug)
         if budget.counts_late() {
             set(state, false);
         } else if budget.look_exactly(limits::CALL_LOOK_EXACT) {
-            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
+            ffi::lua_pushstring(state, budget.ended().as_ptr());
             ffi::lua_error(state)
         }
     }

@@ -33,8 +33,9 @@ pub fn install(lua: &Lua, native: &Table, bytes: usize, time: Duration) -> Resul
     loops(lua, &charge)?;
     let look = budget.clone();
     native.raw_set("over", lua.create_function(move |_, ()| Ok(look.is_over()))?)?;
-    let ended = lua.create_string(super::budget::ENDED.to_bytes())?;
-    native.raw_set("failure", lua.create_function(move |_, ()| Ok(ended.clone()))?)?;
+    let ended = budget.clone();
+    let failure = move |lua: &Lua, ()| lua.create_string(ended.ended().to_bytes());
+    native.raw_set("failure", lua.create_function(failure)?)?;
     native.raw_set(
         "text_of",
         lua.create_function(move |lua, value: Value| match value {

@@ -30,7 +30,7 @@ mod watch;
 mod work;
 
 pub use aside::Field;
-pub use budget::{Budget, processor_time};
+pub use budget::{Budget, INTERRUPTED, processor_time};
 pub use errors::{Short, message_within};
 pub use guards::{Guards, install as guard, loops};
 pub use lower::{Problem, Spot};

@@ -1,7 +1,8 @@
 //! Signals, `davit shutdown` and a script's end on the program itself: the stages of stopping, and the exit status.
 
 use crate::demo::Demo;
-use crate::foreground::{Foreground, until};
+use crate::foreground::{Foreground, full_pipe, until};
+use crate::kept::process;
 use std::fs::File;
 use std::process::Stdio;
 
@@ -96,6 +97,48 @@ fn a_second_signal_and_force_begin_with_force() {
     }
 }
 
+/// From when others can see it on: here it has its socket, and waits for who reads why it is not kept.
+#[test]
+fn a_signal_before_it_comes_up_is_led_down() {
+    let demo = Demo::new();
+    demo.write("state", "no directory");
+    let (_nobody, errors) = full_pipe();
+    let mut command = demo.command(&["deploy", "deployment.yaml", "--in-background"]);
+    command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+    let deployed = Foreground::start(&mut command);
+    until("its socket", || demo.path("davit/demo.sock").exists().then_some(()));
+    deployed.signal(libc::SIGTERM);
+    let ended = deployed.end();
+    assert!(ended.code() == Some(1) && demo.read("out").contains("interrupted"), "{ended} {}", demo.read("out"));
+    assert!(!demo.path("davit/demo.sock").exists(), "it ended in order");
+}
+
+/// The process in the background is told of the command's signals, and what becomes of it is said.
+#[test]
+fn an_interrupted_command_says_that_what_it_started_is_not_up() {
+    for interrupted in [true, false] {
+        let demo = Demo::new();
+        slow(&demo);
+        waiting(&demo);
+        demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
+        let mut command = demo.command(&["deploy", "deployment.yaml", "--detach", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let command = Foreground::start(&mut command);
+        until("the call", || demo.read("out").contains("slow_mode").then_some(()));
+        if interrupted {
+            command.signal(libc::SIGINT);
+            demo.until_phase("shutting_down");
+        }
+        // SAFETY: a signal to a process of ours.
+        assert_eq!(unsafe { libc::kill(process(&demo, "demo"), libc::SIGKILL) }, 0);
+        let (code, words) = (command.end().code(), demo.read("err"));
+        assert_eq!(code, Some(if interrupted { 1 } else { 3 }), "{words}");
+        assert!(words.contains("not up: ") && words.contains("signal 9"), "{words}");
+        assert_eq!(words.contains("interrupted"), interrupted, "{words}");
+    }
+}
+
 /// A bring-up that fails ends with 1 where its coordinator leads down.
 #[test]
 fn a_bring_up_that_fails_is_led_down() {
@@ -145,6 +188,31 @@ fn a_script_is_stopped_by_signals_and_leaves_nothing() {
     demo.write("story.lua", "deploy('deployment.yaml')");
     let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
     assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
+}
+
+/// Whatever it catches, and also where it calls no function of ours; nobody waits for a bound of its instructions.
+#[test]
+fn a_script_that_catches_its_interruption_is_stopped_all_the_same() {
+    for goes_on in [
+        "while not pcall(wait_state, 'root.failed', 1) do end",
+        "while true do pcall(wait, 1) end",
+        "while true do xpcall(wait, function() return 'no' end, 0.001) end",
+        "while true do end",
+        "while true do pcall(function() while true do end end) end",
+        "while true do ('x'):gsub('x', function() pcall(wait, 1) end) end",
+    ] {
+        let demo = Demo::new();
+        demo.write("story.lua", &format!("deploy('deployment.yaml') say('it is up') {goes_on}"));
+        let mut command = demo.command(&["run", "story.lua", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let running = Foreground::start(&mut command);
+        until("it is up", || demo.read("out").contains("it is up").then_some(()));
+        running.signal(libc::SIGTERM);
+        assert_eq!(running.end().code(), Some(1), "{goes_on}: {}{}", demo.read("out"), demo.read("err"));
+        assert!(demo.read("err").contains("interrupted by a signal"), "{goes_on}: {}", demo.read("err"));
+        assert!(demo.read("out").contains("create_all.undone"), "{goes_on}: {}", demo.read("out"));
+    }
 }
 
 /// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.

@@ -1,18 +1,22 @@
 //! How somebody outside stops a script and what it has brought up: a signal.
 
 use super::error;
+use crate::functions::INTERRUPTED;
 use crate::limits;
 use crate::session::{Command, Session};
 use crate::time::{Clock, Time, lock};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 
-/// Stops a script: from now on every function of it fails, and what it brought up is stopped. Clones stop the same one.
+/// Stops a script: it ends wherever it is, whatever it catches, and what it brought up is stopped. Clones stop the same one.
 #[derive(Debug, Clone, Default)]
-pub struct Interrupt(Arc<Mutex<State>>);
+pub struct Interrupt {
+    asked: Arc<AtomicBool>,
+    state: Arc<Mutex<State>>,
+}
 
 #[derive(Debug, Default)]
 struct State {
-    asked: bool,
     force: bool,
     session: Weak<Session>,
 }
@@ -21,8 +25,8 @@ impl Interrupt {
     /// Asks it to end; with `force` what it brought up is taken down by force.
     pub fn stop(&self, force: bool) {
         let session = {
-            let mut state = lock(&self.0);
-            state.asked = true;
+            let mut state = lock(&self.state);
+            self.asked.store(true, Ordering::Relaxed);
             state.force |= force;
             state.session.clone()
         };
@@ -34,18 +38,27 @@ impl Interrupt {
     /// A deployment of the script's: commands go to it from now on, also one that came before.
     pub(super) fn up(&self, session: &Arc<Session>) {
         let state = {
-            let mut state = lock(&self.0);
+            let mut state = lock(&self.state);
             state.session = Arc::downgrade(session);
-            (state.asked, state.force)
+            (self.is_asked(), state.force)
         };
         if let (true, force) = state {
             session.command(Command::Shutdown { force });
         }
     }
 
+    /// Whether it is asked for: what the budget of the script looks at.
+    pub(super) fn asked(&self) -> Arc<AtomicBool> {
+        self.asked.clone()
+    }
+
+    fn is_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
+
     /// Fails once it is asked for.
     pub(super) fn check(&self) -> mlua::Result<()> {
-        if lock(&self.0).asked { Err(error("interrupted by a signal")) } else { Ok(()) }
+        if self.is_asked() { Err(error(INTERRUPTED.to_string_lossy())) } else { Ok(()) }
     }
 
     /// Waits until then. In simulated time that takes no time.

@@ -23,7 +23,7 @@ local function passed(ok, ...)
   return told(ok, ...)
 end
 
--- A call whose budget is used up cannot be held by anything in it.
+-- A call whose budget is used up, or that was interrupted, cannot be held by anything in it.
 function pcall(...) return passed(raw_pcall(...)) end
 
 -- A handler runs where the error was raised: inside the look that ended the call, and there nothing ends it.
