@@ -1,7 +1,9 @@
 //! Every bound of the system, with its unit and its reason.
 
+mod check;
 mod kept;
 
+pub use check::*;
 pub use kept::*;
 use std::time::Duration;
 
@@ -397,71 +399,12 @@ pub const DOO_BUSY: Duration = Duration::from_millis(1);
 /// that steps its machine a hundred times a second.
 pub const DOO_IDLE: Duration = Duration::from_millis(10);
 
-/// Events and answers that `check` follows through a coordinator before it says that it has not seen everything. About
-/// half a second of work.
-pub const CHECK_TRANSITIONS: usize = 400_000;
-
-/// Batches of one coordinator that `check` lets be unanswered at once: while so many are, it follows no event from outside
-/// that this coordinator would take, and says so. What goes wrong when requests queue up goes wrong with two of them.
-pub const CHECK_WAITING: usize = 2;
-
-/// The same where following is easy.
-pub const CHECK_WAITING_MOST: usize = 6;
-
-/// Transitions up to which following counts as easy: then it is done anew with more batches that wait, if there are any.
-pub const CHECK_EASY: usize = 10_000;
-
-/// Worlds in which `check` goes round a circle that leaves a frame of one configuration each time, until the oldest frames are
-/// squashed, where following is easy; else in one. In each of them all requests of the circle are planned as often as frames have
-/// room.
-pub const CHECK_ROUNDS: usize = 4;
-
-/// Transitions of several coordinators up to which they are followed anew with it in mind whether the event that ends the
-/// deployment has come: that makes up to twice as many of each state.
-pub const CHECK_STOPPING: usize = 20_000;
-
-/// Transitions up to which they are followed anew with what an operator's safe configuration leads to: that makes many times
-/// as many.
-pub const CHECK_BY_HAND: usize = 20_000;
-
-/// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
-/// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
-pub const CHECK_LEAN: usize = 5_000;
-
-/// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
-/// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.
-pub const CHECK_PILED: usize = 32;
-
-/// Frames of one configuration and one coordinator that `check` follows: a fourth one means that going round adds one
-/// each time.
-pub const CHECK_FRAMES: usize = 3;
-
-/// The same behind an undoing that failed: there it is the failing that adds one each time, which is no mistake of the
-/// coordinator. What one left frame under another leads to, further ones do too.
-pub const CHECK_LEFT: usize = 2;
-
-/// States on a way from a safety event to a safe configuration.
-pub const CHECK_CIRCLE: usize = 128;
-
-/// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes
-/// round for ever.
-pub const CHECK_DRIVEN: usize = 10_000;
-
 /// How soon a safety event that nobody leads after acts again by itself: a component may raise it in each update.
 pub const SAFETY_AGAIN: Duration = Duration::from_secs(1);
 
 /// How often what is there is brought to rest and taken away by force, where something is left of it: once more for what failed by chance, and
 /// once for what that uncovers.
 pub const FORCE_ROUNDS: usize = 3;
-
-/// Batches that one event leads a coordinator to ask for, and that are followed; one that goes round by itself asks without end.
-pub const CHECK_HANDED: usize = 64;
-
-/// Times at which it is looked whether what a configuration stands for may come true by time alone.
-pub const CHECK_STANDS: usize = 64;
-
-/// Ways in which what one step asks for may meet what is under way, and that are followed.
-pub const CHECK_FORKS: usize = 64;
 
 /// Between two moves of a way that a script replays: what is to happen at one instant on the way must not happen then by
 /// chance in another order.
@@ -470,16 +413,6 @@ pub const REPLAY_STEP: Duration = Duration::from_millis(20);
 /// So many rounds of a circle that a script goes again and again are written out: the first, the last, and one between that is
 /// repeated.
 pub const REPLAY_ROUNDS: usize = 3;
-
-/// Circles of answers that are told; more of them say nothing new.
-pub const CHECK_TOLD: usize = 4;
-
-/// Types as which configurations create one component, up to which `check` judges each configuration by them: a hot swap
-/// has a few. A connection is looked at for every pair of them.
-pub const CHECK_TYPES: usize = 16;
-
-/// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
-pub const CHECK_INBOX: usize = 6;
 
 /// Forced steps told one by one; more are told by number, so that a line can be read.
 pub const FORCED_SHOWN: usize = 8;

@@ -6,8 +6,12 @@ use crate::limits;
 /// A bound that cut something off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Bound {
-    /// [`limits::CHECK_TRANSITIONS`].
+    /// The transitions of an [`Effort`](super::Effort).
     Budget,
+    /// [`Halt::Memory`](super::Halt).
+    Memory,
+    /// [`Halt::Interrupted`](super::Halt).
+    Interrupted,
     /// [`limits::CHECK_WAITING`].
     Waiting,
     /// [`limits::CHECK_LEAN`].
@@ -38,12 +42,14 @@ pub enum Bound {
 
 impl Bound {
     /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
-    pub(super) fn told(self, failed: Failed, most_waiting: usize) -> String {
+    pub(super) fn told(self, failed: Failed, most_waiting: usize, budget: usize) -> String {
         let what = match self {
             Self::Budget => format!(
-                "what comes after the first {} transitions was not followed, for they are as many as are looked at",
-                limits::CHECK_TRANSITIONS
+                "what comes after the first {budget} transitions was not followed, for they are as many as are looked at \
+                 (`--budget`)"
             ),
+            Self::Memory => "what takes up more memory than `--budget` gives was not followed".to_owned(),
+            Self::Interrupted => "what was left when it was interrupted was not followed".to_owned(),
             Self::Waiting => {
                 format!("more than {most_waiting} batches of one coordinator that wait at once were not followed")
             }

@@ -6,6 +6,7 @@
 
 use super::beside;
 use super::closed::Raises;
+use super::effort::Far;
 use super::lasts;
 use super::members::Member;
 use super::outcome::Held;
@@ -174,7 +175,8 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
             reached = Some(at);
             break;
         }
-        if states.len() > limits::CHECK_TRANSITIONS {
+        let (met, most) = (states.len(), product.effort.transitions().max(limits::CHECK_TRANSITIONS));
+        if met > most || !product.effort.goes_on(at, Far { states: met, transitions: at }) {
             break;
         }
         last = at;

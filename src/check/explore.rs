@@ -4,6 +4,7 @@
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
 use super::bound::Bound;
+use super::effort::{Far, Halt};
 use super::outcome::WorldId;
 use super::product::Product;
 use super::report::Explored;
@@ -149,23 +150,31 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
 
 /// How many transitions are followed before those with at worst this failing come to their end: what fails is to be looked
 /// at also where there is no end to what does not.
-fn share_of(failed: Failed) -> usize {
+fn share_of(failed: Failed, of: usize) -> usize {
     let eighths = match failed {
         Failed::Nothing => 5,
         Failed::Apply => 6,
         Failed::Undo => 7,
         Failed::Broken => 8,
     };
-    limits::CHECK_TRANSITIONS / 8 * eighths
+    of / 8 * eighths + of % 8 * eighths / 8
 }
 
 impl Graph<'_, '_> {
     fn run(&mut self) {
+        let mut looked_at = 0;
         while let Some(Reverse((failed, _, at))) = self.open.pop() {
             if self.followed[at as usize] || failed > self.failed[at as usize] {
                 continue;
             }
-            if self.edges.len() >= share_of(failed) {
+            let far = Far { states: self.states.len(), transitions: self.edges.len() };
+            if !self.product.effort.goes_on(looked_at, far) {
+                let halt = self.product.effort.halted();
+                self.cut(if halt == Some(Halt::Memory) { Bound::Memory } else { Bound::Interrupted }, failed);
+                continue;
+            }
+            looked_at += 1;
+            if self.edges.len() >= share_of(failed, self.product.effort.transitions()) {
                 self.cut(Bound::Budget, failed);
                 continue;
             }

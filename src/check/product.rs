@@ -12,6 +12,7 @@
 
 use super::beside;
 use super::coordinator::outside_events;
+use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
@@ -63,6 +64,8 @@ pub struct Product<'a> {
     pub never_down: bool,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
+    /// How much more is followed.
+    pub(super) effort: Left<'a>,
 }
 
 impl<'a> Product<'a> {
@@ -102,6 +105,7 @@ impl<'a> Product<'a> {
             follows_by_hand: false,
             never_down: false,
             untimed: false,
+            effort: Effort::default().into(),
         };
         product.worlds.judged = super::stands::judged(deployment, charts);
         product.alike = product.alike_events();

@@ -1,6 +1,7 @@
 //! The whole check, one family after the other; and single families, for who changes a running deployment.
 
 use super::bound::Bound;
+use super::effort::Effort;
 use super::explore::explore;
 use super::judge::Traced;
 use super::product::Product;
@@ -22,6 +23,11 @@ use std::sync::Arc;
 
 /// Checks a deployment against the component types it may use (those of its libraries and those it declares).
 pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Report {
+    run_with(deployment, catalogue, Effort::default())
+}
+
+/// The same with more effort, or less.
+pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
     let shared = deployment.into();
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
@@ -61,7 +67,7 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
             replayed = Some(Checked::new(shared.clone()));
             let followed = settings::followed(deployment, &universe);
-            explored = follow(&followed, &views, &charts, catalogue, &mut traced, &mut left);
+            explored = follow(&followed, &views, &charts, catalogue, effort, &mut traced, &mut left);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
                 traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))
@@ -84,38 +90,49 @@ fn follow(
     views: &[Deployment],
     charts: &[&Chart],
     catalogue: &Catalogue,
+    effort: Effort<'_>,
     traced: &mut Traced,
     left: &mut BTreeSet<String>,
 ) -> Explored {
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let all: Vec<usize> = (0..charts.len()).collect();
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
+    product.effort = effort.into();
     let mut found = ways::ways(&mut product);
+    if product.effort.halted().is_some() {
+        // Where it ended says nothing of the ways.
+        found.clear();
+    }
     let mut asked = product.worlds.asked().clone();
     if product.untimed {
-        left.insert(Bound::Times.told(Failed::Nothing, 0));
+        left.insert(Bound::Times.told(Failed::Nothing, 0, effort.transitions));
     }
     for numbers in beside::groups(deployment, charts) {
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
-        apart.iter_mut().for_each(|apart| apart.never_down = product.never_down);
+        if let Some(apart) = &mut apart {
+            apart.never_down = product.never_down;
+            apart.effort = effort.into();
+        }
         let product = apart.as_mut().unwrap_or(&mut product);
         let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);
         loop {
             product.follow_anew(most_waiting);
             let mut graph = explore(product);
             // Anew with more of them where they are few: often there never are more at once.
+            let whole = graph.product.effort.halted().is_none();
             let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
             let minds = graph.product.minds_stopping;
-            if easy && graph.bounds.contains_key(&Bound::Waiting) {
+            if whole && easy && graph.bounds.contains_key(&Bound::Waiting) {
                 most_waiting += 1;
                 continue;
             }
-            if !minds && graph.edges.len() <= limits::CHECK_STOPPING {
+            if whole && !minds && graph.edges.len() <= limits::CHECK_STOPPING {
                 product.minds_stopping = true;
                 continue;
             }
-            if graph.bounds.contains_key(&Bound::ByHand) && graph.edges.len() <= limits::CHECK_BY_HAND && by_hand {
+            let few = graph.edges.len() <= limits::CHECK_BY_HAND;
+            if whole && graph.bounds.contains_key(&Bound::ByHand) && few && by_hand {
                 product.follows_by_hand = true;
                 continue;
             }
@@ -128,10 +145,13 @@ fn follow(
                 graph.cut(Bound::Stopping, Failed::Nothing);
             }
             found.extend(graph.judge());
-            let verified = !graph.bounds.contains_key(&Bound::Budget) && !graph.bounds.contains_key(&Bound::Entered);
+            let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];
+            let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
             let shared = beside::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-            left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting)));
+            left.extend(
+                graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, effort.transitions)),
+            );
             explored = explored.and(graph.explored());
             asked.extend(product.worlds.asked());
             break;

@@ -1,12 +1,13 @@
 //! `davit check`
 
+use super::budget::{Budget, Following};
 use super::exit::Exit;
 use super::input::Input;
 use super::output::Style;
 use super::{Answer, Context, Failure, Run, replay};
-use crate::check::{self, Explored, Report, TraceStep, Verdict, why_no_way};
+use crate::check::{self, Effort, Explored, Report, TraceStep, Verdict, why_no_way};
 use crate::diagnostics::{SourceMap, to_json};
-use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED, CHECK_TRANSITIONS};
+use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED};
 use crate::model::codes::CLI_WHICH_COORDINATOR;
 use crate::model::finding::count as plural;
 use crate::model::{Deployment, Finding, Severity};
@@ -23,6 +24,8 @@ use std::path::PathBuf;
 /// `--trace N` shows the shortest way to the N-th finding, and with `--as way.lua` writes a script that goes it:
 /// `davit run way.lua --clock simulated --platform simulated`. With a name that ends in `.events` it writes what the
 /// coordinator hears on that way, for `davit sim FILE --events way.events`.
+///
+/// Ctrl-C ends the following, and what was found so far is told (exit status 1); a second one ends the command.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -36,6 +39,11 @@ pub struct Args {
     /// Show notes whole, not a line each.
     #[arg(long)]
     notes: bool,
+    /// Follow the coordinators through at most so many transitions (`2000000`, `2M`), while the process takes up at most so
+    /// much memory (`2GB`, `500MB`), or both (`20M,4GB`). Of coordinators that have nothing to do with each other each has as
+    /// many.
+    #[arg(long, value_name = "BUDGET", default_value_t)]
+    budget: Budget,
     /// Show the shortest way to the N-th finding, and nothing else.
     #[arg(long, value_name = "N", conflicts_with_all = ["json", "notes"])]
     trace: Option<usize>,
@@ -72,14 +80,17 @@ impl Run for Args {
                 return Ok(exit);
             }
         };
-        let mut report = check::run(read.deployment.clone(), &read.catalogue);
+        let following = Following::new(self.budget, self.json)?;
+        let effort = Effort { transitions: self.budget.transitions, goes_on: &|far| following.goes_on(far) };
+        let mut report = check::run_with(read.deployment.clone(), &read.catalogue, effort);
+        let interrupted = following.over();
         report.verdict = report.verdict.with(&read.findings);
         report.findings.extend(read.findings);
         report.traces.resize(report.findings.len(), Vec::new());
         let no = match report.verdict {
             Verdict::Refused => true,
             Verdict::Sound => false,
-            Verdict::Followed { .. } | Verdict::Warnings => self.strict,
+            Verdict::Followed { .. } | Verdict::Warnings => self.strict || interrupted,
         };
         let exit = if no { Exit::No } else { Exit::Done };
         if self.json {
@@ -128,7 +139,7 @@ impl Run for Args {
         };
         out.line(format!("{name}: {verdict}{reach}"));
         report.left.iter().for_each(|left| out.line(format!("  {left}")));
-        for line in bounds(&explored) {
+        for line in bounds(&explored, self.budget) {
             out.line(out.paint(Style::Dim, format!("  {line}")));
         }
         Ok(exit)
@@ -239,7 +250,7 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
 }
 
 /// How far the coordinators were followed, and what was left out.
-fn bounds(explored: &Explored) -> Vec<String> {
+fn bounds(explored: &Explored, budget: Budget) -> Vec<String> {
     let mut lines = Vec::new();
     if explored.states == 0 {
         return lines;
@@ -250,9 +261,9 @@ fn bounds(explored: &Explored) -> Vec<String> {
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
         lines.push(format!(
-            "{} states were met and not followed further{rest}: the budget is {CHECK_TRANSITIONS} transitions, and \
-             {CHECK_PILED} requests that wait",
-            explored.unfollowed
+            "{} states were met and not followed further{rest}: the budget is {}, and {CHECK_PILED} requests that wait",
+            explored.unfollowed,
+            budget.told()
         ));
     }
     lines

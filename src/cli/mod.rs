@@ -5,6 +5,7 @@
 //! To add a command: a file with an `Args` struct (its doc comment is the help text) that implements [`Run`], and one
 //! line in `commands!` below.
 
+mod budget;
 mod check;
 mod completions;
 mod convert;

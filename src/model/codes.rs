@@ -674,6 +674,9 @@ codes! {
         "`davit sim --events FILE` reads lines of events from a file, or from standard input as `-`. The file is missing, is \
          a directory, is no text, or has no end that is in sight: a line has at most 1 MiB, and all of them 64 MiB. Name another \
          one; each line is a set of events, `run`, or `advance SECONDS`.";
+    CLI_MEMORY_UNKNOWN = "cli::memory_unknown", "it is not known how much memory is taken up",
+        "`davit check --budget 2GB` bounds the memory of the process, and asks the operating system how much that is \
+         (`/proc/self/status`). Here it does not tell. Bound the number of transitions instead (`--budget 2M`).";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
     CLI_WHICH_WAY = "cli::which_way", "it is not said how to recover",

@@ -5,6 +5,7 @@ mod answered;
 mod background;
 mod booked;
 mod breakages;
+mod budget;
 mod commands;
 mod crowded;
 mod declared;

@@ -1,0 +1,69 @@
+//! How much is followed, and who is asked meanwhile whether it goes on.
+
+use crate::limits;
+
+/// How far following has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Far {
+    /// States that were met.
+    pub states: usize,
+    /// Transitions that were followed.
+    pub transitions: usize,
+}
+
+/// Why following ends before its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Halt {
+    /// It takes up as much memory as it may.
+    Memory,
+    /// Somebody wants what there is so far.
+    Interrupted,
+}
+
+/// How much is followed. `check` itself looks at no clock, no memory and no signals: who wants an end by these is asked.
+#[derive(Clone, Copy)]
+pub struct Effort<'e> {
+    /// So many transitions of coordinators that are followed together, at most.
+    pub transitions: usize,
+    /// Told every few thousand states how far it is; an error ends it there, and what was left out is said.
+    pub goes_on: &'e dyn Fn(Far) -> Result<(), Halt>,
+}
+
+impl Default for Effort<'_> {
+    /// [`limits::CHECK_TRANSITIONS`], and to the end.
+    fn default() -> Self {
+        Self { transitions: limits::CHECK_TRANSITIONS, goes_on: &|_| Ok(()) }
+    }
+}
+
+/// The effort that is still to be made.
+pub(super) struct Left<'e> {
+    effort: Effort<'e>,
+    halted: Option<Halt>,
+}
+
+impl<'e> From<Effort<'e>> for Left<'e> {
+    fn from(effort: Effort<'e>) -> Self {
+        Self { effort, halted: None }
+    }
+}
+
+impl Left<'_> {
+    /// So many transitions at most.
+    pub fn transitions(&self) -> usize {
+        self.effort.transitions
+    }
+
+    /// Why it ended, once it has.
+    pub fn halted(&self) -> Option<Halt> {
+        self.halted
+    }
+
+    /// Tells how far it is, after every [`limits::CHECK_TELL`] states that were looked at. False: no further.
+    pub fn goes_on(&mut self, looked_at: usize, far: Far) -> bool {
+        if self.halted.is_none() && looked_at.is_multiple_of(limits::CHECK_TELL) {
+            self.halted = (self.effort.goes_on)(far).err();
+        }
+        self.halted.is_none()
+    }
+}

@@ -1,0 +1,230 @@
+//! How much `davit check` follows, and what is told meanwhile: a line on the terminal, the memory that is left, Ctrl-C.
+
+use super::Failure;
+use crate::check::{Far, Halt};
+use crate::limits;
+use crate::model::codes::CLI_MEMORY_UNKNOWN;
+use crate::model::finding::count;
+use crate::time::{Clock, Time};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use signal_hook::SigId;
+use signal_hook::consts::SIGINT;
+use std::cell::Cell;
+use std::io::IsTerminal;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How much is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Budget {
+    /// Transitions of coordinators that are followed together.
+    pub transitions: usize,
+    /// Bytes of memory that the process takes up; none: any.
+    pub memory: Option<u64>,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { transitions: limits::CHECK_TRANSITIONS, memory: None }
+    }
+}
+
+/// Units of memory and what a number of transitions may end with, the longest first.
+const BYTES: [(&str, u64); 4] = [("KB", 1_000), ("MB", 1_000_000), ("GB", 1_000_000_000), ("B", 1)];
+const TIMES: [(&str, u64); 4] = [("K", 1_000), ("M", 1_000_000), ("G", 1_000_000_000), ("", 1)];
+
+/// What is written before one of these units, in whole ones; none: it is none of them, or no number.
+fn number(text: &str, units: &[(&str, u64)]) -> Option<u64> {
+    let upper = text.trim().to_ascii_uppercase();
+    let (digits, times) = units.iter().find_map(|(unit, times)| Some((upper.strip_suffix(unit)?, times)))?;
+    let digits = digits.trim_end();
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
+    let plain = !whole.is_empty() && whole.bytes().chain(part.bytes()).all(|byte| byte.is_ascii_digit());
+    // More digits behind the point than the unit has places mean nothing.
+    let part = part.trim_end_matches('0');
+    let places = u32::try_from(part.len()).ok()?;
+    if !plain || places > times.ilog10() {
+        return None;
+    }
+    let part = if part.is_empty() { 0 } else { part.parse::<u64>().ok()?.checked_mul(times / 10u64.pow(places))? };
+    whole.parse::<u64>().ok()?.checked_mul(*times)?.checked_add(part)
+}
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut budget = Self::default();
+        let mut transitions = None;
+        for part in text.split(',') {
+            if let Some(bytes) = number(part, &BYTES).filter(|_| budget.memory.is_none()) {
+                budget.memory = Some(bytes);
+            } else if let Some(most) = number(part, &TIMES).filter(|_| transitions.is_none()) {
+                let most = usize::try_from(most).ok().filter(|n| (1..=limits::CHECK_TRANSITIONS_MOST).contains(n));
+                let told = || format!("`{part}`: between 1 and {} transitions", limits::CHECK_TRANSITIONS_MOST);
+                transitions = Some(most.ok_or_else(told)?);
+            } else {
+                return Err(format!(
+                    "`{part}`: a number of transitions (`2000000`, `2M`), memory (`2GB`), or `2M,2GB`"
+                ));
+            }
+        }
+        budget.transitions = transitions.unwrap_or(budget.transitions);
+        Ok(budget)
+    }
+}
+
+/// Memory in the largest unit that it is whole in.
+fn memory(bytes: u64) -> String {
+    let whole = |(_, times): &(&str, u64)| bytes >= *times && bytes.is_multiple_of(*times);
+    let (unit, times) = [BYTES[2], BYTES[1], BYTES[0]].into_iter().find(whole).unwrap_or(BYTES[3]);
+    format!("{}{unit}", bytes / times)
+}
+
+/// As it is read: `400000`, `400000,2GB`.
+impl std::fmt::Display for Budget {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.transitions)?;
+        self.memory.map_or(Ok(()), |bytes| write!(f, ",{}", memory(bytes)))
+    }
+}
+
+impl Budget {
+    /// In words.
+    pub fn told(self) -> String {
+        let memory = self.memory.map(|bytes| format!(" and {} of memory", memory(bytes)));
+        format!("{}{}", count(self.transitions, "transition"), memory.unwrap_or_default())
+    }
+}
+
+/// What the process takes up in memory, in bytes; none: the system does not tell.
+fn taken_up() -> Option<u64> {
+    let told = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = told.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1_024)
+}
+
+/// How soon a line tells how far it is: what is over before needs none.
+const TELLS_AFTER: Duration = Duration::from_millis(500);
+
+/// Following that is under way.
+pub struct Following {
+    budget: Budget,
+    clock: Clock,
+    began: Time,
+    bar: ProgressBar,
+    /// Ctrl-C came.
+    interrupted: Arc<AtomicBool>,
+    signals: Vec<SigId>,
+    told: Cell<Time>,
+}
+
+impl Following {
+    /// From now on. The first Ctrl-C ends it, the second one the process, as it would without us.
+    ///
+    /// # Errors
+    /// The operating system does not tell how much memory is taken up, and that is bounded.
+    pub fn new(budget: Budget, silent: bool) -> Result<Self, Failure> {
+        if budget.memory.is_some() && taken_up().is_none() {
+            return Err(Failure::usage(
+                CLI_MEMORY_UNKNOWN,
+                "the system does not tell how much memory this process takes up",
+                "give `--budget` a number of transitions",
+            ));
+        }
+        let interrupted = Arc::new(AtomicBool::new(false));
+        // Where signals cannot be watched the first one ends the process.
+        let watched = signal_hook::flag::register_conditional_default(SIGINT, interrupted.clone());
+        let watched =
+            watched.and_then(|ends| Ok(vec![ends, signal_hook::flag::register(SIGINT, interrupted.clone())?]));
+        let shown = std::io::stderr().is_terminal() && !silent;
+        let bar = ProgressBar::with_draw_target(
+            None,
+            if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() },
+        );
+        bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
+        let clock = Clock::real();
+        let began = clock.now();
+        Ok(Self {
+            budget,
+            clock,
+            began,
+            bar,
+            interrupted,
+            signals: watched.unwrap_or_default(),
+            told: Cell::new(began),
+        })
+    }
+
+    /// Tells how far it is, and whether it goes on.
+    ///
+    /// # Errors
+    /// It does not, and why.
+    pub fn goes_on(&self, far: Far) -> Result<(), Halt> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(Halt::Interrupted);
+        }
+        let over = |most: u64| taken_up().is_some_and(|bytes| bytes > most);
+        if self.budget.memory.is_some_and(over) {
+            return Err(Halt::Memory);
+        }
+        let now = self.clock.now();
+        let spent = now.since(self.began);
+        if spent >= TELLS_AFTER && !self.bar.is_hidden() && now.since(self.told.get()) >= Duration::from_millis(100) {
+            self.told.set(now);
+            #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let rate = (far.states as f64 / spent.as_secs_f64()) as u64;
+            self.bar.set_message(format!(
+                "following: {}, {} of {}; {rate} states/s; Ctrl-C tells what was found so far",
+                count(far.states, "state"),
+                count(far.transitions, "transition"),
+                self.budget.told(),
+            ));
+            self.bar.tick();
+        }
+        Ok(())
+    }
+
+    /// It is over; whether it was interrupted.
+    pub fn over(self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Following {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        self.signals.drain(..).for_each(|id| _ = signal_hook::low_level::unregister(id));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_is_written_as_it_is_read() {
+        for (text, transitions, memory, told) in [
+            ("2M", 2_000_000, None, "2000000"),
+            ("0.5k", 500, None, "500"),
+            ("1.25g", 1_000_000_000, None, ""),
+            ("2 GB", limits::CHECK_TRANSITIONS, Some(2_000_000_000), "400000,2GB"),
+            ("1.5GB, 7", 7, Some(1_500_000_000), "7,1500MB"),
+            ("9B", limits::CHECK_TRANSITIONS, Some(9), "400000,9B"),
+        ] {
+            match text.parse::<Budget>() {
+                Ok(budget) => {
+                    assert_eq!(budget, Budget { transitions, memory }, "{text}");
+                    assert_eq!(budget.to_string(), told, "{text}");
+                    assert_eq!(told.parse(), Ok(budget), "{text}");
+                }
+                Err(why) => assert!(told.is_empty(), "{text}: {why}"),
+            }
+        }
+        for none in ["", "M", ".5M", "1e3", "1.2345k", "+3", "3,4", "1GB,2GB", "99999999999999999999", "5TB", "١"] {
+            assert!(none.parse::<Budget>().is_err(), "{none}");
+        }
+    }
+}
