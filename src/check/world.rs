@@ -170,7 +170,6 @@ impl<'a> Worlds<'a> {
             operator: &self.operator,
             context: &self.context,
             at: Time::default(),
-            busy: false,
             held: &[],
             // All that one coordinator asks for is begun after what it asked before, and one operator is followed at a time.
             places: &[],

@@ -142,14 +142,15 @@ impl Engine {
         let stop = Arc::<AtomicBool>::default();
         let step = |i: &u32| &running.machine.step(*i).step;
         steps.iter().for_each(|i| self.tell_started(step(i)));
-        let deadline = running.machine.deadline(started);
-        let patience = running.machine.spec().patience;
         let (call, deadline) = match *steps {
-            [i] => (Call::Execute(step(&i).clone(), running.enters_quarantine), deadline),
-            // The last of them begins within the turn.
+            [i] => (Call::Execute(step(&i).clone(), running.enters_quarantine), running.machine.deadline(i, started)),
             _ => {
                 let several = steps.iter().map(|i| step(i).clone()).collect();
-                let until = (deadline + limits::BRIEF_TURN).min(running.machine.spec().until);
+                let all = || steps.iter().map(|i| running.machine.limit_of(*i));
+                let patience = all().map(|limit| limit.patience).max().unwrap_or_default();
+                let latest = all().map(|limit| limit.until).max().unwrap_or(Time::NEVER);
+                // The last of them begins within the turn.
+                let until = (started + patience + limits::BRIEF_TURN).min(latest);
                 (Call::Several(several, patience, stop.clone()), until)
             }
         };

@@ -16,6 +16,7 @@ use crate::stack::{Requester, World};
 use crate::system::System;
 use crate::time::{Clock, Join, Receiver, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -124,22 +125,29 @@ impl ConfiguratorHandle {
     /// Submits requests; never blocks.
     ///
     /// # Errors
-    /// [`Full`] when the queue is full or the configurator has ended; each request has then been answered *failed*.
+    /// [`Full`] when the queue is full or the configurator has ended; each request that found no room has then been answered
+    /// *failed*. What is safe has room of its own, also in a batch whose other requests find none.
     pub fn submit(&self, batch: Batch) -> Result<(), Full> {
         if batch.requests.is_empty() {
             return Ok(());
         }
-        let safe = |request: &&Request| matches!(request.ask, Ask::Apply(id) if self.inner.safe.contains(&id));
-        let safe = batch.requests.iter().filter(safe).count();
-        self.inner.post.batch(batch, safe).map_err(|batch| {
-            let at = self.inner.clock.now();
-            for request in batch.requests {
-                let verdict = request.ask.failed();
-                let reason = Some(Arc::new(Reason::Full));
-                (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
-            }
-            Full
-        })
+        let is_safe = |request: &Request| matches!(request.ask, Ask::Apply(id) if self.inner.safe.contains(&id));
+        let safe = batch.requests.iter().filter(|request| is_safe(request)).count();
+        let Err(batch) = self.inner.post.batch(batch, safe) else { return Ok(()) };
+        // What is safe does not wait for room that the rest of its batch does not find.
+        let (apart, mut refused): (SmallVec<[Request; 2]>, SmallVec<[Request; 2]>) =
+            batch.requests.into_iter().partition(|request| safe > 0 && is_safe(request));
+        let number = apart.len();
+        let apart = Batch { requests: apart };
+        let alone = if number > 0 && !refused.is_empty() { self.inner.post.batch(apart, number) } else { Err(apart) };
+        refused.extend(alone.err().into_iter().flat_map(|batch| batch.requests));
+        let at = self.inner.clock.now();
+        for request in refused {
+            let verdict = request.ask.failed();
+            let reason = Some(Arc::new(Reason::Full));
+            (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
+        }
+        Err(Full)
     }
 
     /// Tells what the platform reported; never blocks. Faults and late returns change the picture of the system, a raised

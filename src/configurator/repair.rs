@@ -129,7 +129,7 @@ impl Engine {
             if !steps.is_empty() && (asked || !moves) {
                 let list = in_order(&self.world.system, steps).unwrap_or_default();
                 let plan = own_plan(list, &self.world.system);
-                let spec = Spec { asked_back: asked, ..self.effort(crate::time::Time::NEVER) };
+                let spec = Spec { asked_back: asked, ..self.effort([]) };
                 let _ = self.carry_out_for(serves, Transaction::new(plan, spec));
                 observed = self.read(&components);
             }

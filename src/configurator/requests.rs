@@ -9,13 +9,14 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Planned, Requester, Rules, Stopped, Why, settle,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Planned, Requester, Rules, Stopped, Why, settle,
     take_up,
 };
 use crate::time::Time;
-use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Transaction};
+use crate::transaction::{BrokenPart, Input, Limit, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What was carried out of a group.
 struct Carried<'c> {
@@ -62,7 +63,6 @@ impl Engine {
                 continue;
             }
             let configurations = self.given.configurations.clone();
-            let busy = self.desk.under_way().len() > 1 || self.desk.waiting().next().is_some();
             let held = self.held_frames();
             let places = self.places_taken();
             let rules = Rules {
@@ -70,7 +70,6 @@ impl Engine {
                 operator: &self.given.operator,
                 context: &self.given.context,
                 at: self.given.clock.now(),
-                busy,
                 held: &held,
                 places: &places,
                 joined: false,
@@ -144,15 +143,31 @@ impl Engine {
         }
     }
 
-    /// How a plan is carried out: the time that its configurations give themselves, which then is also how long one step of
-    /// theirs, or of their undoing, may take.
+    /// How a plan is carried out: each of its parts in the time that the configuration gives itself.
     pub(super) fn spec(&self, planned: &Planned, asked_back: bool) -> Spec {
-        let of = |id: &ConfigId| self.given.configurations.get(id).and_then(|c| c.timeout);
-        let timeout = planned.parts.iter().filter_map(|part| part.pushes.as_ref().and_then(of)).max();
-        let popped = planned.popped.iter().filter_map(|frame| of(&frame.configuration)).max();
-        let patience = self.given.limits.step_timeout.max(timeout.unwrap_or_default()).max(popped.unwrap_or_default());
-        let until = timeout.map_or(Time::NEVER, |limit| self.given.clock.now() + limit);
-        Spec { until, timeout: timeout.unwrap_or_default(), patience, best_effort: false, asked_back }
+        let now = self.given.clock.now();
+        let limit = |part: &Part| {
+            let own = part.pushes.and_then(|id| self.given.configurations.get(&id)?.timeout);
+            let popped = planned.popped.iter().filter(|frame| part.edits.pops.iter().any(|(id, _)| *id == frame.id));
+            let patience = self.patience(part.pushes.into_iter().chain(popped.map(|frame| frame.configuration)));
+            let until = own.map_or(Time::NEVER, |limit| now + limit);
+            Limit { until, timeout: own.unwrap_or_default(), patience }
+        };
+        let mut limits: SmallVec<[Limit; 1]> = planned.parts.iter().map(limit).collect();
+        if limits.iter().all(|limit| *limit == limits[0]) {
+            limits.truncate(1);
+        }
+        if limits.is_empty() {
+            limits.push(Limit::patient(self.given.limits.step_timeout));
+        }
+        Spec { limits, best_effort: false, asked_back }
+    }
+
+    /// How long one step of these configurations, or of their undoing, may take: as long as one gives itself, where that is
+    /// longer than a step's own time.
+    pub(super) fn patience(&self, ids: impl IntoIterator<Item = ConfigId>) -> Duration {
+        let own = ids.into_iter().filter_map(|id| self.given.configurations.get(&id)?.timeout);
+        own.fold(self.given.limits.step_timeout, Duration::max)
     }
 
     /// A transaction is over.

@@ -9,7 +9,6 @@ use super::running::{Purpose, Running};
 use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
 use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
-use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
@@ -71,13 +70,7 @@ impl Engine {
         }
         touched.planned_at(self.world.system.revision());
         self.safety.troubles.push((request.id, troubles));
-        let spec = Spec {
-            until: Time::NEVER,
-            timeout: Duration::ZERO,
-            patience: self.given.limits.step_timeout,
-            best_effort: true,
-            asked_back: false,
-        };
+        let spec = Spec { asked_back: false, ..self.effort([configuration.id]) };
         let purpose = Purpose::Safe(Box::new((request, frame, touched)));
         let machine = Transaction::new(planned, spec);
         let running =

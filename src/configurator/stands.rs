@@ -18,8 +18,8 @@ impl Engine {
         let (condition, until) = match question {
             Question::Stands { part } => {
                 let id = running.machine.planned().parts[part].pushes;
-                let limit = running.machine.spec().until;
-                let until = if limit == Time::NEVER { now + self.given.limits.step_timeout } else { limit };
+                let limit = running.machine.spec().limit(part);
+                let until = if limit.until == Time::NEVER { now + limit.patience } else { limit.until };
                 (id.and_then(|id| self.given.configurations.get(&id)?.holds.clone()), until)
             }
             Question::WasDone { step } => {

@@ -33,14 +33,16 @@ impl Engine {
         self.changed();
     }
 
-    /// A batch without what is refused since everything is being stopped; none: nothing of it is left. What is safe is
-    /// never refused.
+    /// A batch without what is refused since everything is being stopped, or led down since the event that ends it came (there
+    /// force may do it, which `check` does not follow); none: nothing of it is left. What is safe is never refused.
     pub(super) fn without_refused(&mut self, mut batch: Batch) -> Option<Batch> {
-        if self.began.is_some() {
+        let stopping = self.began.is_some();
+        if stopping || self.leaving {
             let safe = |id: ConfigId| self.given.configurations.get(&id).is_some_and(|c| c.safe);
             let refused = |request: &Request| {
                 let safe = matches!(request.ask, Ask::Apply(id) if safe(id));
-                request.why == Why::Asked && request.requester == Requester::Operator && !safe
+                let asked = request.why == Why::Asked && request.requester == Requester::Operator;
+                asked && !safe && (stopping || !request.force)
             };
             let out: Vec<Request> = batch.requests.iter().copied().filter(refused).collect();
             batch.requests.retain(|request| !out.contains(request));
@@ -186,7 +188,7 @@ impl Engine {
         }
         let edits = planned.parts[0].edits.clone();
         let mut spec = self.spec(&planned, false);
-        spec.until = spec.until.min(deadline);
+        spec.limits.iter_mut().for_each(|limit| limit.until = limit.until.min(deadline));
         let since = self.world.stack.next();
         match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
             Some(PartEnd::Done) | None => {

@@ -10,10 +10,9 @@ use crate::plan::{PlannedStep, Stage};
 use crate::stack::{Broken, Effort, FrameId, Part, Planned, Requester, Residual, Why, effort};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
-use crate::transaction::{Input, Spec, Transaction};
+use crate::transaction::{Input, Limit, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
-use std::time::Duration;
 
 impl Engine {
     pub(super) fn command(&mut self, command: Command) {
@@ -162,7 +161,7 @@ impl Engine {
             let Effort { mut planned, troubles: left_out, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
             // What brings it to rest may take the time that it gives itself.
-            let patience = configuration.timeout.unwrap_or_default().max(self.given.limits.step_timeout);
+            let patience = self.patience([*id]);
             let (mut whole, mut troubles) = (false, Vec::new());
             for _ in 0..limits::FORCE_ROUNDS {
                 // A safe configuration that somebody asked for keeps everything still.
@@ -176,7 +175,7 @@ impl Engine {
                     break;
                 }
                 let steps = planned.steps.len();
-                let machine = Transaction::new(planned, Spec { patience, ..self.effort(Time::NEVER) });
+                let machine = Transaction::new(planned, self.effort([*id]));
                 let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
                 whole = done.done_so_far().count() == steps;
                 let failed: Vec<PlannedStep> = done.failed_steps().cloned().collect();
@@ -220,15 +219,10 @@ impl Engine {
         self.complete(number).machine
     }
 
-    /// A best effort.
-    pub(super) fn effort(&self, until: Time) -> Spec {
-        Spec {
-            until,
-            timeout: Duration::ZERO,
-            patience: self.given.limits.step_timeout,
-            best_effort: true,
-            asked_back: true,
-        }
+    /// A best effort for these configurations.
+    pub(super) fn effort(&self, of: impl IntoIterator<Item = ConfigId>) -> Spec {
+        let limits = SmallVec::from_iter([Limit::patient(self.patience(of))]);
+        Spec { limits, best_effort: true, asked_back: true }
     }
 
     /// Removes what is there by the difference to nothing, again where something is left: a step that failed once need not
@@ -260,7 +254,9 @@ impl Engine {
                 .into_iter()
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !quarantined.contains(&step.component())),
         );
-        let machine = Transaction::new(own_plan(work, &self.world.system), self.effort(deadline));
+        let mut spec = self.effort([]);
+        spec.limits[0].until = deadline;
+        let machine = Transaction::new(own_plan(work, &self.world.system), spec);
         let done = self.carry_out(machine);
         down.forced.extend(done.done_so_far().map(|(planned, _)| planned.step.clone()));
         down.troubles.extend(troubles_of(done));

@@ -28,8 +28,6 @@ pub struct Rules<'a> {
     pub context: &'a Context,
     /// When.
     pub at: Time,
-    /// Whether other requests are under way.
-    pub busy: bool,
     /// Frames that others under way pop or hand over to, and those that wait for their confirmation.
     pub held: &'a [FrameId],
     /// Who asked for the pushes under way beside it: these have taken their places on the stack ([`places`]).
@@ -319,9 +317,6 @@ fn resolve<'a>(
             None => tell(failed, Reason::NothingToUndo),
         },
         Ask::UndoTo(left) => {
-            if rules.busy {
-                return tell(failed, Reason::Busy);
-            }
             if let Some(broken) = world.broken.first() {
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }
@@ -334,9 +329,6 @@ fn resolve<'a>(
             }
         }
         Ask::Commit { force } => {
-            if rules.busy {
-                return tell(failed, Reason::Busy);
-            }
             if let Some(broken) = world.broken.first() {
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }

@@ -23,7 +23,12 @@ impl Transaction {
     /// A step of the list in hand that is carried out from `now` on.
     pub fn doing(&self, number: u32, now: Time) -> Doing<'_> {
         let part = if self.planned.parts.len() == 1 { 0 } else { self.part_of_step(number) };
-        Doing { step: &self.step(number).step, part, undoing: self.is_going_back(), deadline: self.deadline(now) }
+        Doing {
+            step: &self.step(number).step,
+            part,
+            undoing: self.is_going_back(),
+            deadline: self.deadline(number, now),
+        }
     }
 
     /// Carries out what [`Self::poll`] would let begin, as long as these are immediate steps, nothing else is to be done
@@ -43,10 +48,9 @@ impl Transaction {
         if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
             return 0;
         }
-        let timeout = self.spec.timeout;
         let mut count = 0;
         while count < most && goes_on() {
-            let Some(number) = self.in_hand_mut().next_immediate(live, *now, execution, timeout) else { break };
+            let Some(number) = self.in_hand_mut().next_immediate(live, *now, execution) else { break };
             let outcome = execute(self.doing(number, *now), now);
             count += 1;
             if matches!(outcome, Outcome::Done(_)) {

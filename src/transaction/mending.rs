@@ -7,7 +7,6 @@ use super::{Can, Phase, Transaction};
 use crate::model::{OnFailure, RunState, Snapshot, Step};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, View as _, moves_any, step};
-use crate::time::Time;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
@@ -99,7 +98,7 @@ impl Transaction {
     fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.mending.target = Some(Box::new(target));
         let list = chain(steps);
-        self.back = Some((Run::new(Arc::new(list), Time::NEVER), WayBack::default()));
+        self.back = Some((Run::untimed(Arc::new(list)), WayBack::default()));
         self.phase = Phase::Mending;
     }
 }

@@ -2,24 +2,7 @@
 
 use super::touched::Touched;
 use crate::model::{ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
-use crate::time::Time;
 use smallvec::SmallVec;
-use std::time::Duration;
-
-/// How a transaction is carried out.
-#[derive(Debug, Clone, Copy)]
-pub struct Spec {
-    /// No step of it begins later.
-    pub until: Time,
-    /// What that time is, from its beginning, for words.
-    pub timeout: Duration,
-    /// How long one step may take.
-    pub patience: Duration,
-    /// Every step is tried, past failures, and none is taken back: a safe configuration.
-    pub best_effort: bool,
-    /// Somebody asked for what a way back would do: it may move.
-    pub asked_back: bool,
-}
 
 /// What whoever drives it can do now.
 pub struct Can<'a> {

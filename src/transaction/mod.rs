@@ -20,6 +20,7 @@ mod end;
 mod endings;
 mod heed;
 mod immediate;
+mod limits;
 mod mending;
 mod messages;
 mod order;
@@ -31,7 +32,8 @@ mod touched;
 pub use end::{BrokenPart, End, PartEnd};
 pub use endings::{Stopping, can_fail, endings};
 pub use immediate::Doing;
-pub use messages::{Can, Input, Poll, Question, Spec};
+pub use limits::{Limit, Spec};
+pub use messages::{Can, Input, Poll, Question};
 pub use touched::Touched;
 
 use crate::model::{ComponentName, Outcome, Snapshot, Step};
@@ -128,11 +130,14 @@ pub struct Transaction {
 impl Transaction {
     /// A transaction that has not begun.
     pub fn new(mut planned: Planned, spec: Spec) -> Self {
-        let mut forward = Run::new(std::mem::take(&mut planned.steps), spec.until);
+        let list = std::mem::take(&mut planned.steps);
+        let limits = spec.limits_of(&planned, list.len());
+        let mut forward = Run::new(list, limits);
         forward.tries_all = spec.best_effort;
         forward.notes = spec.best_effort;
         Self {
             planned,
+            asked_back: spec.asked_back,
             spec,
             phase: Phase::Forward,
             forward: Some(forward),
@@ -153,7 +158,6 @@ impl Transaction {
             late_back: Vec::new(),
             stopped_by: None,
             given_up: SmallVec::new(),
-            asked_back: spec.asked_back,
             interrupted: false,
             held: false,
             taken_down: false,
@@ -230,12 +234,6 @@ impl Transaction {
                     .unwrap_or(self.planned.parts.len() - 1)
             }
         }
-    }
-
-    /// How long a step may take that begins now.
-    pub fn deadline(&self, now: Time) -> Time {
-        let deadline = now + self.spec.patience;
-        if self.back.is_some() { deadline } else { deadline.min(self.spec.until) }
     }
 
     /// Steps of the forward list that were done so far, in order, with what takes each back: what a safe configuration that
@@ -337,10 +335,9 @@ impl Transaction {
             match self.phase {
                 Phase::Forward | Phase::Back | Phase::Mending => {
                     let stopped = self.is_stopped();
-                    let timeout = self.spec.timeout;
                     let run = self.in_hand_mut();
                     if !stopped && !run.stops() {
-                        let begun = run.begin(live, now, can, timeout);
+                        let begun = run.begin(live, now, can);
                         if !begun.is_empty() {
                             return Poll::Begin(begun);
                         }
@@ -476,7 +473,7 @@ impl Transaction {
             return;
         }
         self.attempts += 1;
-        let mut run = Run::new(Arc::new(way.list.clone()), Time::NEVER);
+        let mut run = Run::untimed(Arc::new(way.list.clone()));
         run.late_from_now = false;
         self.back = Some((run, way));
         self.phase = Phase::Back;

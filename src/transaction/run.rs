@@ -1,5 +1,6 @@
 //! One list of steps being carried out: which may begin, what came of those that did, what is not known yet.
 
+use super::limits::Limit;
 use super::messages::Can;
 use super::order::Order;
 use crate::limits;
@@ -43,8 +44,8 @@ pub(super) struct Run {
     pub out: usize,
     /// Failures do not stop it: a best effort.
     pub tries_all: bool,
-    /// No step begins later.
-    pub until: Time,
+    /// How long each step may take, or all of them.
+    limits: SmallVec<[Limit; 1]>,
     /// Steps that came in after a safe configuration had begun.
     pub late: Vec<Late>,
     pub late_from_now: bool,
@@ -64,7 +65,8 @@ pub(super) struct Late {
 }
 
 impl Run {
-    pub fn new(list: Arc<Vec<PlannedStep>>, until: Time) -> Self {
+    /// With one limit for all steps, or one for each.
+    pub fn new(list: Arc<Vec<PlannedStep>>, limits: SmallVec<[Limit; 1]>) -> Self {
         Self {
             state: vec![State::Waiting; list.len()],
             done: Vec::with_capacity(list.len()),
@@ -77,12 +79,21 @@ impl Run {
             unread: Vec::new(),
             out: 0,
             tries_all: false,
-            until,
+            limits,
             late: Vec::new(),
             late_from_now: false,
             notes: false,
             noted: Vec::new(),
         }
+    }
+
+    /// Whose steps begin however late it is.
+    pub fn untimed(list: Arc<Vec<PlannedStep>>) -> Self {
+        Self::new(list, smallvec![Limit::patient(std::time::Duration::MAX)])
+    }
+
+    fn limit(&self, i: usize) -> &Limit {
+        self.limits.get(i).unwrap_or(&self.limits[0])
     }
 
     /// Whether no further step of it begins.
@@ -126,13 +137,7 @@ impl Run {
 
     /// The next steps that begin now: an immediate one, a blocking one, or several brief ones. Those that must not begin
     /// fail here. Empty: nothing can begin.
-    pub fn begin(
-        &mut self,
-        live: &System,
-        now: Time,
-        can: &Can<'_>,
-        timeout: std::time::Duration,
-    ) -> SmallVec<[u32; 1]> {
+    pub fn begin(&mut self, live: &System, now: Time, can: &Can<'_>) -> SmallVec<[u32; 1]> {
         let (execution, room) = (can.execution, can.room);
         let kind = |planned: &PlannedStep| execution(&planned.step);
         while self.order.is_none() && self.at < self.list.len() {
@@ -160,7 +165,7 @@ impl Run {
                     if self.out > 0 {
                         return smallvec![];
                     }
-                    if let Some(i) = self.immediate(live, now, timeout) {
+                    if let Some(i) = self.immediate(live, now) {
                         return smallvec![i];
                     }
                 }
@@ -168,21 +173,21 @@ impl Run {
                     if self.out > 0 || !room {
                         return smallvec![];
                     }
-                    let begun = self.brief(live, now, &kind, can, timeout);
+                    let begun = self.brief(live, now, &kind, can);
                     if !begun.is_empty() {
                         return begun;
                     }
                 }
             }
         }
-        if self.order.is_some() { self.side_by_side(live, now, can, timeout) } else { smallvec![] }
+        if self.order.is_some() { self.side_by_side(live, now, can) } else { smallvec![] }
     }
 
     /// The immediate step at the present place, which is out from now on. None: it must not begin, and has failed.
     #[inline]
-    fn immediate(&mut self, live: &System, now: Time, timeout: std::time::Duration) -> Option<u32> {
+    fn immediate(&mut self, live: &System, now: Time) -> Option<u32> {
         let i = self.at as u32;
-        if !self.gate(i, live, now, timeout) {
+        if !self.gate(i, live, now) {
             return None;
         }
         self.state[self.at] = State::Out(live.revision());
@@ -193,13 +198,7 @@ impl Run {
     /// What [`Self::begin`] begins where that is an immediate step in the list's own order, with nothing to be looked at
     /// before; it is out from now on.
     #[inline]
-    pub fn next_immediate(
-        &mut self,
-        live: &System,
-        now: Time,
-        execution: &impl Fn(&Step) -> Execution,
-        timeout: std::time::Duration,
-    ) -> Option<u32> {
+    pub fn next_immediate(&mut self, live: &System, now: Time, execution: &impl Fn(&Step) -> Execution) -> Option<u32> {
         let plain = self.order.is_none() && self.out == 0 && self.unread.is_empty();
         if !plain || self.stops() {
             return None;
@@ -208,7 +207,7 @@ impl Run {
             self.at += 1;
         }
         let immediate = execution(&self.list[self.at].step) == Execution::Immediate;
-        if immediate { self.immediate(live, now, timeout) } else { None }
+        if immediate { self.immediate(live, now) } else { None }
     }
 
     /// The immediate step that was begun last was done. In the same breath, so that nothing can have come between the look at
@@ -227,7 +226,6 @@ impl Run {
         now: Time,
         kind: &dyn Fn(&PlannedStep) -> Execution,
         can: &Can<'_>,
-        timeout: std::time::Duration,
     ) -> SmallVec<[u32; 1]> {
         let mut items: SmallVec<[u32; 1]> = SmallVec::new();
         let mut about = FxHashSet::<ComponentName>::default();
@@ -240,14 +238,16 @@ impl Run {
                 || kind(&self.list[at]) != Execution::Brief
                 || !about.insert(step.component())
                 || is_busy(step, can)
+                // Those that begin together end together.
+                || items.first().is_some_and(|first| self.limit(*first as usize) != self.limit(at))
             {
                 break;
             }
             // What is wrong with a later one is found when its turn comes.
-            let allowed = now < self.until && step::precondition(step, live).is_empty();
+            let allowed = now < self.limit(at).until && step::precondition(step, live).is_empty();
             if !allowed {
                 if items.is_empty() {
-                    self.gate(at as u32, live, now, timeout);
+                    self.gate(at as u32, live, now);
                     return items;
                 }
                 break;
@@ -261,15 +261,9 @@ impl Run {
         items
     }
 
-    fn side_by_side(
-        &mut self,
-        live: &System,
-        now: Time,
-        can: &Can<'_>,
-        timeout: std::time::Duration,
-    ) -> SmallVec<[u32; 1]> {
+    fn side_by_side(&mut self, live: &System, now: Time, can: &Can<'_>) -> SmallVec<[u32; 1]> {
         let mut later = SmallVec::<[u32; 1]>::new();
-        let begun = self.free_ones(live, now, can, timeout, &mut later);
+        let begun = self.free_ones(live, now, can, &mut later);
         if let Some(order) = &mut self.order {
             later.into_iter().for_each(|i| order.again(i));
         }
@@ -282,7 +276,6 @@ impl Run {
         live: &System,
         now: Time,
         can: &Can<'_>,
-        timeout: std::time::Duration,
         later: &mut SmallVec<[u32; 1]>,
     ) -> SmallVec<[u32; 1]> {
         loop {
@@ -312,7 +305,7 @@ impl Run {
                 later.extend::<SmallVec<[u32; 1]>>(busy);
                 ready = free;
             }
-            ready.retain(|i| self.gate(*i, live, now, timeout));
+            ready.retain(|i| self.gate(*i, live, now));
             if !ready.is_empty() {
                 for i in &ready {
                     self.state[*i as usize] = State::Out(live.revision());
@@ -326,9 +319,10 @@ impl Run {
     /// Whether a step may be given to the platform now: its precondition on the live model, and the time. If not, it has
     /// failed.
     #[inline]
-    fn gate(&mut self, i: u32, live: &System, now: Time, timeout: std::time::Duration) -> bool {
-        let refused = if now >= self.until {
-            Some(Reason::Timeout(timeout))
+    fn gate(&mut self, i: u32, live: &System, now: Time) -> bool {
+        let limit = self.limit(i as usize);
+        let refused = if now >= limit.until {
+            Some(Reason::Timeout(limit.timeout))
         } else {
             false_precondition(&self.list[i as usize].step, live)
         };

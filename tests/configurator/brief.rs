@@ -126,6 +126,21 @@ fn every_manner_leads_to_the_same() {
     }
 }
 
+/// The way back takes its time: several brief steps are not late because those that they take back were.
+#[test]
+fn what_was_too_slow_is_taken_back() {
+    let calls = Arc::new(AtomicUsize::new(0));
+    let counted = calls.clone();
+    let mut all = scenario();
+    all.iter_mut().filter(|c| c.id == id("make")).for_each(|c| c.timeout = Some(Duration::from_millis(250)));
+    let wrap = move |inner| Arc::new(Hasty { inner, manner: Manner::Slow(100), calls: counted }) as Arc<dyn Platform>;
+    let rig = Rig::with(all, Options { blocking: true, ..Options::default() }, wrap);
+    assert_eq!(rig.ask("make"), ["make.failed"]);
+    assert!(rig.see().is_empty());
+    rig.each_answered_once();
+    rig.in_step();
+}
+
 #[test]
 fn a_platform_that_breaks_its_word_is_read_back() {
     for manner in [Manner::Silent, Manner::Panics, Manner::Lost] {

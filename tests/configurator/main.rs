@@ -13,4 +13,5 @@ mod safe_ends;
 mod survival;
 mod table;
 mod teardown;
+mod times;
 mod way_out;

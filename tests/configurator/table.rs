@@ -286,7 +286,10 @@ fn a_full_queue_is_answered() {
     assert!(refused >= 100, "{refused}");
     assert_eq!(rig.events().iter().filter(|e| *e == "eight.failed").count(), refused, "at once");
     assert!(rig.submit_as("quiet", coordinator("c1")).is_ok(), "a safe one gets in");
+    // As where a state with a configuration of its own is left for one that is safe.
+    assert!(rig.submit_as("eight.undo quiet", coordinator("c1")).is_err(), "not all of it gets in");
     rig.wait(100.0);
+    assert_eq!(rig.events().iter().filter(|e| *e == "quiet.ok").count(), 2, "what is safe does");
     rig.each_answered_once();
 }
 

@@ -12,7 +12,7 @@ use davit::plan::PlannedStep;
 use davit::stack::{Op, Planned, Stack, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
-use davit::transaction::{Can, Input, PartEnd, Poll, Spec, Touched, Transaction};
+use davit::transaction::{Can, Input, Limit, PartEnd, Poll, Spec, Touched, Transaction};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -79,9 +79,7 @@ impl Bench {
 
     pub fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
         let spec = Spec {
-            until: Time::NEVER,
-            timeout: Duration::ZERO,
-            patience: Duration::from_secs(1),
+            limits: SmallVec::from_iter([Limit::patient(Duration::from_secs(1))]),
             best_effort: false,
             asked_back: false,
         };
