@@ -267,8 +267,12 @@ pub const HOLDS_COUNTERS: Duration = Duration::from_millis(100);
 /// once, it looks at the whole platform instead.
 pub const PLATFORM_REPORTS: usize = 1024;
 
-/// Commands of the session (views, teardown) that may wait for the configurator.
+/// Commands that only ask (views, `drift`, `recover`) and may wait for the configurator.
 pub const CONFIGURATOR_COMMANDS: usize = 32;
+
+/// Commands that must not be lost: that a coordinator is down, that stopping begins, its stages, the end. A coordinator that
+/// comes down again and again tells it once each time, behind which it waits for its answers.
+pub const CONFIGURATOR_CONTROL: usize = 256;
 
 /// Blocking platform calls made at the same time where the deployment does not say: enough to hide the latency of slow
 /// components behind each other, few enough for a small board.

@@ -1,7 +1,6 @@
 //! Frames that are taken back unless an event confirms them in time.
 
 use super::request::Request;
-use crate::limits;
 use crate::model::{Confirm, EventName};
 use crate::stack::{FrameId, Stack};
 use crate::time::Time;
@@ -25,7 +24,9 @@ impl Confirmations {
     /// An event came that some configuration waits for; `early`: something is under way that it may be meant for.
     pub fn came(&mut self, event: EventName, now: Time, early: bool) {
         self.waiting.retain(|waiting| waiting.event != event);
-        if early && self.heard.len() < limits::HEARD {
+        if early {
+            // The last time counts; there are no more of them than configurations wait for.
+            self.heard.retain(|(heard, _)| *heard != event);
             self.heard.push((event, now));
         }
     }

@@ -186,6 +186,24 @@ pub(super) enum Command {
 }
 
 impl Command {
+    /// Whether somebody only wants to know something, or to change what can be asked for again: there may be many of these.
+    pub fn only_asks(&self) -> bool {
+        matches!(self, Self::View { .. } | Self::Drift { .. } | Self::Recover { .. } | Self::Define { .. })
+    }
+
+    /// Whether it is done where it is taken in; others wait for their turn.
+    pub fn is_immediate(&self) -> bool {
+        !matches!(
+            self,
+            Self::Drift { .. }
+                | Self::Recover { .. }
+                | Self::TakeBack { .. }
+                | Self::Force { .. }
+                | Self::DiscardStack
+                | Self::Stop
+        )
+    }
+
     /// Whether what is under way gives way to it.
     pub fn is_urgent(&self) -> bool {
         matches!(self, Self::TakeBack { .. } | Self::Force { .. } | Self::Stop)

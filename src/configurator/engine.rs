@@ -136,10 +136,13 @@ impl Engine {
         while !self.stopping {
             if let Err(payload) = catch_unwind(AssertUnwindSafe(|| self.work())) {
                 let text = crate::time::clock::panic_text(&*payload);
-                // A panic while starting anew must not end the thread either: then there is no picture to be had.
+                // A panic while starting anew must not end the thread either: then there is no picture to be had, and who asked is
+                // told so.
                 if catch_unwind(AssertUnwindSafe(|| self.start_anew(&text))).is_err() {
-                    self.current.clear();
                     self.running.clear();
+                    self.desk.under_way().to_vec().iter().for_each(|turn| self.desk.over(turn.number));
+                    let _ = catch_unwind(AssertUnwindSafe(|| self.break_current(&Reason::Panic(text))));
+                    self.current.clear();
                 }
             }
         }
@@ -149,6 +152,7 @@ impl Engine {
     fn work(&mut self) {
         while !self.stopping {
             if let Some(command) = self.commands.pop_front() {
+                self.counts.command_taken(&command);
                 self.command(command);
                 continue;
             }
@@ -225,6 +229,8 @@ impl Engine {
         if self.counts.reports_lost.load(Ordering::Acquire) && self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.report_all(&self.world.system);
             self.returned = true;
+            let (now, early) = (self.given.clock.now(), !self.current.is_empty());
+            self.counts.missed().into_iter().for_each(|event| self.confirmations.came(event, now, early));
         }
     }
 
@@ -244,7 +250,10 @@ impl Engine {
                 self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());
             }
             Mail::Command(command) => {
-                self.counts.command_taken();
+                // What waits for its turn keeps its place until then.
+                if command.is_immediate() {
+                    self.counts.command_taken(&command);
+                }
                 match command {
                     // How things stand can be told at any time.
                     Command::View { system, reply } => {
@@ -435,9 +444,19 @@ impl Engine {
         left.map(|(_, residual)| residual.of_partial(&self.world.system)).collect()
     }
 
+    /// What has begun and was not answered is answered: nobody knows how far it came.
+    fn break_current(&mut self, reason: &Reason) {
+        while let Some((request, begun)) = self.current.pop() {
+            if request.why == Why::Asked {
+                self.tell_answer(request, request.ask.broken(), Some(Arc::new(reason.clone())), begun);
+            }
+        }
+    }
+
     /// Everything that still waits is answered.
     fn bid_farewell(&mut self) {
         self.glance();
+        self.break_current(&Reason::Ended);
         let safe = std::mem::take(&mut self.safety.waiting);
         let waiting = self.desk.cancel_waiting(|_| true);
         for request in safe.into_iter().chain(waiting).filter(|request| request.why == Why::Asked) {

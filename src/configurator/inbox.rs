@@ -3,14 +3,16 @@
 //! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
 //! gets in when the queue of requests is full, and the reply of a worker always does.
 
+use super::control::Command;
 use super::request::{Batch, Request};
 use crate::limits;
 use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
 use crate::platform::{Ended, ObserveError, PlatformEvent};
 use crate::stack::Requester;
 use crate::time::{Clock, Receiver, Sender, TrySendError};
-use std::sync::Arc;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// A call of the platform, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -37,7 +39,7 @@ pub(super) enum Mail {
     /// Conditions that are evaluated for the configurator are so, or are so no more.
     Truths,
     /// To be done between requests, in the configurator's own thread.
-    Command(super::control::Command),
+    Command(Command),
 }
 
 #[derive(Default)]
@@ -56,8 +58,11 @@ pub(super) struct Counts {
     pub told: AtomicBool,
     reports: AtomicUsize,
     commands: AtomicUsize,
-    /// Reports did not fit: the platform must be looked at as a whole.
+    control: AtomicUsize,
+    /// Reports did not fit: the platform must be looked at as a whole, and events are among those missed.
     pub reports_lost: AtomicBool,
+    /// Events that did not fit, each once: looking at the platform does not tell them.
+    missed: Mutex<BTreeSet<EventName>>,
 }
 
 /// The end mail is put in at.
@@ -74,6 +79,7 @@ pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
         + limits::WORKERS_MOST
         + limits::WORKERS_GIVEN_UP
         + limits::CONFIGURATOR_COMMANDS
+        + limits::CONFIGURATOR_CONTROL
         + 1;
     let (sender, receiver) = clock.channel(room);
     (Post { sender, counts: Arc::default() }, receiver)
@@ -85,9 +91,22 @@ impl Counts {
         self.reports.fetch_sub(1, Ordering::AcqRel);
     }
 
-    /// A command was taken out: its room is free again.
-    pub fn command_taken(&self) {
-        self.commands.fetch_sub(1, Ordering::AcqRel);
+    /// A command was taken up: its room is free again.
+    pub fn command_taken(&self, command: &Command) {
+        self.room_of(command).0.fetch_sub(1, Ordering::AcqRel);
+    }
+
+    /// Where a command is counted, and how many there may be: whoever only asks takes no place from what must not be lost.
+    fn room_of(&self, command: &Command) -> (&AtomicUsize, usize) {
+        match command.only_asks() {
+            true => (&self.commands, limits::CONFIGURATOR_COMMANDS),
+            false => (&self.control, limits::CONFIGURATOR_CONTROL),
+        }
+    }
+
+    /// Events that did not fit since the last look.
+    pub fn missed(&self) -> BTreeSet<EventName> {
+        std::mem::take(&mut *crate::time::lock(&self.missed))
     }
 }
 
@@ -130,8 +149,12 @@ impl Post {
 
     /// Puts a report or an event in.
     pub fn report(&self, mail: Mail) {
+        let event = if let Mail::Event(event) = mail { Some(event) } else { None };
         if !reserve(&self.counts.reports, 1, limits::PLATFORM_REPORTS) || self.sender.try_send(mail).is_err() {
             // There is much to read: whoever reads it looks at everything then.
+            if let Some(event) = event {
+                crate::time::lock(&self.counts.missed).insert(event);
+            }
             self.counts.reports_lost.store(true, Ordering::Release);
         }
     }
@@ -144,15 +167,15 @@ impl Post {
     }
 
     /// Puts a command in; answers whether there was room.
-    pub fn command(&self, command: super::control::Command) -> bool {
-        reserve(&self.counts.commands, 1, limits::CONFIGURATOR_COMMANDS)
-            && self.sender.try_send(Mail::Command(command)).is_ok()
+    pub fn command(&self, command: Command) -> bool {
+        let (count, bound) = self.counts.room_of(&command);
+        reserve(count, 1, bound) && self.sender.try_send(Mail::Command(command)).is_ok()
     }
 
     /// Says that force is wanted. That is known also when there is no room to wake whoever waits: then there is much to take in.
     pub fn hurry(&self) {
         self.counts.hurried.store(true, Ordering::Release);
-        self.command(super::control::Command::Hurry);
+        self.command(Command::Hurry);
     }
 
     /// Says that the deployment is led down from now on, or that it is brought up. It is for the requests that come after this,
@@ -167,7 +190,7 @@ impl Post {
         if told.load(Ordering::Acquire) == now || told.swap(now, Ordering::AcqRel) == now {
             return;
         }
-        if !self.command(super::control::Command::Leaving(now)) {
+        if !self.command(Command::Leaving(now)) {
             told.store(!now, Ordering::Release);
         }
     }
@@ -176,5 +199,42 @@ impl Post {
     /// wants it.
     pub fn send(&self, mail: Mail) {
         let _ = self.sender.try_send(mail);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An event that a configuration waits for is not among what looking at the platform tells.
+    #[test]
+    fn an_event_that_does_not_fit_is_kept() {
+        let (post, _inbox) = new(&Clock::simulated());
+        let event = |name: &str| EventName::new(name).expect("a name");
+        for _ in 0..limits::PLATFORM_REPORTS {
+            post.report(Mail::Event(event("e_other")));
+        }
+        assert!(post.counts.missed().is_empty());
+        for _ in 0..3 {
+            post.report(Mail::Event(event("e_fine")));
+        }
+        assert!(post.counts.reports_lost.load(Ordering::Acquire));
+        assert_eq!(post.counts.missed(), BTreeSet::from([event("e_fine")]));
+        assert!(post.counts.missed().is_empty(), "taken once");
+    }
+
+    /// Who only asks leaves room for what must not be lost, and keeps its place until it is carried out.
+    #[test]
+    fn asking_takes_no_room_from_what_must_not_be_lost() {
+        let (post, inbox) = new(&Clock::simulated());
+        let drift = || Command::Drift { reply: Clock::simulated().channel(1).0 };
+        let asked = (0..1_000).filter(|_| post.command(drift())).count();
+        assert_eq!(asked, limits::CONFIGURATOR_COMMANDS);
+        let told = (0..1_000).filter(|_| post.command(Command::Stopping)).count();
+        assert_eq!(told, limits::CONFIGURATOR_CONTROL);
+        let Ok(Mail::Command(command)) = inbox.try_recv() else { panic!("a command") };
+        assert!(!post.command(drift()), "it was taken in, and waits");
+        post.counts.command_taken(&command);
+        assert!(post.command(drift()));
     }
 }

@@ -325,3 +325,18 @@ fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
     rig.in_step();
     rig.each_answered_once();
 }
+
+/// Whoever asked for what is under way when the configurator ends is told: nobody knows how far it came.
+#[test]
+fn what_is_under_way_at_the_end_is_answered() {
+    let rig = Rig::with(scenario(), Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
+    rig.inject("create B", Fault::Slow(Duration::from_secs(2)));
+    rig.submit("make");
+    rig.submit("wire");
+    rig.wait(0.5);
+    assert!(rig.handle.stop(rig.clock.now() + Duration::from_secs(60)));
+    let mut events = rig.events();
+    events.sort();
+    assert_eq!(events, ["make.broken", "wire.failed"]);
+    rig.each_answered_once();
+}
