@@ -35,6 +35,10 @@ pub const SOCKET_IDLE: Duration = Duration::from_secs(60);
 /// between its last answer and its end, it has none.
 pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
 
+/// What a command waits beyond its `--within` for what the deployment says at the end of that: its way, also on a machine that is
+/// busy.
+pub const ANSWER_WAY: Duration = Duration::from_secs(1);
+
 /// How often it looks.
 pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 

@@ -172,12 +172,8 @@ fn print(out: &Output, status: &Json) {
         }
     }
     if let Ok(stopping) = serde_json::from_value::<StoppingView>(status["stopping"].clone()) {
-        let held = if stopping.held {
-            ": a safe configuration holds what is left, `davit shutdown --force` lets go".to_owned()
-        } else {
-            stopping.stands_still.map(|still| format!(": stands still, {still}")).unwrap_or_default()
-        };
-        out.line(format!("stopping     {}{held}", stopping.stage.words()));
+        let still = stopping.stands_still().map(|still| format!(": stands still, {still}")).unwrap_or_default();
+        out.line(format!("stopping     {}{still}", stopping.stage.words()));
     }
     if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();

@@ -215,9 +215,8 @@ fn a_script_that_catches_its_interruption_is_stopped_all_the_same() {
     }
 }
 
-/// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
-#[test]
-fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
+/// In which an emergency on the way down is left on that event alone.
+fn stopped_in_an_emergency(left_on: &str) -> (Demo, Foreground) {
     let demo = Demo::new();
     demo.write(
         "deployment.yaml",
@@ -247,10 +246,11 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
           trans { src = \"up\", tgt = \"leaving\", events = { \"e_stop\" } },
           trans { src = \"up\", tgt = \"safe\", events = { \"e_estop\" } },
           trans { src = \"leaving\", tgt = \"safe\", events = { \"e_estop\" } },
-          trans { src = \"safe\", tgt = \"gone\", events = { \"e_stop\" } },
+          trans { src = \"safe\", tgt = \"gone\", events = { \"LEFT_ON\" } },
           trans { src = \"gone\", tgt = \"idle\", events = { \"base.undone\" } },
         }",
     );
+    demo.replace("coordinator.lua", "LEFT_ON", left_on);
     demo.replace("deployment.yaml", "within_s: 1 }", "within_s: 600 }");
     let deployed = deploy(&demo, "out");
     demo.until_phase("up");
@@ -260,6 +260,13 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     assert!(!status.out.contains("stands still"), "{}", status.out);
     let emergency = demo.run(&["event", "e_estop", "--wait", "calm.ok"]);
     assert_eq!(emergency.code, 0, "{}{}", emergency.out, emergency.err);
+    (demo, deployed)
+}
+
+/// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
+#[test]
+fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
+    let (demo, deployed) = stopped_in_an_emergency("e_stop");
     let status = demo.run(&["status"]);
     let says = "stands still, `calm` is in force since ";
     let leads_on =
@@ -271,4 +278,36 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     let down = demo.run(&["shutdown"]);
     assert_eq!(down.code, 0, "{}{}", down.out, down.err);
     assert_eq!(deployed.end().code(), Some(0), "{}", demo.read("out"));
+}
+
+/// A command ends after its `--within`: with the deployment's word where that lives, and what it says is not that nobody answers.
+#[test]
+fn who_waits_for_less_than_it_takes_is_told_so() {
+    let (demo, deployed) = stopped_in_an_emergency("e_estop");
+    let late = demo.run(&["shutdown", "--within", "0.1"]);
+    assert_eq!(late.code, 1, "{}{}", late.out, late.err);
+    for words in ["it is not down yet", "`calm` is in force since ", "cli::refused"] {
+        assert!(late.err.contains(words), "{words}: {}", late.err);
+    }
+    // One that lives no more says nothing, however it is asked.
+    deployed.signal(libc::SIGSTOP);
+    let silent: [&[&str]; 10] = [
+        &["shutdown"],
+        &["event", "e_estop"],
+        &["apply", "calm"],
+        &["apply", "calm", "--no-wait"],
+        &["undo"],
+        &["commit"],
+        &["get", "a.g"],
+        &["set", "a.g", "2"],
+        &["drift"],
+        &["recover", "--back"],
+    ];
+    for command in silent {
+        let ran = demo.run(&[command, &["--within", "0.1"]].concat());
+        assert!(ran.code == 1 && ran.err.contains("cli::no_answer"), "{command:?} {}{}", ran.out, ran.err);
+        let (_, waited) = ran.err.split_once("nothing came within ").expect("for how long");
+        let waited: f64 = waited.split_whitespace().next().and_then(|it| it.parse().ok()).expect("a number");
+        assert!(waited <= 0.1 + davit::limits::ANSWER_WAY.as_secs_f64() + 0.05, "{command:?} {waited}");
+    }
 }
