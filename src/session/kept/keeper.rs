@@ -54,16 +54,27 @@ impl Keeper {
     pub fn open(name: &str, of: &Path, clock: &Clock) -> io::Result<Self> {
         prepared()?;
         let missing = || io::Error::from(io::ErrorKind::NotFound);
-        let life = Arc::new(locked(&file(name, "life").ok_or_else(missing)?)?);
+        let path = file(name, "life").ok_or_else(missing)?;
+        let life = Arc::new(locked(&path)?);
+        // What stands there of an earlier life stays until this one is written; then nothing stays of one that is not kept.
+        let mut none_before = life.metadata()?.len() == 0;
+        Self::keep(name, of, clock, life, &mut none_before).inspect_err(|_| {
+            if none_before {
+                let _ = std::fs::remove_file(&path);
+            }
+        })
+    }
+
+    /// The same, with the record locked. `gone`: nothing stands in that of a life before.
+    fn keep(name: &str, of: &Path, clock: &Clock, life: Arc<File>, gone: &mut bool) -> io::Result<Self> {
+        let missing = || io::Error::from(io::ErrorKind::NotFound);
         let of = std::path::absolute(of).unwrap_or_else(|_| of.to_owned());
-        let began = Began { pid: std::process::id(), began: Wall::now(), file: of, boot: boot() };
+        let own = Some(name.to_owned());
+        let began = Began { name: own, pid: std::process::id(), began: Wall::now(), file: of, boot: boot() };
         let log = Rotating::open(log_file(name).ok_or_else(missing)?, limits::KEPT_BYTES)?;
-        // Last of what may fail: what says that it began has all that is needed to say how it ended.
+        *gone = true;
         life.set_len(0)?;
-        say(&life, &serde_json::to_string(&began).expect("plain data")).inspect_err(|_| {
-            // Half a word would be told as that of one that died.
-            let _ = file(name, "life").map(std::fs::remove_file);
-        })?;
+        say(&life, &serde_json::to_string(&began).expect("plain data"))?;
         let begins = json!({ "at": 0.0, "what": "began", "when": began.began.to_string(), "pid": began.pid });
         let mut writer = Writer { log, story: Story::default(), missing: 0, begins: Some(begins) };
         writer.begin();
