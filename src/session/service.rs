@@ -262,7 +262,11 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
         let taken = wait(session, within, gone, late, |hub| hub.was_heard(ticket));
         session.hub().forget(ticket);
         // What confirms a configuration need not move a coordinator.
-        answer["taken"] = json!(taken? || session.confirms(event));
+        let taken = taken? || session.confirms(event);
+        answer["taken"] = json!(taken);
+        if let Some(note) = (!taken).then(|| session.applied_over_safe(event)).flatten() {
+            answer["note"] = json!(note);
+        }
     } else {
         session.offer(event, "operator").map_err(not_raised)?;
     }

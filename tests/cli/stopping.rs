@@ -215,8 +215,8 @@ fn a_script_that_catches_its_interruption_is_stopped_all_the_same() {
     }
 }
 
-/// In which an emergency on the way down is left on that event alone.
-fn stopped_in_an_emergency(left_on: &str) -> (Demo, Foreground) {
+/// In which an emergency is left on that event alone.
+fn with_an_emergency(left_on: &str) -> Demo {
     let demo = Demo::new();
     demo.write(
         "deployment.yaml",
@@ -235,7 +235,8 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     demo.write(
         "configurations.lua",
         "ConfiguratorConf { base = Configuration { create(\"a\", \"T\"), post_conf_state = { \"a:running\" } },
-          calm = Configuration { safe = true, property_set(\"a.g\", 0.0) } }",
+          calm = Configuration { safe = true, property_set(\"a.g\", 0.0) },
+          fast = Configuration { property_set(\"a.g\", 9.0) } }",
     );
     demo.write(
         "coordinator.lua",
@@ -252,6 +253,12 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     );
     demo.replace("coordinator.lua", "LEFT_ON", left_on);
     demo.replace("deployment.yaml", "within_s: 1 }", "within_s: 600 }");
+    demo
+}
+
+/// The same on the way down.
+fn stopped_in_an_emergency(left_on: &str) -> (Demo, Foreground) {
+    let demo = with_an_emergency(left_on);
     let deployed = deploy(&demo, "out");
     demo.until_phase("up");
     deployed.signal(libc::SIGHUP);
@@ -310,4 +317,22 @@ fn who_waits_for_less_than_it_takes_is_told_so() {
         let waited: f64 = waited.split_whitespace().next().and_then(|it| it.parse().ok()).expect("a number");
         assert!(waited <= 0.1 + davit::limits::ANSWER_WAY.as_secs_f64() + 0.05, "{command:?} {waited}");
     }
+}
+
+/// The coordinator leads: what is safe already hears no emergency. Who sends one is told what was applied over that, and what to do.
+#[test]
+fn an_emergency_that_changes_nothing_says_what_was_applied_over_what_is_safe() {
+    let demo = with_an_emergency("e_stop");
+    let _deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    assert_eq!(demo.run(&["event", "e_estop", "--wait", "calm.ok"]).code, 0);
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.is_empty(), "{}{}", again.out, again.err);
+    assert_eq!(demo.run(&["apply", "fast", "--force"]).code, 0);
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.contains("since then came `fast` by operator"), "{}{}", again.out, again.err);
+    assert!(again.err.contains("`davit apply calm`"), "{}", again.err);
+    assert_eq!(demo.run(&["apply", "calm"]).code, 0, "what it says helps");
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.is_empty(), "{}{}", again.out, again.err);
 }
