@@ -1,7 +1,9 @@
 //! Every bound of the system, with its unit and its reason.
 
+mod asking;
 mod kept;
 
+pub use asking::*;
 pub use kept::*;
 use std::time::Duration;
 
@@ -35,10 +37,6 @@ pub const SOCKET_IDLE: Duration = Duration::from_secs(60);
 /// between its last answer and its end, it has none.
 pub const SOCKET_APPEARS: Duration = Duration::from_secs(2);
 
-/// What a command waits beyond its `--within` for what the deployment says at the end of that: its way, also on a machine that is
-/// busy.
-pub const ANSWER_WAY: Duration = Duration::from_secs(1);
-
 /// How often it looks.
 pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 
@@ -47,9 +45,6 @@ pub const REPORTED_AGAIN: Duration = Duration::from_secs(5);
 
 /// Different events of components that are kept while a deployment is being stopped.
 pub const REPORTED: usize = 64;
-
-/// How often `davit shutdown` tells what it waits for.
-pub const SHUTDOWN_TOLD: Duration = Duration::from_secs(1);
 
 /// How often a script that waits looks whether it is to end.
 pub const SIGNAL_LOOK: Duration = Duration::from_millis(100);
