@@ -72,14 +72,14 @@ pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartErro
     start_open(checked, clock, Played::AsWritten).map(|(session, _)| session)
 }
 
-/// Who says what happens on a simulated platform by itself.
+/// Who says what components of a simulated platform raise by themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Played {
     /// The deployment.
     AsWritten,
     /// The deployment, and somebody who may add faults while it runs.
     Steered,
-    /// Only a script that goes a way: what components raise on it, and what goes wrong, it brings about itself.
+    /// Only a script that goes a way: what components raise on it, it raises itself.
     Replayed,
 }
 
@@ -97,11 +97,13 @@ pub(super) fn start_open(
     let (platform, simulated): (Arc<dyn Platform>, _) = match deployment.platform.as_str() {
         "embedded" => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
         "simulated" => {
-            let mut options =
-                simulated::Options { blocking: played != Played::AsWritten, ..simulated::Options::default() };
-            if played != Played::Replayed {
-                (options.faults, options.reactions) = (faults(deployment), reactions(deployment));
-            }
+            let reactions = if played == Played::Replayed { Vec::new() } else { reactions(deployment) };
+            let options = simulated::Options {
+                faults: faults(deployment),
+                reactions,
+                blocking: played != Played::AsWritten,
+                ..simulated::Options::default()
+            };
             let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
             (Arc::new(platform.clone()), Some(platform))
         }

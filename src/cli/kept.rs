@@ -76,15 +76,13 @@ impl Died {
             out.line(out.paint(Style::Bold, "the last that it told"));
             last.iter().for_each(|entry| out.text(super::log::line(out, entry, false)));
         }
-        let anew = match &life.process {
-            Some(process) => format!("`davit deploy {}` begins anew", process.file.display()),
-            None => format!("`davit list --forget {}` throws away what is there", life.name),
-        };
+        let anew = life.process.as_ref().map(|it| format!(", `davit deploy {}` begins anew", it.file.display()));
         out.line(out.paint(
             Style::Dim,
             format!(
-                "what its components did since is not known: look at the hardware; `davit log {}` shows all that it told, {anew}",
-                life.name
+                "what its components did since is not known: look at the hardware; `davit log {}` shows all that it told{}",
+                life.name,
+                anew.unwrap_or_default()
             ),
         ));
     }

@@ -18,9 +18,25 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 /// Keeps a deployment's log and its life, as long as it is there.
 pub struct Keeper {
-    life: Arc<File>,
+    last: Last,
     tap: Tap<Kept>,
     beat: Arc<Beat>,
+}
+
+/// What a life says last: once, whoever says it first.
+#[derive(Clone)]
+struct Last {
+    life: Arc<File>,
+    said: Arc<Mutex<bool>>,
+}
+
+impl Last {
+    fn say(&self, end: &End) {
+        let mut said = lock(&self.said);
+        if !std::mem::replace(&mut said, true) {
+            let _ = say(&self.life, &serde_json::to_string(end).expect("plain data"));
+        }
+    }
 }
 
 /// Says, in a process that ends at once, that it does.
@@ -82,7 +98,7 @@ impl Keeper {
         let beat = Arc::new(Beat::default());
         let lives = (life.clone(), beat.clone());
         std::thread::Builder::new().name("davit-lives".to_owned()).spawn(move || live(&lives.0, &lives.1))?;
-        Ok(Self { life, tap, beat })
+        Ok(Self { last: Last { life, said: Arc::default() }, tap, beat })
     }
 
     /// What to give to the session.
@@ -102,11 +118,10 @@ impl Keeper {
 
     /// For a process that ends at once.
     pub fn leave(&self) -> Leave {
-        let life = self.life.clone();
+        let last = self.last.clone();
         Box::new(move || {
-            let why =
-                Some("it was ended at once, by a third signal: the components were asked nothing more".to_owned());
-            let _ = say(&life, &serde_json::to_string(&End { at: Wall::now(), why, ended: None }).expect("plain data"));
+            let why = "it was ended at once, by a third signal: the components were asked nothing more".to_owned();
+            last.say(&End { at: Wall::now(), why: Some(why), ended: None });
         })
     }
 
@@ -117,7 +132,7 @@ impl Keeper {
         self.tap.put_own(Kept::Own(own));
         self.tap.finish(limits::TAP_END);
         // Last: what says that it ended has all that happened before it.
-        let _ = say(&self.life, &serde_json::to_string(end).expect("plain data"));
+        self.last.say(end);
     }
 }
 
@@ -220,5 +235,22 @@ impl Writer {
 
     fn put(&mut self, line: &Json) -> io::Result<()> {
         self.log.line(&line.to_string(), || self.story.head().to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_behind_the_end_adds_nothing_to_it() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let last = Last { life: Arc::new(file.reopen().unwrap()), said: Arc::default() };
+        let end = |why: &str| End { at: Wall::now(), why: Some(why.to_owned()), ended: None };
+        last.say(&end("it did not come up"));
+        last.clone().say(&end("a third signal"));
+        let mut text = String::new();
+        io::Read::read_to_string(file.as_file_mut(), &mut text).unwrap();
+        assert!(text.lines().count() == 1 && text.contains("come up"), "{text}");
     }
 }
