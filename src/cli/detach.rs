@@ -83,7 +83,7 @@ pub fn run(context: &Context) -> Answer {
         match line {
             Ok(line) if line == UP => {
                 if lock(&passed).leave_it() {
-                    watch.to_the_end();
+                    watch.until_the_end();
                     return Ok(Exit::Done);
                 }
                 came_up = true;

@@ -45,7 +45,7 @@ impl Watch {
     }
 
     /// Goes on until the process ends, whatever it still has to say.
-    pub fn to_the_end(self) {
+    pub fn until_the_end(self) {
         std::mem::forget(self);
     }
 }
