@@ -69,7 +69,7 @@ impl Voice {
         if lost > 0 {
             out.push(Said {
                 by: Printer::Warn,
-                text: format!("{} left out: too much was printed at once", count(lost, "line")),
+                text: format!("{} left out: too much was printed at once", count(lost, "more line")),
             });
         }
     }
