@@ -1,8 +1,10 @@
 //! Every bound of the system, with its unit and its reason.
 
+mod asking;
 mod check;
 mod kept;
 
+pub use asking::*;
 pub use check::*;
 pub use kept::*;
 use std::time::Duration;
@@ -45,9 +47,6 @@ pub const REPORTED_AGAIN: Duration = Duration::from_secs(5);
 
 /// Different events of components that are kept while a deployment is being stopped.
 pub const REPORTED: usize = 64;
-
-/// How often `davit shutdown` tells what it waits for.
-pub const SHUTDOWN_TOLD: Duration = Duration::from_secs(1);
 
 /// How often a script that waits looks whether it is to end.
 pub const SIGNAL_LOOK: Duration = Duration::from_millis(100);

@@ -10,6 +10,7 @@ mod options;
 mod sandbox;
 mod values;
 
+use super::start::Played;
 use super::{Refused, StartError};
 use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
@@ -333,7 +334,8 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     })?;
     let clock = clock(host);
     host.borrow().faults.fit(&checked)?;
-    let started = super::start::start_open(&checked, &clock, true);
+    let played = if replay { Played::Replayed } else { Played::Steered };
+    let started = super::start::start_open(&checked, &clock, played);
     let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
     host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {

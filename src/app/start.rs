@@ -69,14 +69,25 @@ pub(super) fn rule(fault: &StepFault) -> FaultRule {
 /// # Errors
 /// When the deployment names a platform that this program does not have.
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
-    start_open(checked, clock, false).map(|(session, _)| session)
+    start_open(checked, clock, Played::AsWritten).map(|(session, _)| session)
 }
 
-/// The same, with the platform too, if it is the simulated one. `steered`: somebody may add faults while it runs.
+/// Who says what components of a simulated platform raise by themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Played {
+    /// The deployment.
+    AsWritten,
+    /// The deployment, and somebody who may add faults while it runs.
+    Steered,
+    /// Only a script that goes a way: what components raise on it, it raises itself.
+    Replayed,
+}
+
+/// The same, with the platform too, if it is the simulated one.
 pub(super) fn start_open(
     checked: &Checked,
     clock: &Clock,
-    steered: bool,
+    played: Played,
 ) -> Result<(Arc<Session>, Option<Simulated>), StartError> {
     let deployment = &checked.deployment;
     // Once here, to say what is wrong; then on each coordinator's own thread, from the same text.
@@ -86,10 +97,11 @@ pub(super) fn start_open(
     let (platform, simulated): (Arc<dyn Platform>, _) = match deployment.platform.as_str() {
         "embedded" => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
         "simulated" => {
+            let reactions = if played == Played::Replayed { Vec::new() } else { reactions(deployment) };
             let options = simulated::Options {
                 faults: faults(deployment),
-                reactions: reactions(deployment),
-                blocking: steered,
+                reactions,
+                blocking: played != Played::AsWritten,
                 ..simulated::Options::default()
             };
             let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);

@@ -336,9 +336,7 @@ impl Graph<'_, '_> {
                 (false, true) => ("without undoing it", "undo it on the way round, or give it a group".to_owned()),
                 (false, false) => (
                     "without undoing it",
-                    format!(
-                        "undo it on the way round, give it a group, or scope it to a state with `config = \"{id}\"`"
-                    ),
+                    format!("undo it on the way round, give it a group, or make `{id}` the `config` of a state"),
                 ),
             };
             let message = format!("going round applies `{id}` again and again {how}");

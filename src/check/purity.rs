@@ -1,6 +1,7 @@
 //! Functions of a coordinator: where they stand, and what therefore is not known.
 
 use crate::model::codes::COORD_NOT_PURE;
+use crate::model::finding::count;
 use crate::model::functions::function_places;
 use crate::model::{Deployment, Finding, Origin};
 use std::collections::BTreeMap;
@@ -42,8 +43,7 @@ pub fn check(deployment: &Deployment) -> Option<Finding> {
     let mut message = if own.is_empty() {
         format!("the coordinator has no functions of its own, but those of {by}")
     } else {
-        let plural = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
-        let (states, transitions) = (plural(own.len() - transitions, "state"), plural(transitions, "transition"));
+        let (states, transitions) = (count(own.len() - transitions, "state"), count(transitions, "transition"));
         format!("the coordinator has functions in {states} and {transitions}")
     };
     if !own.is_empty() && !by.is_empty() {
@@ -55,8 +55,8 @@ pub fn check(deployment: &Deployment) -> Option<Finding> {
         let parts = place.own();
         finding = finding.also(place.origin, format!("{}: {} — {}", place.what, parts.join(", "), unknown(&parts)));
     }
-    for (plugin, (count, origin)) in plugins {
-        let elsewhere = match count {
+    for (plugin, (places, origin)) in plugins {
+        let elsewhere = match places {
             0 | 1 => String::new(),
             2 => ", here and in another place".to_owned(),
             n => format!(", here and in {} other places", n - 1),
@@ -64,7 +64,7 @@ pub fn check(deployment: &Deployment) -> Option<Finding> {
         finding = finding.also(origin, format!("added by the plugin `{plugin}`{elsewhere}"));
     }
     let more = own.len().saturating_sub(SHOWN);
-    let rest = if more > 0 { format!(" ({more} more places are not shown)") } else { String::new() };
+    let rest = if more > 0 { format!(" ({} not shown)", count(more, "more place")) } else { String::new() };
     let how = if deployment.programs.is_empty() { "they are not run" } else { "`davit sim` runs them" };
     Some(finding.help(if own.is_empty() {
         format!("without the plugins it is pure; {how}")

@@ -14,8 +14,8 @@ use super::state::{Move, Next, State};
 use super::trace::{Does, Replay};
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
-use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, Step, Verdict};
-use crate::stack::Request;
+use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, OnFailure, Step, Verdict};
+use crate::stack::{Planned, Request};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::time::Duration;
@@ -100,7 +100,8 @@ impl Product<'_> {
                 all[k].does = Does::Cannot("what one coordinator tells another one is heard at once");
                 continue;
             }
-            all[k].does = if to.is_empty() { Does::Nothing } else { Does::RaiseTo(event) };
+            // For nobody, too: what it ends, begins or confirms is so before anybody hears it.
+            all[k].does = Does::RaiseTo(event);
             all[k].others = to;
         }
         if way.last().is_some_and(|(_, next)| self.never_rests(&next.state)) {
@@ -109,7 +110,9 @@ impl Product<'_> {
                 .for_each(|end| end.does = Does::Cannot("from there on it goes round for ever at once"));
         }
         if let Some(end) = all.last_mut() {
-            end.passes = begun.iter().any(|batch| batch.idle && batch.over.is_none());
+            // What is raised last is heard at once.
+            let heard = matches!(end.does, Does::Raise(_)) && !way[way.len() - 1].1.state.inbox.is_empty();
+            end.passes = heard || begun.iter().any(|batch| batch.idle && batch.over.is_none());
         }
         for batch in &begun {
             let last = times.last().copied().unwrap_or_default() + limits::REPLAY_STEP;
@@ -198,6 +201,9 @@ impl Product<'_> {
         let mut split = Split::default();
         for (k, (_, next)) in way.iter().enumerate() {
             let Move::Event(at) = next.by else { continue };
+            if k + 1 == way.len() {
+                continue;
+            }
             let name = self.outside[usize::from(at)];
             let inbox = next.state.inbox.iter();
             let lies = inbox.filter(|(to, event)| self.members[usize::from(*to)].name_of(*event) == Some(name));
@@ -292,6 +298,10 @@ impl Product<'_> {
             }
             fails = fails.or(first);
             arms.extend(first.map(|at| (text(at), how, Duration::ZERO)));
+            // What is begun together with it, and done, would stay: then it has not simply failed.
+            let beside = first.filter(|_| how == FaultKind::Fail && stays(planned, part));
+            let beside = beside.into_iter().flat_map(|first| begun_with(planned, first, part));
+            arms.extend(beside.take(limits::SESSION_WORKERS - 1).map(|at| (text(at), how, Duration::ZERO)));
         }
         // What hangs takes its time by itself.
         if takes.is_zero() || planned.steps.is_empty() || answers.iter().any(broken) {
@@ -389,6 +399,24 @@ impl Product<'_> {
         let waits = reasons.first().is_some_and(|reason| reason.code == CONF_HOLDS_NEVER);
         if waits { self.patience(ask) + limits::REPLAY_STEP * 2 } else { Duration::ZERO }
     }
+}
+
+/// Whether something that was done of a part stays when the part fails: nothing goes back, or not what would move.
+fn stays(planned: &Planned, part: usize) -> bool {
+    let mut own = (0..planned.steps.len()).filter(|at| planned.part_of(planned.place(*at)) == part);
+    match planned.parts[part].on_failure {
+        OnFailure::Hold => true,
+        OnFailure::Rollback => false,
+        OnFailure::Unset => own.any(|at| planned.steps[at].undo_moves),
+    }
+}
+
+/// The steps of a part that begin together with its first one.
+fn begun_with(planned: &Planned, first: usize, part: usize) -> impl Iterator<Item = usize> {
+    let of = move |at: usize| planned.part_of(planned.place(at)) == part;
+    let waits = move |at: usize| planned.steps[at].after.iter().any(|before| of(*before as usize));
+    let wave = planned.steps[first].wave;
+    (first + 1..planned.steps.len()).filter(move |at| of(*at) && planned.steps[*at].wave == wave && !waits(*at))
 }
 
 /// The text of a step without its values: which, not how.

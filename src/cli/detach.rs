@@ -4,6 +4,7 @@
 //! without that line says that it is not, and its exit status says why. Signals to the command are [passed on](Passed) to it.
 
 use super::exit::Exit;
+use super::last_words;
 use super::output::{self, Output};
 use super::signals::Watch;
 use super::{Answer, Context, Failure};
@@ -16,6 +17,9 @@ use std::sync::{Arc, Mutex};
 
 /// The line that says that the deployment is up. Not JSON and not a word anybody prints by chance.
 const UP: &str = "\u{1}davit up\u{1}";
+
+/// What is said to a signal that comes when it is up already.
+const STAYS: &str = "note: it is up, and stays so in the background: `davit shutdown` takes it down\n";
 
 /// Says, in the process in the background, that the deployment is up. Nobody reads after it: the streams of who started it
 /// are let go, so that a pipe that the command was typed with (`| tail`) ends with the command. What is said from now on is
@@ -35,10 +39,28 @@ pub fn run(context: &Context) -> Answer {
     // While it comes up, Ctrl-C here is passed on: it is stopped, as in the foreground. Before it is there already: who is
     // ended by a signal in the moment in which it begins would leave it to come up unasked.
     let passed = Arc::new(Mutex::new(Passed::by(interrupt)));
-    let _watch = {
+    let watch = {
         let (passed, last) = (passed.clone(), passed.clone());
-        Watch::start(true, move |_| lock(&passed).signal(), move || lock(&last).signal())
-            .map_err(super::deploy::unwatched)?
+        let left = |heard: bool| {
+            if !heard {
+                last_words::say(|| output::error(STAYS));
+            }
+            heard
+        };
+        let leave = move || {
+            if !left(lock(&last).signal()) {
+                last_words::end();
+                std::process::exit(i32::from(Exit::Done.code()));
+            }
+        };
+        Watch::start(
+            true,
+            move |_| {
+                left(lock(&passed).signal());
+            },
+            leave,
+        )
+        .map_err(super::deploy::unwatched)?
     };
     let mut child = {
         // Also a third signal, which ends the command, waits until there is somebody to be told.
@@ -61,6 +83,7 @@ pub fn run(context: &Context) -> Answer {
         match line {
             Ok(line) if line == UP => {
                 if lock(&passed).leave_it() {
+                    watch.until_the_end();
                     return Ok(Exit::Done);
                 }
                 came_up = true;
@@ -104,21 +127,28 @@ fn interrupt(pid: u32) {
 /// Passes signals on to a process, also those that came before it was there.
 struct Passed<F> {
     by: F,
-    /// As long as it is there and meant.
+    /// Once it is there.
     process: Option<u32>,
+    /// It is up, and left alone.
+    left: bool,
     signals: u32,
 }
 
 impl<F: FnMut(u32)> Passed<F> {
     fn by(by: F) -> Self {
-        Self { by, process: None, signals: 0 }
+        Self { by, process: None, left: false, signals: 0 }
     }
 
-    fn signal(&mut self) {
+    /// One came; whether it is meant for the process, or will be.
+    fn signal(&mut self) -> bool {
+        if self.left {
+            return false;
+        }
         self.signals += 1;
         if let Some(process) = self.process {
             (self.by)(process);
         }
+        true
     }
 
     /// It is there.
@@ -129,10 +159,8 @@ impl<F: FnMut(u32)> Passed<F> {
 
     /// Nothing more is meant for it, unless something was.
     fn leave_it(&mut self) -> bool {
-        if !self.interrupted() {
-            self.process = None;
-        }
-        !self.interrupted()
+        self.left = !self.interrupted();
+        self.left
     }
 
     fn interrupted(&self) -> bool {
@@ -148,10 +176,10 @@ mod tests {
     fn a_signal_that_comes_before_the_process_is_passed_on_to_it() {
         let mut told = Vec::new();
         let mut passed = Passed::by(|process| told.push(process));
-        passed.signal();
+        assert!(passed.signal());
         passed.to(7);
         assert!(!passed.leave_it(), "it is going down");
-        passed.signal();
+        assert!(passed.signal());
         assert_eq!(told, [7, 7]);
     }
 
@@ -161,7 +189,7 @@ mod tests {
         let mut passed = Passed::by(|process| told.push(process));
         passed.to(7);
         assert!(passed.leave_it());
-        passed.signal();
+        assert!(!passed.signal(), "who sent it is told that it stays up");
         assert_eq!(told, [0_u32; 0]);
     }
 

@@ -2,12 +2,11 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{ASK, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{Answer, Context, Run};
 use crate::configurator::WAY_OUT;
 use serde_json::{Value as Json, json};
-use std::time::Duration;
 
 /// Show how a running deployment differs from what it should be: the platform is read and compared.
 ///
@@ -17,8 +16,7 @@ use std::time::Duration;
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     name: Option<String>,
-    /// How long to wait at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON: an array with one object a difference.
     #[arg(long)]
@@ -35,9 +33,9 @@ impl Run for Args {
 impl Args {
     fn show(self, context: &Context) -> Answer {
         let out = &context.out;
+        let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;
-        let limit = Duration::from_secs_f64(self.within) + ASK;
-        let drift = client.call("drift", &json!({ "within_s": self.within }), limit).map_err(failure)?;
+        let drift = client.call("drift", &json!({ "within_s": self.within }), patience.left()).map_err(failure)?;
         let differences = drift.as_array().map_or(&[][..], Vec::as_slice);
         let exit = if differences.is_empty() { Exit::Done } else { Exit::No };
         if self.json {
@@ -45,7 +43,7 @@ impl Args {
             return Ok(exit);
         }
         let name = out.paint(Style::Bold, client.name());
-        let broken = client.call("status", &json!({}), ASK).is_ok_and(|status| status["phase"] == "broken");
+        let broken = client.call("status", &json!({}), patience.left()).is_ok_and(|status| status["phase"] == "broken");
         match (differences.is_empty(), broken) {
             (true, false) => out.line(format!("{name}: as it should be")),
             (true, true) => out.line(format!("{name}: nothing differs from what is known of it")),

@@ -9,7 +9,7 @@ use crate::session::{Ended, Stage};
 use crate::time::Wall;
 use serde_json::{Value as Json, json};
 
-/// What a command answers about a deployment that died.
+/// What a command answers about a deployment that died, or of which nobody knows how it ended.
 #[derive(Debug)]
 pub struct Died {
     life: Life,
@@ -22,7 +22,7 @@ pub struct Died {
 const LAST: usize = 3;
 
 impl Died {
-    /// Of a life that ended without a word.
+    /// Of a life that is [open](Life::is_open).
     pub fn of(life: Life) -> Self {
         let entries = entries(&life.name).unwrap_or_default();
         let last = entries[entries.len().saturating_sub(LAST)..].to_vec();
@@ -34,12 +34,13 @@ impl Died {
         let Self { life, story, .. } = self;
         json!({
             "name": life.name,
-            "phase": "died",
+            "phase": self.word(),
             "pid": life.process.as_ref().map(|process| process.pid),
             "file": life.process.as_ref().map(|process| &process.file),
             "began": life.process.as_ref().map(|process| process.began.to_string()),
             "damaged": life.is_damaged(),
             "seen": life.seen.to_string(),
+            "why": life.end.as_ref().and_then(|end| end.why.as_ref()),
             "rebooted": life.rebooted,
             "was": {
                 "phase": story.phase,
@@ -75,14 +76,13 @@ impl Died {
             out.line(out.paint(Style::Bold, "the last that it told"));
             last.iter().for_each(|entry| out.text(super::log::line(out, entry, false)));
         }
-        let file =
-            life.process.as_ref().map_or_else(|| "FILE".to_owned(), |process| process.file.display().to_string());
+        let anew = life.process.as_ref().map(|it| format!(", `davit deploy {}` begins anew", it.file.display()));
         out.line(out.paint(
             Style::Dim,
             format!(
-                "what its components did since is not known: look at the hardware; `davit log {0}` shows all that it told, \
-                 `davit deploy {file}` begins anew",
-                life.name
+                "what its components did since is not known: look at the hardware; `davit log {}` shows all that it told{}",
+                life.name,
+                anew.unwrap_or_default()
             ),
         ));
     }
@@ -100,20 +100,32 @@ impl Died {
     /// In one line.
     pub fn print_short(&self, out: &Output) {
         let name = out.paint(Style::Bold, self.name());
-        out.line(format!("{name}  {}  {}", out.paint(Style::Bad, "died"), self.when()));
+        out.line(format!("{name}  {}  {}", out.paint(Style::Bad, self.word()), self.when()));
+    }
+
+    /// What it is called instead of a phase.
+    fn word(&self) -> &'static str {
+        if self.life.is_damaged() { "damaged" } else { "died" }
     }
 
     /// When, and what is known of why.
-    pub fn when(&self) -> String {
-        let Life { seen, rebooted, .. } = &self.life;
-        let why = match rebooted {
-            _ if self.life.is_damaged() => {
-                "its record is damaged and cannot be read, it may have been shut down; written last"
-            }
-            true => "the machine went down; seen alive last",
-            false => "killed, or crashed; seen alive last",
-        };
-        format!("{why} at {seen} ({})", seen.ago())
+    fn when(&self) -> String {
+        let Life { name, seen, rebooted, end, .. } = &self.life;
+        let at = format!("at {seen} ({})", seen.ago());
+        match end.as_ref().and_then(|end| end.why.as_ref()) {
+            _ if self.life.is_damaged() => format!(
+                "its record cannot be read: it may have died, or have been shut down; written last {at}; `davit list \
+                 --forget {name}` throws it away"
+            ),
+            Some(why) => format!("{why}; {at}"),
+            None if *rebooted => format!("the machine went down; seen alive last {at}"),
+            None => format!("killed, or crashed; seen alive last {at}"),
+        }
+    }
+
+    /// For a sentence about another one.
+    pub fn sentence(&self) -> String {
+        ended(&self.life)
     }
 }
 
@@ -128,9 +140,9 @@ pub fn meant(error: &ClientError) -> Option<Life> {
     life.filter(|life| !life.alive)
 }
 
-/// Tells that a deployment died with which a command went along until now; false: it ended otherwise.
+/// Tells that a deployment died with which a command went along until now, or that this is not known; false: it ended otherwise.
 pub fn told_died(out: &Output, name: &str, json: bool) -> bool {
-    let Some(died) = kept::life_after(name).filter(Life::died).map(Died::of) else { return false };
+    let Some(died) = kept::life_after(name).filter(Life::is_open).map(Died::of) else { return false };
     match json {
         true => out.json_line(&died.json()),
         false => died.print_short(out),
@@ -138,19 +150,19 @@ pub fn told_died(out: &Output, name: &str, json: bool) -> bool {
     true
 }
 
-/// Those that died and were not deployed since.
+/// Those that died and were not deployed since, and those of which that is not known.
 pub fn died() -> Vec<Died> {
-    kept::lives().into_iter().filter(Life::died).map(Died::of).collect()
+    kept::lives().into_iter().filter(Life::is_open).map(Died::of).collect()
 }
 
 /// What is known of how a deployment ended that does not run, for a sentence behind `no deployment is running`.
 pub fn ended(life: &Life) -> String {
-    let Some(end) = &life.end else { return format!("`{}` died: `davit status {0}` tells of it", life.name) };
-    let how = match (&end.ended, &end.why) {
-        (_, Some(why)) => why.clone(),
-        (Some(ended), None) => how(ended),
-        (None, None) => "stopped".to_owned(),
-    };
+    let tells = |what: &str| format!("{what}: `davit status {}` tells of it", life.name);
+    if life.is_damaged() {
+        return tells(&format!("the record of `{}` is damaged", life.name));
+    }
+    let Some(end) = life.end.as_ref().filter(|_| !life.died()) else { return tells(&format!("`{}` died", life.name)) };
+    let how = end.why.clone().or_else(|| end.ended.as_ref().map(how)).unwrap_or_default();
     format!("`{}` ended at {} ({}): {how}; `davit log {0}` shows its log", life.name, end.at, end.at.ago())
 }
 
@@ -162,5 +174,5 @@ fn how(ended: &Ended) -> String {
     }
 }
 
-/// How `davit status` ends where a deployment died: it was not shut down.
+/// How `davit status` ends where a deployment died, or may have: nobody knows that it was shut down.
 pub const EXIT: Exit = Exit::Forced;

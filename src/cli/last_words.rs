@@ -5,6 +5,7 @@
 
 use super::output;
 use crate::limits;
+use crate::model::finding::count;
 use crate::session::tap::{News, Tap};
 use crate::time::Clock;
 use crate::time::clock::panic_text;
@@ -23,7 +24,7 @@ static WORDS: OnceLock<Tap<Job>> = OnceLock::new();
 pub fn prepare() -> std::io::Result<()> {
     let tap = Tap::new("davit-last-words", limits::TAP_OWN, &Clock::real(), |news: News<Job>| match news {
         News::One(job) => job(),
-        News::Missed(words) => output::error(&format!("note: {words} messages could not be written\n")),
+        News::Missed(words) => output::error(&format!("note: {} could not be written\n", count(words, "message"))),
     })?;
     if WORDS.set(tap).is_ok() {
         std::panic::set_hook(Box::new(|info| {
@@ -59,7 +60,8 @@ pub fn say(job: impl FnOnce() + Send + 'static) {
 /// So many lines of the story were not written, since nobody read them.
 pub fn unread(lines: u64) {
     if lines > 0 {
-        say(move || output::error(&format!("note: {lines} lines could not be written: nobody reads them\n")));
+        let lines = count(lines, "line");
+        say(move || output::error(&format!("note: {lines} could not be written: nobody reads\n")));
     }
 }
 

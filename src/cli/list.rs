@@ -6,7 +6,7 @@ use super::output::{Output, Style, Table};
 use super::remote::ASK;
 use super::status::{state_style, text};
 use super::{Answer, Context, Failure, Run};
-use crate::model::codes::CLI_NOTHING_KEPT;
+use crate::model::codes::{CLI_NOTHING_KEPT, CLI_SYSTEM};
 use crate::model::finding::count;
 use crate::session::client::Client;
 use crate::session::kept::{Life, forget, life};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// List the running deployments of this user, and those that died without being shut down.
 ///
-/// One that died is listed until its name is deployed again, or until it is forgotten.
+/// One that died, or whose record is damaged, is listed until its name is deployed again, or until it is forgotten.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Throw away what is kept of a deployment that does not run any more: its log, and that it died.
@@ -36,14 +36,20 @@ impl Run for Args {
                     format!("`{name}` runs, and nothing of it is forgotten before it has ended"),
                     format!("`davit shutdown {name}` takes it down; what is kept of it is then that it was shut down"),
                 ))
-            } else if forget(&name) {
-                Ok(Exit::Done)
             } else {
-                Err(Failure::no(
-                    CLI_NOTHING_KEPT,
-                    format!("nothing of a deployment `{name}` that does not run any more is kept"),
-                    "`davit list` shows what runs, and what died",
-                ))
+                match forget(&name) {
+                    Ok(true) => Ok(Exit::Done),
+                    Ok(false) => Err(Failure::no(
+                        CLI_NOTHING_KEPT,
+                        format!("nothing of a deployment `{name}` that does not run any more is kept"),
+                        "`davit list` shows what runs, and what died",
+                    )),
+                    Err((path, why)) => Err(Failure::usage(
+                        CLI_SYSTEM,
+                        format!("{} cannot be thrown away: {why}", path.display()),
+                        "look what it is, and remove it by hand",
+                    )),
+                }
             };
         }
         let overview = Overview::look();

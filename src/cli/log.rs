@@ -73,8 +73,8 @@ impl Args {
             )
         })?;
         entries.drain(..entries.len().saturating_sub(self.last.unwrap_or(usize::MAX)));
-        context.out.error(match life.died() {
-            true => format!("note: `{}` died: `davit status {0}` tells of it\n", life.name),
+        context.out.error(match life.is_open() {
+            true => format!("note: {}\n", kept::ended(&life)),
             false => format!("note: `{}` does not run any more\n", life.name),
         });
         Ok(Json::Array(entries))

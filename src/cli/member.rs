@@ -2,12 +2,11 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{ASK, Wait, Which, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, Wait, Which, connect, failure, seconds};
 use super::request::request;
 use super::status::text;
 use super::{Answer, Context, Run};
 use serde_json::{Value as Json, json};
-use std::time::Duration;
 
 /// Show what a property or a port of a running deployment is worth: value, unit, and when that was.
 ///
@@ -20,8 +19,7 @@ pub struct GetArgs {
     member: String,
     #[command(flatten)]
     which: Which,
-    /// How long to wait for a sample at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON.
     #[arg(long)]
@@ -32,9 +30,9 @@ impl Run for GetArgs {
     fn run(self, context: &Context) -> Answer {
         let out = &context.out;
         let params = json!({ "name": self.member, "within_s": self.within });
-        let limit = Duration::from_secs_f64(self.within) + ASK;
+        let patience = Patience::within(self.within);
         let client = connect(self.which.name.as_deref());
-        let seen = client.and_then(|mut client| client.call("get", &params, limit).map_err(failure));
+        let seen = client.and_then(|mut client| client.call("get", &params, patience.left()).map_err(failure));
         let seen = seen.map_err(|failure| failure.as_json(self.json))?;
         let there = !seen["value"].is_null();
         if self.json {
@@ -87,14 +85,15 @@ pub struct SetArgs {
 
 impl Run for SetArgs {
     fn run(self, context: &Context) -> Answer {
+        let patience = Patience::within(self.wait.within);
         let ask = || {
             let mut client = connect(self.which.name.as_deref())?;
-            client.call("get", &json!({ "name": self.member, "within_s": 0 }), ASK).map_err(failure)
+            client.call("get", &json!({ "name": self.member, "within_s": 0 }), patience.left()).map_err(failure)
         };
         let seen = ask().map_err(|failure| failure.as_json(self.json))?;
         let value = meant(&self.value, text(&seen["type"]));
         let params = json!({ "name": self.member, "value": value, "force": self.force });
-        request(context, "set", params, &self.which, &self.wait, self.json)
+        request(context, "set", params, &self.which, &self.wait, &patience, self.json)
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::output;
 use crate::limits;
+use crate::model::finding::count;
 use crate::time::{Clock, Time, lock};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read};
@@ -93,7 +94,7 @@ fn pass_on(mut from: impl BufRead, hear: &mut impl FnMut(String)) {
         if now.since(second) >= limits::DROPS_TOLD {
             (second, told) = (now, 0);
             if left_out > 0 {
-                hear(format!("({left_out} more lines were printed than are kept)"));
+                hear(format!("({} left out: more was printed than is kept)", count(left_out, "more line")));
                 left_out = 0;
             }
         }
@@ -105,7 +106,7 @@ fn pass_on(mut from: impl BufRead, hear: &mut impl FnMut(String)) {
         hear(String::from_utf8_lossy(&line).trim_end().to_owned());
     }
     if left_out > 0 {
-        hear(format!("({left_out} more lines were printed than are kept)"));
+        hear(format!("({} left out: more was printed than is kept)", count(left_out, "more line")));
     }
 }
 

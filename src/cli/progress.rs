@@ -154,9 +154,8 @@ impl Screen {
             }
             News::Missed(entries) => {
                 let word = self.out.paint(Style::Care, "missed");
-                self.line(format!(
-                    "             {word}  {entries} lines are not shown: they came faster than they were read"
-                ));
+                let lines = count(entries, "line");
+                self.line(format!("             {word}  {lines} not shown: more came than was read"));
             }
         }
     }

@@ -3,14 +3,13 @@
 use super::drift::listed;
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{ASK, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
 use crate::configurator::WAY_OUT;
 use crate::model::codes::{CLI_REFUSED, CLI_WHICH_WAY};
 use crate::session::NO_FORWARD;
 use serde_json::{Value as Json, json};
-use std::time::Duration;
 
 /// Lead a broken deployment out: back to the system before what broke it, or by taking what is there as the state.
 ///
@@ -29,8 +28,7 @@ pub struct Args {
     accept: bool,
     #[arg(long, hide = true)]
     forward: bool,
-    /// How long to wait at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON.
     #[arg(long)]
@@ -54,10 +52,10 @@ impl Args {
             return Err(Failure::usage(CLI_WHICH_WAY, message, WAY_OUT));
         }
         let out = &context.out;
+        let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;
         let params = json!({ "direction": if self.back { "back" } else { "accept" }, "within_s": self.within });
-        let limit = Duration::from_secs_f64(self.within) + ASK;
-        let answer = client.call("recover", &params, limit).map_err(failure)?;
+        let answer = client.call("recover", &params, patience.left()).map_err(failure)?;
         let whole = answer["recovered"] == true;
         let exit = if whole { Exit::Done } else { Exit::Broken };
         if self.json {

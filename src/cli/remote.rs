@@ -3,10 +3,12 @@
 use super::Failure;
 use super::exit::Exit;
 use super::kept;
+use crate::limits;
 use crate::model::codes::{
     CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED, page,
 };
 use crate::session::client::{Client, ClientError};
+use crate::time::{Clock, Time};
 use serde_json::Value as Json;
 use std::time::Duration;
 
@@ -30,9 +32,35 @@ pub struct Wait {
     /// What is done anyway.
     #[arg(long, hide = true, conflicts_with = "no_wait")]
     pub wait: bool,
-    /// How long to wait at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    /// For how long: see [`Patience`].
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     pub within: f64,
+}
+
+/// The help of every `--within`.
+pub const WITHIN: &str =
+    "How long to wait at most, in seconds; of a deployment that says nothing at all, one second longer";
+
+/// How long a command waits for a running deployment, all that it asks for together. The deployment is told the same time: if
+/// it lives it says at the end of it what has not come, and that is heard within [`limits::ANSWER_WAY`]. Nothing else
+/// lengthens a `--within`.
+pub struct Patience {
+    clock: Clock,
+    until: Time,
+}
+
+impl Patience {
+    /// From now on, for that many seconds.
+    pub fn within(seconds: f64) -> Self {
+        let clock = Clock::real();
+        let until = clock.now() + Duration::from_secs_f64(seconds) + limits::ANSWER_WAY;
+        Self { clock, until }
+    }
+
+    /// What is left of it.
+    pub fn left(&self) -> Duration {
+        self.until.since(self.clock.now())
+    }
 }
 
 /// A number of seconds: finite, not negative.

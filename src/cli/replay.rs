@@ -159,7 +159,8 @@ impl Lines {
             Does::RaiseTo(event) => {
                 self.wait_until(replay.at);
                 let to = replay.others.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
-                self.line(format!("raise({}, {{ to = {{ {to} }} }})", quoted(event.as_str())));
+                let to = if to.is_empty() { "{}".to_owned() } else { format!("{{ {to} }}") };
+                self.line(format!("raise({}, {{ to = {to} }})", quoted(event.as_str())));
             }
             Does::Ask(ask) => {
                 self.wait_until(replay.at);

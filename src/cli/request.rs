@@ -3,13 +3,12 @@
 use super::exit::Exit;
 use super::log::duration;
 use super::output::Style;
-use super::remote::{ASK, Wait, Which, ask};
+use super::remote::{Patience, WITHIN, Wait, Which, ask, seconds};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
 use crate::configurator::WAY_OUT;
 use crate::model::finding::count;
 use serde_json::{Value as Json, json};
-use std::time::Duration;
 
 /// Raise an event for the coordinators of a running deployment, and wait until they have taken it up.
 ///
@@ -28,8 +27,7 @@ pub struct EventArgs {
     /// Do not wait: exit with 0 once it is raised.
     #[arg(long, conflicts_with = "wait_for")]
     no_wait: bool,
-    /// How long to wait at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::remote::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON.
     #[arg(long)]
@@ -41,7 +39,7 @@ impl Run for EventArgs {
         let params = json!({
             "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
         });
-        let answer = ask(self.which.name.as_deref(), "event", &params, limit(self.within))
+        let answer = ask(self.which.name.as_deref(), "event", &params, Patience::within(self.within).left())
             .map_err(|failure| failure.as_json(self.json))?;
         let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
         let good = heard == self.wait_for.as_deref();
@@ -109,7 +107,8 @@ pub struct ApplyArgs {
 impl Run for ApplyArgs {
     fn run(self, context: &Context) -> Answer {
         let params = json!({ "configuration": self.configuration, "force": self.force });
-        request(context, "apply", params, &self.which, &self.wait, self.json)
+        let patience = Patience::within(self.wait.within);
+        request(context, "apply", params, &self.which, &self.wait, &patience, self.json)
     }
 }
 
@@ -140,7 +139,8 @@ pub struct UndoArgs {
 impl Run for UndoArgs {
     fn run(self, context: &Context) -> Answer {
         let params = json!({ "configuration": self.configuration, "to": self.to, "force": self.force });
-        request(context, "undo", params, &self.which, &self.wait, self.json)
+        let patience = Patience::within(self.wait.within);
+        request(context, "undo", params, &self.which, &self.wait, &patience, self.json)
     }
 }
 
@@ -154,8 +154,7 @@ pub struct CommitArgs {
     /// Also while a coordinator's frame is in force. That frame stays, and can be undone as far as that then goes.
     #[arg(long)]
     force: bool,
-    /// How long to wait for the answer at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = super::remote::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON.
     #[arg(long)]
@@ -166,13 +165,9 @@ impl Run for CommitArgs {
     fn run(self, context: &Context) -> Answer {
         let wait = Wait { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
-        request(context, "commit", params, &Which { name: self.name }, &wait, self.json)
+        let patience = Patience::within(wait.within);
+        request(context, "commit", params, &Which { name: self.name }, &wait, &patience, self.json)
     }
-}
-
-/// Real time for what the deployment was given, and a little for the way.
-fn limit(within: f64) -> Duration {
-    Duration::from_secs_f64(within) + ASK
 }
 
 /// Asks, and tells the answer if it is waited for.
@@ -182,13 +177,14 @@ pub(super) fn request(
     mut params: Json,
     which: &Which,
     wait: &Wait,
+    patience: &Patience,
     json: bool,
 ) -> Result<Exit, Failure> {
     let waits = !wait.no_wait;
     params["wait"] = json!(waits);
     params["within_s"] = json!(wait.within);
     let out = &context.out;
-    let asked = ask(which.name.as_deref(), method, &params, limit(wait.within));
+    let asked = ask(which.name.as_deref(), method, &params, patience.left());
     let answer = asked.map_err(|failure| failure.as_json(json))?;
     let verdict = text(&answer["answer"]);
     if json {

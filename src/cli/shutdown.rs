@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::{Output, Style};
-use super::remote::{ASK, connect, failure};
+use super::remote::{ASK, Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{Answer, Context, Run};
 use crate::limits;
@@ -12,7 +12,6 @@ use crate::time::Clock;
 use serde_json::{Value as Json, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 /// Drive a running deployment to its *down* state; nothing is left.
 ///
@@ -26,8 +25,7 @@ pub struct Args {
     /// Without its coordinator: what is safe, what brings it to rest, then everything is removed.
     #[arg(long)]
     force: bool,
-    /// How long to wait at most, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 120.0, value_parser = super::remote::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON.
     #[arg(long)]
@@ -44,18 +42,19 @@ impl Run for Args {
 impl Args {
     fn show(self, context: &Context) -> Answer {
         let out = &context.out;
+        let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
-        let limit = Duration::from_secs_f64(self.within) + ASK;
         let done = Arc::new(AtomicBool::new(false));
         if !self.json {
             tell_waiting(context.out, name.clone(), done.clone());
         }
-        let answer = client.call("shutdown", &json!({ "force": self.force, "wait": true }), limit).map_err(failure);
+        let params = json!({ "force": self.force, "wait": true, "within_s": self.within });
+        let answer = client.call("shutdown", &params, patience.left()).map_err(failure);
         done.store(true, Ordering::Relaxed);
         let answer = answer?;
         // So that the same name can be deployed at once.
-        client.wait_until_free();
+        client.wait_until_free(patience.left());
         if self.json {
             out.json(&answer);
         } else {
@@ -86,13 +85,10 @@ fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
             clock.sleep(limits::SHUTDOWN_TOLD);
             let status = client.call("status", &json!({}), ASK).ok()?;
             let stopping: StoppingView = serde_json::from_value(status["stopping"].clone()).ok()?;
-            let what = match (stopping.stands_still, stopping.held, stopping.waits_for.is_empty()) {
-                (Some(still), ..) => still.to_string(),
-                (None, true, _) => {
-                    "a safe configuration holds what is left: `davit shutdown --force` lets go".to_owned()
-                }
-                (None, false, true) => format!("{} in {}", stopping.stage.words(), place(&status)),
-                (None, false, false) => stopping.waits_for.join(", "),
+            let what = match stopping.stands_still() {
+                Some(still) => still,
+                None if stopping.waits_for.is_empty() => format!("{} in {}", stopping.stage.words(), place(&status)),
+                None => stopping.waits_for.join(", "),
             };
             if done.load(Ordering::Relaxed) {
                 return Some(());

@@ -43,6 +43,11 @@ impl Watch {
         })?;
         Ok(Self { handle, thread: Some(thread) })
     }
+
+    /// Goes on until the process ends, whatever it still has to say.
+    pub fn until_the_end(self) {
+        std::mem::forget(self);
+    }
 }
 
 /// What is told at the first signal, and at the second.

@@ -16,7 +16,8 @@ use serde_json::{Value as Json, json};
 /// Show a running deployment: its phase, the coordinator's states, components, faults. Of one that died: when, and how far it
 /// was. Of several, where none is named: a line each, as `davit list`.
 ///
-/// Exit status: 0 it runs; 1 none runs; 3 it is broken; 4 it died: killed, crashed or cut off, and was not shut down. Of several the
+/// Exit status: 0 it runs; 1 none runs; 3 it is broken; 4 it died: killed, crashed or cut off, and was not shut down, or its record is
+/// damaged, so that nobody knows. Of several the
 /// first of 3, 4, 1 and 0 that is so of one of them; without a name also one that died beside the one that runs counts.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -39,7 +40,7 @@ impl Run for Args {
                     let own = status["name"].as_str().unwrap_or_default().to_owned();
                     let mut exit = show(out, &[Seen::Runs(status)], self.json);
                     for died in kept::died().iter().filter(|died| died.name() != own) {
-                        out.error(format!("note: `{}` died: `davit status {0}` tells of it\n", died.name()));
+                        out.error(format!("note: {}\n", died.sentence()));
                         exit = Exit::worst([exit, kept::EXIT]);
                     }
                     Ok(exit)
@@ -105,7 +106,7 @@ fn look(name: Option<&str>) -> Result<Seen, ClientError> {
     asked.map(Seen::Runs).or_else(|error| {
         let died = match error {
             ClientError::None => kept::died().into_iter().max_by(|a, b| a.seen().0.total_cmp(&b.seen().0)),
-            _ => kept::meant(&error).filter(Life::died).map(Died::of),
+            _ => kept::meant(&error).filter(Life::is_open).map(Died::of),
         };
         died.map(|died| Seen::Died(Box::new(died))).ok_or(error)
     })
@@ -172,12 +173,8 @@ fn print(out: &Output, status: &Json) {
         }
     }
     if let Ok(stopping) = serde_json::from_value::<StoppingView>(status["stopping"].clone()) {
-        let held = if stopping.held {
-            ": a safe configuration holds what is left, `davit shutdown --force` lets go".to_owned()
-        } else {
-            stopping.stands_still.map(|still| format!(": stands still, {still}")).unwrap_or_default()
-        };
-        out.line(format!("stopping     {}{held}", stopping.stage.words()));
+        let still = stopping.stands_still().map(|still| format!(": stands still, {still}")).unwrap_or_default();
+        out.line(format!("stopping     {}{still}", stopping.stage.words()));
     }
     if let Some(outstanding) = status["outstanding"].as_array().filter(|a| !a.is_empty()) {
         let names: Vec<&str> = outstanding.iter().map(text).collect();

@@ -67,7 +67,7 @@ impl Args {
                 Ok(look) => look,
                 Err(error) => {
                     drop(screen);
-                    looking.client.wait_until_free();
+                    looking.client.wait_until_free(Duration::MAX);
                     return if owner::is_owned(&name) { Err(failure(error)) } else { Ok(self.over(out, &name)) };
                 }
             };

@@ -6,6 +6,7 @@ use super::guards::{self, Guards};
 use super::lower::Spot;
 use super::native;
 use crate::limits;
+use crate::model::finding::count;
 use crate::model::program::{Openings, Program};
 use crate::statechart::{Printer, Said};
 use crate::time::Clock;
@@ -60,15 +61,15 @@ impl Voice {
         let events = self.no_room.replace(0);
         if events > 0 {
             self.no_room_before.set(self.no_room_before.get() + events);
-            let (events, most) = (grouped(events), grouped(limits::CHART_QUEUE as u64));
-            let text = format!("{events} events found no room: at most {most} wait for a step");
+            let (events, most) = (count(grouped(events), "event"), grouped(limits::CHART_QUEUE as u64));
+            let text = format!("{events} found no room: at most {most} wait for a step");
             out.push(Said { by: Printer::Err, text });
         }
         let lost = self.lost.replace(0);
         if lost > 0 {
             out.push(Said {
                 by: Printer::Warn,
-                text: format!("{lost} more lines were printed at once and are left out"),
+                text: format!("{} left out: too much was printed at once", count(lost, "more line")),
             });
         }
     }

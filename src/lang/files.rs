@@ -2,11 +2,15 @@
 
 use crate::diagnostics::Language;
 use crate::limits;
+use crate::model::finding::did_you_mean;
 use crate::model::{Code, Finding, codes};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+
+/// Where deployments are, below the folder of a project.
+const DEPLOYMENTS: &str = "deployments";
 
 /// A set of files.
 #[derive(Debug, Clone, Default)]
@@ -93,28 +97,39 @@ impl Sources {
         })
     }
 
-    /// Files near to a name that does not exist.
+    /// Files near to a name that does not exist: in its folder, else in that for deployments below it.
     fn near(&self, path: &Path) -> String {
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        let names: Vec<String> = match self {
+        let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
+        let Some(names) = self.inside(shown) else { return format!("there is no folder {} either", shown.display()) };
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        let near = |names: &[String]| did_you_mean(name, "files", names.iter().map(String::as_str));
+        if !names.is_empty() {
+            return near(&names);
+        }
+        let below = shown.join(DEPLOYMENTS);
+        match self.inside(&below).filter(|names| !names.is_empty()) {
+            Some(names) => format!("in the folder {}: {}", normal(&below).display(), near(&names)),
+            None => format!("no file in the folder {} is Lua, YAML or SCXML by its name", shown.display()),
+        }
+    }
+
+    /// The names of the files in a folder that are in a language of ours; none: there is no such folder.
+    fn inside(&self, folder: &Path) -> Option<Vec<String>> {
+        Some(match self {
             Self::Memory(files) => {
-                let folder = normal(&folder);
+                let folder = normal(folder);
                 let inside = files.keys().filter(|p| p.parent() == Some(&folder));
                 inside.filter_map(|p| Some(p.file_name()?.to_str()?.to_owned())).collect()
             }
             Self::Disk => {
-                let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
-                let Ok(list) = std::fs::read_dir(folder) else {
-                    return format!("there is no folder {} either", folder.display());
-                };
+                let list = std::fs::read_dir(folder).ok()?;
                 let names = list.take(1_000).filter_map(|e| e.ok()?.file_name().into_string().ok());
                 let mut names: Vec<_> = names.filter(|n| language(Path::new(n)).is_some()).collect();
                 names.sort();
                 names
             }
-        };
-        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        crate::model::finding::did_you_mean(name, "files", names.iter().map(String::as_str))
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the functions of a coordinator mean for writing it in another language.
 
+use crate::model::finding::count;
 use crate::model::functions::{FunctionPlace, function_places};
 use crate::model::program::Program;
 use crate::model::{Finding, Findings, Statechart, codes};
@@ -24,13 +25,14 @@ fn parts(place: &FunctionPlace) -> String {
 pub fn refused(chart: &Statechart, program: &Program) -> Option<Finding> {
     let places = function_places(chart, &program.beside);
     let first = places.first()?;
-    let message = format!("a coordinator with functions cannot be converted: it has some in {} places", places.len());
+    let message =
+        format!("a coordinator with functions cannot be converted: it has some in {}", count(places.len(), "place"));
     let mut finding = Finding::error(codes::CONVERT_FUNCTIONS, message).at(first.origin);
     for place in places.iter().take(SHOWN) {
         finding = finding.also(place.origin, format!("{}: {}", place.what, parts(place)));
     }
     let more = places.len().saturating_sub(SHOWN);
-    let rest = if more > 0 { format!(" ({more} more places are not shown)") } else { String::new() };
+    let rest = if more > 0 { format!(" ({} not shown)", count(more, "more place")) } else { String::new() };
     Some(
         finding.help(format!(
             "names of events in place of functions make it pure; `--to scxml` writes it without them{rest}"

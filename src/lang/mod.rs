@@ -16,6 +16,7 @@ mod params;
 pub mod print;
 mod scxml;
 mod slips;
+mod spelling;
 mod tree;
 mod trusted;
 mod words;

@@ -1,6 +1,7 @@
 //! The loose tree both languages are read into: shapes and places, no meaning yet.
 
-use crate::diagnostics::{FileId, SourceMap};
+use super::spelling::as_yaml;
+use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Finding, Findings, Origin, codes};
@@ -123,6 +124,17 @@ impl Cx {
         }
     }
 
+    /// An example as the file spells it in which something stands: one of Lua also in YAML.
+    pub fn spelt(&self, origin: Origin, example: &str) -> String {
+        self.either(origin, example, &as_yaml(example).unwrap_or_else(|| example.to_owned()))
+    }
+
+    /// Which of two spellings is the file's in which something stands.
+    pub fn either(&self, origin: Origin, lua: &str, yaml: &str) -> String {
+        let file = self.sources.extent(origin).map(|(file, _)| self.sources.file(file).language);
+        if file == Some(Language::Yaml) { yaml.to_owned() } else { lua.to_owned() }
+    }
+
     /// Reports that a node is not of the kind wanted; `example` is a line as it should be.
     pub fn wrong(&mut self, node: &Node, what: &str, expected: &str, example: &str) {
         if matches!(node.kind, Kind::Poison) {
@@ -132,6 +144,7 @@ impl Cx {
         let message = format!("{what} must be {expected}, this is {}", node.describe());
         let quoted = matches!(node.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_) | Kind::Null);
         let hint = if quoted && expected.contains("text") { " (quotes make a text of it)" } else { "" };
+        let example = self.spelt(node.origin, example);
         self.report(
             Finding::error(codes::TEXT_WRONG_TYPE, message)
                 .at(origin)
@@ -169,6 +182,11 @@ impl Fields {
         }
     }
 
+    /// What the table is.
+    pub fn what(&self) -> &'static str {
+        self.what
+    }
+
     /// Takes a field with its name's place.
     pub fn take_entry(&mut self, key: &'static str) -> Option<Entry> {
         self.asked.push(key);
@@ -182,15 +200,21 @@ impl Fields {
 
     /// Takes a field that must be there; a finding where it is not.
     pub fn required(&mut self, cx: &mut Cx, key: &'static str, example: &str) -> Option<Node> {
+        self.needed(cx, key, |cx, origin| format!("add `{}`", cx.spelt(origin, example)))
+    }
+
+    /// The same with the help that tells how it is written.
+    pub fn needed(&mut self, cx: &mut Cx, key: &'static str, help: impl Fn(&Cx, Origin) -> String) -> Option<Node> {
         let field = self.take(key);
         if field.is_none() {
             // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
             if !self.misspelt(key) {
+                let help = help(cx, self.origin);
                 cx.report(
                     Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.what))
                         .at(self.origin)
                         .labelled(format!("without `{key}`"))
-                        .help(format!("add `{example}`")),
+                        .help(help),
                 );
             }
         }

@@ -709,13 +709,13 @@ codes! {
          NAME`; of one that died without being shut down `davit status NAME` tells when, and how far it was.";
     CLI_NOTHING_KEPT = "cli::nothing_kept", "nothing is kept of such a deployment",
         "What `davit list --forget NAME` throws away is what is kept of a deployment that does not run any more: its log, how it \
-         ended, or that it died. There is none of that name, or it runs: `davit shutdown NAME` takes it down first.";
+         ended, that it died, or a damaged record. There is none of that name, or it runs: `davit shutdown NAME` takes it down first.";
     CLI_SEVERAL_RUNNING = "cli::several_running", "several deployments are running",
         "The command was given no name and more than one deployment is running, so it is not known which is meant. \
          Give the name: `davit status NAME`, `davit event E --on NAME`.";
     CLI_NO_ANSWER = "cli::no_answer", "the running deployment does not answer",
-        "The control socket is there and something listens on it, but no answer came in time, or the connection was \
-         closed. The deployment may just have ended: `davit status` tells. If it is stuck, `davit shutdown --force` \
+        "The control socket is there and something listens on it, but no answer came within what `--within` allows and one \
+         second more, or the connection was closed. The deployment may just have ended: `davit status` tells. If it is stuck, `davit shutdown --force` \
          takes it down without its coordinator.";
     CLI_SOCKET_GONE = "cli::socket_gone", "the socket of a running deployment is gone",
         "A process owns the deployment's name, but the file of its control socket is not there any more: somebody removed it, \

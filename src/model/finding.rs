@@ -185,6 +185,11 @@ pub fn count(number: impl std::fmt::Display, what: &str) -> String {
     }
 }
 
+/// `1 is`, `3 are`.
+pub fn are(number: usize) -> String {
+    format!("{number} {}", if number == 1 { "is" } else { "are" })
+}
+
 /// The usual help for an unknown name: the nearest known one, else the list of known ones (at most eight of them).
 pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();

@@ -2,6 +2,7 @@
 
 use super::monitor::Part;
 use super::names::Ident;
+use crate::model::finding::count;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -106,7 +107,7 @@ pub enum FitError {
         found: String,
     },
     /// An array of another length.
-    #[error("expected {expected} elements, found {found}")]
+    #[error("expected {}, found {found}", count(expected, "element"))]
     Length {
         /// Elements wanted.
         expected: usize,

@@ -10,6 +10,7 @@ use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
 use super::probe::{Observed, Probes, ProbesEnd};
 use super::property::{Prop, PropEnd};
 use super::value::PortValue;
+use crate::model::finding::count;
 use crate::model::monitor::Condition;
 use crate::model::{
     ComponentType, Direction, Effect, EventName, Ident, OperationType, Origin, PortType, PropertyType, Transition,
@@ -151,7 +152,7 @@ impl<C: Component> Builder<C> {
         properties.resize_with(table.properties.len(), || None);
         let made = Ends { ports, properties, callers: Vec::new(), probes: None };
         if values.len() != table.properties.len() {
-            return Err(format!("{} values for {} properties", values.len(), table.properties.len()));
+            return Err(format!("{} for {}", count(values.len(), "value"), count(table.properties.len(), "property")));
         }
         let making = Making {
             table: table.clone(),

@@ -110,10 +110,11 @@ impl Client {
     }
 
     /// Waits until the deployment's name is free: it is down, and its process is done with its clients. At most for as long
-    /// as that may take.
-    pub fn wait_until_free(&self) {
+    /// as that may take, and for `limit`.
+    pub fn wait_until_free(&self, limit: Duration) {
         let clock = Clock::real();
-        while owner::is_owned(&self.name) && clock.now().0 < nanos(limits::SOCKET_WRITE + limits::TAP_END) {
+        let limit = nanos(limit.min(limits::SOCKET_WRITE + limits::TAP_END));
+        while owner::is_owned(&self.name) && clock.now().0 < limit {
             clock.sleep(limits::SOCKET_STEP);
         }
     }
@@ -130,7 +131,7 @@ impl Client {
     pub fn call(&mut self, method: &str, params: &Json, limit: Duration) -> Result<Json, ClientError> {
         let asked = self.send(method, params)?;
         self.answer(asked, limit)?.ok_or_else(|| {
-            let why = format!("nothing came within {} s", limit.as_secs_f64());
+            let why = format!("nothing came within {:.1} s", limit.as_secs_f64());
             ClientError::Io { name: self.name.clone(), source: io::Error::new(io::ErrorKind::TimedOut, why) }
         })
     }
@@ -157,14 +158,19 @@ impl Client {
     /// # Errors
     /// When the deployment refuses, or the connection is gone.
     pub fn answer(&mut self, id: u64, limit: Duration) -> Result<Option<Json>, ClientError> {
-        let io = |source| ClientError::Io { name: self.name.clone(), source };
-        self.reader.get_ref().set_read_timeout(Some(limit)).map_err(io)?;
+        let name = self.name.clone();
+        let io = |source| ClientError::Io { name: name.clone(), source };
+        let (clock, least) = (Clock::real(), Duration::from_micros(1));
+        let deadline = clock.now() + limit;
         loop {
+            // What else comes meanwhile lengthens nothing. No time at all would be taken for all of it.
+            let left = deadline.since(clock.now()).max(least);
+            self.reader.get_ref().set_read_timeout(Some(left)).map_err(io)?;
             let json = match self.read() {
                 Err(late) if matches!(late.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
                     return Ok(None);
                 }
-                read => read.map_err(|source| ClientError::Io { name: self.name.clone(), source })?,
+                read => read.map_err(io)?,
             };
             let refused = json.get("error");
             let own = json.get("id").and_then(Json::as_u64) == Some(id);

@@ -22,6 +22,14 @@ pub struct StoppingView {
     pub stands_still: Option<StandsStill>,
 }
 
+impl StoppingView {
+    /// Why nothing goes on before somebody decides; none: it goes on.
+    pub fn stands_still(&self) -> Option<String> {
+        let held = "a safe configuration holds what is left: `davit shutdown --force` lets go";
+        self.stands_still.as_ref().map(ToString::to_string).or_else(|| self.held.then(|| held.to_owned()))
+    }
+}
+
 /// Why the time of the first stage stands still: people decide how it goes on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StandsStill {

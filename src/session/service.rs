@@ -34,7 +34,7 @@ pub const METHODS: &[(&str, &[&str])] = &[
     ("drift", &["within_s"]),
     ("recover", &["direction", "within_s"]),
     ("commit", &["force", "wait", "within_s"]),
-    ("shutdown", &["force", "wait"]),
+    ("shutdown", &["force", "wait", "within_s"]),
     ("subscribe", &[]),
 ];
 
@@ -61,6 +61,8 @@ impl SessionService {
 const WITHIN: f64 = 10.0;
 const GET_WITHIN: f64 = 2.0;
 const LOOK_WITHIN: f64 = 0.3;
+/// It takes what it takes: who asks knows how long that is waited for.
+const DOWN_WITHIN: f64 = 1e6;
 
 fn within(params: &Json, usual: f64) -> Result<Duration, RpcError> {
     let seconds: f64 = optional(params, "within_s")?.unwrap_or(usual);
@@ -159,15 +161,19 @@ impl Service for SessionService {
                 request(&session, line, Ask::Commit { force }, params, gone)
             }
             "shutdown" => {
-                let force = forced(params)?;
+                let (force, within) = (forced(params)?, within(params, DOWN_WITHIN)?);
                 let waits = optional(params, "wait")?.unwrap_or(false);
                 session.command(Command::Shutdown { force });
                 if !waits {
                     return Ok(json!({ "phase": "shutting_down" }));
                 }
                 let late = || "it is not down yet".to_owned();
-                wait(&session, Duration::from_secs(1_000_000), gone, late, |_| session.ended())
-                    .map(|ended| view(&ended))
+                let ended = wait(&session, within, gone, late, |_| session.ended());
+                ended.map(|ended| view(&ended)).map_err(|late| {
+                    let still = session.status().stopping.and_then(|stopping| stopping.stands_still());
+                    let help = still.unwrap_or_else(|| "it goes on: `davit status` shows what it waits for".to_owned());
+                    RpcError { data: json!({ "help": help }), ..late }
+                })
             }
             _ => Err(RpcError::new(METHOD_NOT_FOUND, format!("`{method}` is the socket's own"))),
         }
@@ -256,7 +262,11 @@ fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcEr
         let taken = wait(session, within, gone, late, |hub| hub.was_heard(ticket));
         session.hub().forget(ticket);
         // What confirms a configuration need not move a coordinator.
-        answer["taken"] = json!(taken? || session.confirms(event));
+        let taken = taken? || session.confirms(event);
+        answer["taken"] = json!(taken);
+        if let Some(note) = (!taken).then(|| session.applied_over_safe(event)).flatten() {
+            answer["note"] = json!(note);
+        }
     } else {
         session.offer(event, "operator").map_err(not_raised)?;
     }

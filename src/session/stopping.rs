@@ -277,7 +277,7 @@ impl Session {
         Some(StandsStill { safe: frame.configuration.to_string(), since: frame.at.as_secs_f64(), leads_on })
     }
 
-    fn is_safe(&self, id: ConfigId) -> bool {
+    pub(super) fn is_safe(&self, id: ConfigId) -> bool {
         self.deployment().configurations.iter().any(|c| c.id == id && c.safe)
     }
 

@@ -1,6 +1,7 @@
 //! Why a step may not happen, as data. What a user reads of it is in `advice`.
 
 use crate::model::codes::{self, Code};
+use crate::model::finding::{are, count};
 use crate::model::{
     ComponentName, ComponentType, Ident, MemberRef, Origin, RunState, Transition, Tunable, TypeName, Value, ValueType,
 };
@@ -101,7 +102,7 @@ pub enum Violation {
     Driven { port: MemberRef, by: Vec<MemberRef> },
     #[error("`{port}` is {} port and cannot be written", if *event { "an event" } else { "a buffered" })]
     NotWritable { port: MemberRef, event: bool, declared: Origin },
-    #[error("`{operation}` takes {}, {found} {} given", arguments(wanted.len()), if *found == 1 { "is" } else { "are" })]
+    #[error("`{operation}` takes {}, {} given", arguments(wanted.len()), are(*found))]
     ArgumentCount { operation: MemberRef, wanted: Vec<ValueType>, found: usize, declared: Origin },
     #[error("argument {position} of `{operation}` cannot be {value}: {reason}")]
     Argument {
@@ -112,7 +113,7 @@ pub enum Violation {
         wanted: Vec<ValueType>,
         declared: Origin,
     },
-    #[error("`{component}` is created with {found} values, its type has {expected} properties")]
+    #[error("`{component}` is created with {}, its type has {}", count(found, "value"), count(expected, "property"))]
     PropertyCount { component: ComponentName, expected: usize, found: usize },
 }
 
@@ -139,11 +140,7 @@ pub fn either(types: &[TypeName]) -> String {
 }
 
 fn arguments(n: usize) -> String {
-    match n {
-        0 => "no arguments".to_owned(),
-        1 => "1 argument".to_owned(),
-        n => format!("{n} arguments"),
-    }
+    if n == 0 { "no arguments".to_owned() } else { count(n, "argument") }
 }
 
 fn states(tunable: Tunable) -> &'static str {

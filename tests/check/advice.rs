@@ -44,13 +44,16 @@ fn what_is_scoped_and_piles_up_since_its_undo_failed_is_not_to_be_scoped() {
     assert_eq!(soft.len(), 1, "{:#}", scoped.0);
     let (message, help) = soft[0];
     assert!(message.ends_with("after its undo has failed"), "{message}");
-    assert!(help.contains("`soft.undo.failed`") && !help.contains("config ="), "{help}");
+    assert!(help.contains("`soft.undo.failed`") && !help.contains("`config`"), "{help}");
     // Where nobody undoes it on the way round, though elsewhere, the old advice is true.
     let left = check(&round("", "soft", "soft.undo"), "");
     let found = texts(&left, "coord::stack_grows");
     assert_eq!(found.len(), 1, "{:#}", left.0);
     let (message, help) = found[0];
-    assert!(message.ends_with("without undoing it") && help.contains("config = \"soft\""), "{message}: {help}");
+    assert!(
+        message.ends_with("without undoing it") && help.contains("make `soft` the `config` of a state"),
+        "{message}: {help}"
+    );
 }
 
 #[test]

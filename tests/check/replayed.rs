@@ -120,3 +120,60 @@ fn a_circle_beside_the_bring_up_is_what_is_named() {
     let message = up[0]["message"].as_str().unwrap();
     assert!(message.starts_with("the bring-up goes round for ever at `one:root.up, two:root.up`"), "{message}");
 }
+
+/// On a way its script alone says what components raise: not the deployment once more.
+#[test]
+fn what_components_raise_by_themselves_comes_when_it_does_on_the_way() {
+    let conf = "base = Configuration { create('a', 'Drive'), post_conf_state = { 'a:running' } },
+                c0 = Configuration { property_set('a.gain', 2.0) }, wrong = Configuration { create('a', 'Drive') }";
+    let more = "late = state {}, other = state { entry = 'wrong' },
+        trans { src = 'building', tgt = 'stays', events = { 'e_seen' } },
+        trans { src = 'up', tgt = 'late', events = { 'e_seen' } },
+        trans { src = 'late', tgt = 'other', events = { 'e_seen' } },
+        trans { src = 'late', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'other', tgt = 'leaving', events = { 'e_shutdown', 'wrong.failed', 'wrong.broken' } },";
+    let keys = "simulated: { reactions: [{ after: start a, delay_s: 0.05, raise: e_seen, component: a }] }\n";
+    let small = Small::new(conf, &life("c0", more), keys);
+    let said = small.check();
+    let refused = said.refused("wrong");
+    assert!(!refused.is_empty(), "{:#}", said.0);
+    all_go(&small, &said);
+}
+
+/// Of what is held when it fails nothing may be done, where it has simply failed: whatever begins at once fails.
+#[test]
+fn what_holds_fails_only_where_nothing_beside_is_done() {
+    let conf = "base = Configuration { create('a', 'Drive'), create('b', 'Drive'), post_conf_state = { 'a:stopped', 'b:stopped' } },
+                c0 = Configuration { on_failure = 'hold', property_set('a.gain', 2.0), property_set('b.gain', 2.0) },
+                wrong = Configuration { create('a', 'Drive') }";
+    let more = "other = state { entry = 'wrong' },
+        trans { src = 'other', tgt = 'leaving', events = { 'e_shutdown', 'wrong.failed', 'wrong.broken' } },
+        trans { src = 'up', tgt = 'other', events = { 'c0.failed' }, pn = 1 },";
+    let moving =
+        conf.replace("on_failure = 'hold', ", "").replace("property_set('b.gain', 2.0)", "operation_call('b.raise')");
+    for conf in [conf, &moving] {
+        let small = Small::new(conf, &life("c0", more), "");
+        let said = small.check();
+        let refused = said.refused("wrong");
+        assert!(!refused.is_empty(), "{:#}", said.0);
+        all_go(&small, &said);
+    }
+}
+
+/// What is raised for nobody waits to be heard: the way to a state in which it lies in all inboxes.
+#[test]
+fn what_nobody_has_heard_yet_is_raised_all_the_same() {
+    let two = "idle = state {}, up = state {}, trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'up', events = { 'e_start' } }, trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },";
+    let conf = "base = Configuration { create('a', 'Drive'), post_conf_state = { 'a:stopped' } },
+                c0 = Configuration { property_set('a.gain', 2.0) }";
+    let small = Small::several(conf, &[("one", &life("c0", "")), ("two", two)], "");
+    let script =
+        "deploy('small.yaml', { replay = true }) raise('e_start', { to = {} }) wait_answer('e_start', 0) wait(0.1)
+        wait_state('one:idle', 0) wait_state('two:idle', 0)
+        raise('e_start', { to = 'two' }) wait_state('two:up', 0.1) wait_state('one:idle', 0)
+        raise('e_start', { to = { 'one' } }) wait_state('one:up', 1)";
+    small.demo.write("way.lua", script);
+    let ran = small.demo.run(&["run", "way.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
+}

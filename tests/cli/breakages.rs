@@ -211,3 +211,19 @@ fn a_missing_library_and_a_missing_file_are_named() {
     assert_eq!(ran.json()["findings"][0]["code"], "text::no_file");
     assert_eq!(ran.json()["findings"][0]["line"], line);
 }
+
+#[test]
+fn of_a_file_that_is_not_there_it_is_said_which_are() {
+    let demo = Demo::new();
+    let help = |args: &[&str]| demo.run(args).json()["findings"][0]["help"].as_str().unwrap_or_default().to_owned();
+    assert_eq!(help(&["check", "deploymnt.yaml", "--json"]), "did you mean `deployment.yaml`?");
+    std::fs::create_dir_all(demo.path("empty")).unwrap();
+    demo.write("empty/notes.txt", "");
+    let none = "no file in the folder empty is Lua, YAML or SCXML by its name";
+    assert_eq!(help(&["check", "empty/nope.yaml", "--json"]), none);
+    std::fs::create_dir_all(demo.path("empty/deployments")).unwrap();
+    demo.write("empty/deployments/arm.yaml", "");
+    let below = "in the folder empty/deployments: known files: `arm.yaml`";
+    assert_eq!(help(&["check", "empty/nope.yaml", "--json"]), below);
+    assert_eq!(help(&["check", "empty/none/nope.yaml", "--json"]), "there is no folder empty/none either");
+}

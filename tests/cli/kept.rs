@@ -91,6 +91,14 @@ fn what_cannot_be_kept_keeps_nobody_from_deploying() {
     assert_eq!(demo.run(&["shutdown"]).code, 0);
     let log = demo.run(&["log", "demo"]);
     assert!(log.code == 1 && log.err.contains("cli::not_running"), "{}", log.err);
+    // Its record, but not its log: nothing is left that would be told as one that died.
+    std::fs::remove_file(demo.path("state")).unwrap();
+    std::fs::create_dir_all(demo.path("state/davit/demo.log")).unwrap();
+    let up = deploy(&demo, "deployment.yaml");
+    assert!(up.err.contains("what happens is not kept"), "{}", up.err);
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    assert_eq!(demo.run(&["list"]).out, "no deployment is running\n");
+    assert_eq!(demo.run(&["status", "demo"]).code, 1);
 }
 
 #[test]
@@ -118,26 +126,62 @@ fn one_in_the_foreground_is_kept_too_also_when_a_third_signal_ends_it() {
     child.signal(libc::SIGINT);
     assert_eq!(child.end().code(), Some(4));
     let status = demo.run(&["status", "demo"]);
-    assert!(status.code == 1 && status.err.contains("by a third signal"), "{}{}", status.out, status.err);
+    for words in ["demo  died  it was ended at once, by a third signal", "look at the hardware"] {
+        assert!(status.code == 4 && status.out.contains(words), "{words}: {}{}", status.out, status.err);
+    }
+    let listed = demo.run(&["list"]);
+    assert!(listed.out.contains("demo  died"), "{}", listed.out);
 }
 
-/// What a process wrote down of itself was damaged, at its beginning or behind it: that it was there is told all the same.
+/// What a process wrote down of itself was damaged, at its beginning or behind it, or something else stands there: that is told,
+/// and neither a death nor an end that there may not have been.
 #[test]
-fn of_one_whose_record_is_damaged_it_is_told_that_it_died() {
+fn of_one_whose_record_is_damaged_it_is_told_that_it_is() {
     let demo = Demo::new();
     deploy(&demo, "deployment.yaml");
     kill(&demo, "demo");
-    let whole = demo.read("state/davit/demo.life");
-    for damaged in ["", "\u{1}garbage", "{\"pid\": 3", &format!("{whole}{{\"at\": ")] {
-        demo.write("state/davit/demo.life", damaged);
+    let died = demo.read("state/davit/demo.life");
+    deploy(&demo, "deployment.yaml");
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    let ended = demo.read("state/davit/demo.life");
+    assert_eq!(demo.run(&["status", "demo"]).code, 1, "whole, it is one that was shut down");
+    let end = ended.lines().nth(1).unwrap();
+    let damages = [
+        String::new(),
+        "\u{1}garbage".to_owned(),
+        "{\"pid\": 3".to_owned(),
+        format!("{died}{{\"at\": "),
+        died.trim_end().to_owned(),
+        format!("{{\"a\": 1}}\n{end}\n"),
+        "{\"at\": 1}\n{\"at\": 2}\n".to_owned(),
+        ended.replace("\"demo\"", "\"other\""),
+        ended.replace("{\"at\"", "{\"also\":1,\"at\""),
+        format!("{ended}garbage\n"),
+        format!("{ended}\n"),
+        format!("{ended}\u{0}\u{0}"),
+    ];
+    let told = |damage: &str| {
         let status = demo.run(&["status", "demo"]);
-        assert_eq!(status.code, 4, "{damaged:?}: {}{}", status.out, status.err);
-        for words in ["demo  died  its record is damaged", "it was       up", "look at the hardware"] {
-            assert!(status.out.contains(words), "{damaged:?}, {words}: {}", status.out);
+        assert_eq!(status.code, 4, "{damage:?}: {}{}", status.out, status.err);
+        for words in ["demo  damaged  its record cannot be read", "`davit list --forget demo`", "look at the hardware"]
+        {
+            assert!(status.out.contains(words), "{damage:?}, {words}: {}", status.out);
         }
-        assert_eq!(demo.run(&["status", "--json"]).json()["damaged"], true);
-        assert!(demo.run(&["list"]).out.contains("demo  died"), "{damaged:?}");
+        let json = demo.run(&["status", "--json"]).json();
+        assert_eq!((&json["phase"], &json["damaged"]), (&"damaged".into(), &true.into()), "{damage:?}");
+        assert!(demo.run(&["list"]).out.contains("demo  damaged"), "{damage:?}");
+    };
+    for damage in damages {
+        demo.write("state/davit/demo.life", &damage);
+        told(&damage);
     }
+    assert_eq!(demo.run(&["list", "--forget", "demo"]).code, 0);
+    assert_eq!(demo.run(&["list"]).out, "no deployment is running\n");
+    std::fs::create_dir_all(demo.path("state/davit/demo.life/full")).unwrap();
+    told("a folder");
+    let full = demo.run(&["list", "--forget", "demo"]);
+    assert!(full.code == 2 && full.err.contains("by hand"), "{}{}", full.out, full.err);
+    std::fs::remove_dir(demo.path("state/davit/demo.life/full")).unwrap();
     assert_eq!(demo.run(&["list", "--forget", "demo"]).code, 0);
     assert_eq!(demo.run(&["list"]).out, "no deployment is running\n");
 }

@@ -215,9 +215,8 @@ fn a_script_that_catches_its_interruption_is_stopped_all_the_same() {
     }
 }
 
-/// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
-#[test]
-fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
+/// In which an emergency is left on that event alone.
+fn with_an_emergency(left_on: &str) -> Demo {
     let demo = Demo::new();
     demo.write(
         "deployment.yaml",
@@ -236,7 +235,8 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     demo.write(
         "configurations.lua",
         "ConfiguratorConf { base = Configuration { create(\"a\", \"T\"), post_conf_state = { \"a:running\" } },
-          calm = Configuration { safe = true, property_set(\"a.g\", 0.0) } }",
+          calm = Configuration { safe = true, property_set(\"a.g\", 0.0) },
+          fast = Configuration { property_set(\"a.g\", 9.0) } }",
     );
     demo.write(
         "coordinator.lua",
@@ -247,11 +247,18 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
           trans { src = \"up\", tgt = \"leaving\", events = { \"e_stop\" } },
           trans { src = \"up\", tgt = \"safe\", events = { \"e_estop\" } },
           trans { src = \"leaving\", tgt = \"safe\", events = { \"e_estop\" } },
-          trans { src = \"safe\", tgt = \"gone\", events = { \"e_stop\" } },
+          trans { src = \"safe\", tgt = \"gone\", events = { \"LEFT_ON\" } },
           trans { src = \"gone\", tgt = \"idle\", events = { \"base.undone\" } },
         }",
     );
+    demo.replace("coordinator.lua", "LEFT_ON", left_on);
     demo.replace("deployment.yaml", "within_s: 1 }", "within_s: 600 }");
+    demo
+}
+
+/// The same on the way down.
+fn stopped_in_an_emergency(left_on: &str) -> (Demo, Foreground) {
+    let demo = with_an_emergency(left_on);
     let deployed = deploy(&demo, "out");
     demo.until_phase("up");
     deployed.signal(libc::SIGHUP);
@@ -260,6 +267,13 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     assert!(!status.out.contains("stands still"), "{}", status.out);
     let emergency = demo.run(&["event", "e_estop", "--wait", "calm.ok"]);
     assert_eq!(emergency.code, 0, "{}{}", emergency.out, emergency.err);
+    (demo, deployed)
+}
+
+/// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
+#[test]
+fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
+    let (demo, deployed) = stopped_in_an_emergency("e_stop");
     let status = demo.run(&["status"]);
     let says = "stands still, `calm` is in force since ";
     let leads_on =
@@ -271,4 +285,54 @@ shutdown: { event: e_stop, down: idle, within_s: 1 }
     let down = demo.run(&["shutdown"]);
     assert_eq!(down.code, 0, "{}{}", down.out, down.err);
     assert_eq!(deployed.end().code(), Some(0), "{}", demo.read("out"));
+}
+
+/// A command ends after its `--within`: with the deployment's word where that lives, and what it says is not that nobody answers.
+#[test]
+fn who_waits_for_less_than_it_takes_is_told_so() {
+    let (demo, deployed) = stopped_in_an_emergency("e_estop");
+    let late = demo.run(&["shutdown", "--within", "0.1"]);
+    assert_eq!(late.code, 1, "{}{}", late.out, late.err);
+    for words in ["it is not down yet", "`calm` is in force since ", "cli::refused"] {
+        assert!(late.err.contains(words), "{words}: {}", late.err);
+    }
+    // One that lives no more says nothing, however it is asked.
+    deployed.signal(libc::SIGSTOP);
+    let silent: [&[&str]; 10] = [
+        &["shutdown"],
+        &["event", "e_estop"],
+        &["apply", "calm"],
+        &["apply", "calm", "--no-wait"],
+        &["undo"],
+        &["commit"],
+        &["get", "a.g"],
+        &["set", "a.g", "2"],
+        &["drift"],
+        &["recover", "--back"],
+    ];
+    for command in silent {
+        let ran = demo.run(&[command, &["--within", "0.1"]].concat());
+        assert!(ran.code == 1 && ran.err.contains("cli::no_answer"), "{command:?} {}{}", ran.out, ran.err);
+        let (_, waited) = ran.err.split_once("nothing came within ").expect("for how long");
+        let waited: f64 = waited.split_whitespace().next().and_then(|it| it.parse().ok()).expect("a number");
+        assert!(waited <= 0.1 + davit::limits::ANSWER_WAY.as_secs_f64() + 0.05, "{command:?} {waited}");
+    }
+}
+
+/// The coordinator leads: what is safe already hears no emergency. Who sends one is told what was applied over that, and what to do.
+#[test]
+fn an_emergency_that_changes_nothing_says_what_was_applied_over_what_is_safe() {
+    let demo = with_an_emergency("e_stop");
+    let _deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    assert_eq!(demo.run(&["event", "e_estop", "--wait", "calm.ok"]).code, 0);
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.is_empty(), "{}{}", again.out, again.err);
+    assert_eq!(demo.run(&["apply", "fast", "--force"]).code, 0);
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.contains("since then came `fast` by operator"), "{}{}", again.out, again.err);
+    assert!(again.err.contains("`davit apply calm`"), "{}", again.err);
+    assert_eq!(demo.run(&["apply", "calm"]).code, 0, "what it says helps");
+    let again = demo.run(&["event", "e_estop"]);
+    assert!(again.code == 1 && again.err.is_empty(), "{}{}", again.out, again.err);
 }

@@ -223,7 +223,7 @@ fn mistakes_in_yaml() {
                 "text::wrong_type 3:20",
                 "a condition",
             ),
-            ("faulted: Link_Rx", "faulted: [Link_Rx, A]", "monitor::arguments 16:11", "1 arguments"),
+            ("faulted: Link_Rx", "faulted: [Link_Rx, A]", "monitor::arguments 16:11", "takes 1 argument, 2 are given"),
             ("Dynamics.f_raw_norm, 2.0]", "Dynamics, 2.0]", "text::bad_name 3:47", "Component.port"),
             ("Dynamics.f_raw_norm, 2.0]", "Dynamics.f_raw_norm, two]", "text::bad_name 3:68", "Component.port"),
             ("[0.1, .inf]", "[0.1, .nan]", "text::not_finite 24:104", "NaN"),

@@ -204,7 +204,7 @@ fn yaml(text: &str) -> Loaded {
 fn configurations_in_yaml() {
     let table = [
         ("configurations:", "configuration:", "text::unknown_key 1:1", "`configurations`"),
-        ("timeout: 0.5", "timeout: 500ms", "text::bad_time 3:14", "timeout = 0.5"),
+        ("timeout: 0.5", "timeout: 500ms", "text::bad_time 3:14", "timeout: 0.5"),
         ("timeout: 0.5", "timout: 0.5", "text::unknown_key 3:5", "`timeout`"),
         ("\"A:stopped\"", "\"A:stoped\"", "conf::bad_state 5:25", "`stopped`"),
         ("\"A:stopped\"", "\"A:faulted\"", "conf::faulted_demanded 5:25", "unconfigured"),
@@ -225,7 +225,7 @@ fn configurations_in_yaml() {
             "[\"_default:running\"]\n    conf",
             "{ _default: running, A: stopped }\n    conf",
             "conf::keyed_entries 10:22",
-            "'A:stopped'",
+            "\"A:stopped\"",
         ),
     ];
     let mut answers = Answers::default();
@@ -300,4 +300,53 @@ fn all_findings_come_at_once() {
         codes(&with_configurations(text)),
         ["lua::undefined 4:13", "text::bad_name 3:18", "text::wrong_type 5:20", "text::unknown_key 2:24"]
     );
+}
+
+/// What helps is written as the file is in which the mistake stands.
+#[test]
+fn examples_are_in_the_language_of_the_file() {
+    let mut answers = Answers::default();
+    let lua = [
+        ("connect(\"A.y\", \"B.u\", { buffer = 8 })", "connect(\"A.y\")", "text::missing_key 6:5", "`connect(\"Kin."),
+        ("\"Gain\",", "nil,", "text::missing_key 5:5", "`create("),
+        ("event = \"e_ok\", ", "", "text::missing_key 3:5", "`confirm = { event"),
+        ("within = 2.0", "within = true", "text::wrong_type 3:33", "`within = 2.0`"),
+        ("'A:stopped'", "'A'", "conf::bad_state 4:24", "`{ 'compA:running'"),
+    ];
+    for (from, to, expected, hint) in lua {
+        answers.one(&replaced("c.lua", LUA, from, to), (from, to), expected, hint);
+    }
+    let text = "configurations:
+  up:
+    timeout: 0.5
+    confirm: { event: e_ok, within: 2.0 }
+    holds: { above: [A.y, 1.0] }
+    pre_conf_state: [\"A:stopped\"]
+    changes:
+      - connect: { from: A.y, to: B.u, policy: { buffer: 8 } }
+      - create: { component: A, type: Gain, properties: { k: 1.0 } }
+";
+    let table = [
+        ("timeout: 0.5", "timeout: half", "text::bad_time 3:14", "`timeout: 0.5`"),
+        ("event: e_ok, ", "", "text::missing_key 4:14", "`confirm: { event: e_aligned"),
+        ("within: 2.0", "within: true", "text::wrong_type 4:37", "`within: 2.0`"),
+        ("above: [A.y, 1.0]", "above: [A.y]", "monitor::arguments 5:14", "`{ above: [A.x, 2.0] }`"),
+        ("holds: { above: [A.y, 1.0] }", "holds: 3", "text::wrong_type 5:12", "`{ above: [A.x, 2.0] }`"),
+        ("A:stopped", "A", "conf::bad_state 6:22", "[\"compA:running\""),
+        ("[\"A:stopped\"]", "{ A: stopped, B: stopped }", "conf::keyed_entries 6:21", "[\"A:stopped\", \"B:stopped\"]"),
+        ("[\"A:stopped\"]", "3", "text::wrong_type 6:21", "[\"compA:running\""),
+        (", to: B.u", "", "text::missing_key 8:18", "`to: Dynamics.jacobian`"),
+        ("buffer: 8", "buffer: 0", "text::bad_value 8:58", "`{ buffer: 64 }`"),
+        (
+            "- create: { component: A, type: Gain, properties: { k: 1.0 } }",
+            "- 3",
+            "text::wrong_type 9:9",
+            "- property_set: {",
+        ),
+        ("{ k: 1.0 }", "3", "text::wrong_type 9:57", "`properties: { friction_comp: 0.9 }`"),
+    ];
+    for (from, to, expected, hint) in table {
+        assert!(text.contains(from), "`{from}` is not in the example");
+        answers.one(&yaml(&text.replacen(from, to, 1)), (from, to), expected, hint);
+    }
 }

@@ -10,7 +10,7 @@ use davit::session::service::SessionService;
 use davit::session::socket::Service;
 use davit::session::{Command, Ended, Happening, Session, Stage, rpc};
 use davit::time::{Clock, Guard};
-use serde_json::json;
+use serde_json::{Value as Json, json};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -382,10 +382,30 @@ fn what_was_made_safe_at_the_very_instant_was_so_before() {
     assert!((20.0..22.0).contains(&took) && ended.is_clean(), "{took} {ended:?}");
 }
 
-/// Time goes on by so little that on the deployment's clock less than a second passes, however busy the machine is.
-fn until_finished<T>(session: &Session, asked: &std::thread::JoinHandle<T>) {
-    while !asked.is_finished() {
-        session.clock().sleep(Duration::from_nanos(100));
+impl Small {
+    /// It is stopped, and once nobody leads somebody sends the safety event so many times in a row; then it is forced. What was
+    /// answered, and how it ended.
+    fn stop_while_sent(&self, times: usize) -> (Vec<Json>, Ended) {
+        let service = SessionService::new(Arc::downgrade(&self.session));
+        let answered = Arc::new(Mutex::new(Vec::new()));
+        let told = answered.clone();
+        self.after(6.0, move |session| {
+            // Who waits outside the clock is no participant of it.
+            let asked = std::thread::spawn(move || {
+                for _ in 0..times {
+                    let params = json!({"event": "e_estop", "wait": true});
+                    told.lock().unwrap().push(service.call(1, "event", &params).unwrap());
+                }
+            });
+            // Time goes on by so little that on the deployment's clock less than a second passes, however busy the machine is.
+            while !asked.is_finished() {
+                session.clock().sleep(Duration::from_nanos(100));
+            }
+            force(session);
+            asked.join().unwrap();
+        });
+        let (ended, _) = self.stop();
+        (std::mem::take(&mut *answered.lock().unwrap()), ended)
     }
 }
 
@@ -393,23 +413,7 @@ fn until_finished<T>(session: &Session, asked: &std::thread::JoinHandle<T>) {
 #[test]
 fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
     let small = Small::up("deaf");
-    let service = SessionService::new(Arc::downgrade(&small.session));
-    let answered = Arc::new(Mutex::new(Vec::new()));
-    let told = answered.clone();
-    small.after(6.0, move |session| {
-        // Who waits outside the clock is no participant of it.
-        let asked = std::thread::spawn(move || {
-            for _ in 0..2 {
-                let params = json!({"event": "e_estop", "wait": true});
-                told.lock().unwrap().push(service.call(1, "event", &params).unwrap());
-            }
-        });
-        until_finished(session, &asked);
-        force(session);
-        asked.join().unwrap();
-    });
-    let (ended, _) = small.stop();
-    let answered = std::mem::take(&mut *answered.lock().unwrap());
+    let (answered, ended) = small.stop_while_sent(2);
     assert_eq!(answered[0], json!({"accepted": true, "taken": true, "acted": ["calm.ok"]}), "{ended:?}");
     assert_eq!(answered[1], json!({"accepted": true, "taken": true, "acted": ["calm.ok"], "before": true}));
     let log = small.session.hub().log(usize::MAX);
@@ -428,22 +432,7 @@ fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
 fn a_safety_event_that_failed_acts_again_when_it_is_sent_again() {
     let small = Small::new("deaf", vec![FaultRule::on("property_set a.g", Fault::Fail).times(1)]);
     small.session.bring_up().unwrap_or_else(|not| panic!("{not:#?}"));
-    let service = SessionService::new(Arc::downgrade(&small.session));
-    let answered = Arc::new(Mutex::new(Vec::new()));
-    let told = answered.clone();
-    small.after(6.0, move |session| {
-        let asked = std::thread::spawn(move || {
-            for _ in 0..3 {
-                let params = json!({"event": "e_estop", "wait": true});
-                told.lock().unwrap().push(service.call(1, "event", &params).unwrap());
-            }
-        });
-        until_finished(session, &asked);
-        force(session);
-        asked.join().unwrap();
-    });
-    let (ended, _) = small.stop();
-    let all = std::mem::take(&mut *answered.lock().unwrap());
+    let (all, ended) = small.stop_while_sent(3);
     assert_eq!(all[0], json!({"accepted": true, "taken": true, "acted": ["calm.broken"]}));
     assert_eq!(all[1], json!({"accepted": true, "taken": true, "acted": ["calm.ok"]}));
     assert_eq!(all[2], json!({"accepted": true, "taken": true, "acted": ["calm.ok"], "before": true}));

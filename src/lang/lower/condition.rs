@@ -4,7 +4,7 @@ use super::{Unit, choice, name, number, time};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use crate::limits::MONITOR_DEPTH;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{are, count, did_you_mean};
 use crate::model::monitor::{Comparison, Condition, ConditionKind, Counter, Interval, PortSignal, Signal, SignalKind};
 use crate::model::{ComponentName, Finding, Ident, MemberRef, Origin, RunState, codes};
 use std::time::Duration;
@@ -63,7 +63,8 @@ fn term(cx: &mut Cx, node: Node, wanted: Expected) -> Option<Term> {
                 return None;
             }
             _ => {
-                cx.wrong(&node, wanted.what, &format!("{}, such as `{}`", wanted.what, wanted.example), wanted.example);
+                let example = cx.spelt(origin, wanted.example);
+                cx.wrong(&node, wanted.what, &format!("{}, such as `{example}`", wanted.what), &example);
                 return None;
             }
         };
@@ -72,7 +73,11 @@ fn term(cx: &mut Cx, node: Node, wanted: Expected) -> Option<Term> {
         let (message, help) = match wanted.others.iter().find(|word| word.name == key) {
             Some(_) if wanted.what == A_CONDITION.what => (
                 format!("`{key}` is a signal, not a condition"),
-                format!("compare it with something: `above({key}(…), 2.0)`"),
+                cx.either(
+                    key_origin,
+                    &format!("compare it with something: `above({key}(…), 2.0)`"),
+                    &format!("compare it with something: `{{ above: [{{ {key}: [ … ] }}, 2.0] }}`"),
+                ),
             ),
             Some(_) => (
                 format!("`{key}` is a condition, not a signal"),
@@ -88,12 +93,12 @@ fn term(cx: &mut Cx, node: Node, wanted: Expected) -> Option<Term> {
     };
     if args.len() < word.least || args.len() > word.most {
         let most = if word.most > 20 { "or more".to_owned() } else { format!("to {}", word.most) };
-        let count = if word.least == word.most { word.least.to_string() } else { format!("{} {most}", word.least) };
-        let message = format!("`{}` takes {count} arguments, this are {}", word.name, args.len());
+        let takes = if word.least == word.most { word.least.to_string() } else { format!("{} {most}", word.least) };
+        let takes = count(takes, "argument");
+        let message = format!("`{}` takes {takes}, {} given", word.name, are(args.len()));
+        let example = cx.spelt(key_origin, word.usage);
         cx.report(
-            Finding::error(codes::MONITOR_ARGUMENTS, message)
-                .at(key_origin)
-                .help(format!("write it like `{}`; in YAML `{{ {}: [ … ] }}`", word.usage, word.name)),
+            Finding::error(codes::MONITOR_ARGUMENTS, message).at(key_origin).help(format!("write it like `{example}`")),
         );
         return None;
     }
@@ -200,9 +205,12 @@ fn comparison(cx: &mut Cx, mut t: Term, op: Comparison, depth: usize) -> Option<
         && (!direct || hysteresis.is_some())
     {
         let message = "an age is compared with a number of seconds, by itself";
-        cx.report(Finding::error(codes::MONITOR_AGE, message).at(origin).help(
-            "write it like `above(age(\"A.x\"), 0.1)`; several ages are compared each, in `all { … }` or `any { … }`",
-        ));
+        let example = cx.spelt(origin, "above(age(\"A.x\"), 0.1)");
+        cx.report(
+            Finding::error(codes::MONITOR_AGE, message)
+                .at(origin)
+                .help(format!("write it like `{example}`; several ages are compared each, in `all` or `any`")),
+        );
         return None;
     }
     Some(ConditionKind::Compare { left, op, right, hysteresis })
@@ -329,10 +337,11 @@ fn interval(cx: &mut Cx, node: Node, word: &'static Word) -> Option<Interval> {
         return None;
     };
     let Ok([from, to]) = <[Node; 2]>::try_from(list) else {
+        let example = cx.spelt(origin, word.usage);
         cx.report(
             Finding::error(codes::MONITOR_BAD_INTERVAL, format!("{what} has two ends"))
                 .at(origin)
-                .help(format!("write it like `{}`: from so many seconds ago to so many", word.usage)),
+                .help(format!("write it like `{example}`: from so many seconds ago to so many")),
         );
         return None;
     };

@@ -14,12 +14,33 @@ use std::collections::BTreeMap;
 pub const VERBS: &[&str] =
     &["create", "destroy", "connect", "disconnect", "property_set", "port_write", "operation_call"];
 
+/// How changes are written in Lua: what they need has no names there.
+const CALLS: [(&str, &str); 8] = [
+    ("create", "create(\"Dynamics\", \"youbot.Dynamics\")"),
+    ("destroy", "destroy(\"Dynamics\")"),
+    ("connect", "connect(\"Kin.jacobian\", \"Dynamics.jacobian\")"),
+    ("disconnect", "disconnect(\"Kin.jacobian\", \"Dynamics.jacobian\")"),
+    ("property_set", "property_set(\"Dynamics.force_gain\", 0.5)"),
+    ("port_write", "port_write(\"Cart_Impedance.ext_ref_mode\", true)"),
+    ("operation_call", "operation_call(\"youbot.setControlMode\", 6)"),
+    ("`undo`", "operation_call(\"youbot.setControlMode\", 6):undo(\"youbot.setControlMode\", 0)"),
+];
+
+/// What a change needs, with an example in YAML.
+fn required(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) -> Option<Node> {
+    let call = CALLS.iter().find(|(verb, _)| *verb == fields.what()).map_or("", |(_, call)| call);
+    let help = |cx: &Cx, origin| cx.either(origin, &format!("write it like `{call}`"), &format!("add `{example}`"));
+    fields.needed(cx, key, help)
+}
+
 /// Longest FIFO of a connection.
 const LONGEST_BUFFER: i64 = 1_000_000;
 
 /// A map of named configurations, in the order given.
 pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
-    let Some(entries) = entries(cx, node, "the list of configurations", "engage: { changes: [...] }") else {
+    let example =
+        cx.either(node.origin, "ConfiguratorConf { engage = Configuration { … } }", "engage: { changes: [ … ] }");
+    let Some(entries) = entries(cx, node, "the list of configurations", &example) else {
         return Vec::new();
     };
     let mut all = Vec::with_capacity(entries.len());
@@ -60,7 +81,9 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
         Kind::Map(named) => (named, Vec::new()),
         Kind::List(list) if list.is_empty() => (Vec::new(), list),
         _ => {
-            cx.wrong(&node, "a configuration", "a table", "name = Configuration { property_set(\"A.k\", 1.0) }");
+            let lua = "name = Configuration { property_set(\"A.k\", 1.0) }";
+            let yaml = "name: { changes: [{ property_set: { property: A.k, value: 1.0 } }] }";
+            cx.wrong(&node, "a configuration", "a table", &cx.either(origin, lua, yaml));
             return None;
         }
     };
@@ -74,7 +97,11 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     if let Some(node) = fields.take("changes") {
         match node.kind {
             Kind::List(list) => changes.extend(list),
-            _ => cx.wrong(&node, "`changes`", "a list", "changes: [{ destroy: Dynamics }]"),
+            _ => {
+                let lua = "changes = { destroy(\"Dynamics\") }";
+                let example = cx.either(origin, lua, "changes: [{ destroy: { component: Dynamics } }]");
+                cx.wrong(&node, "`changes`", "a list", &example);
+            }
         }
     }
     c.changes = Vec::with_capacity(changes.len());
@@ -176,6 +203,7 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
                 _ => format!("'{}:stopped'", e.key),
             })
             .collect();
+        let as_list = cx.spelt(list_origin, &format!("{{ {} }}", as_list.join(", ")));
         cx.report(
             Finding::error(
                 codes::CONF_KEYED_ENTRIES,
@@ -183,7 +211,7 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
             )
             .at(list_origin)
             .labelled("in which order?")
-            .help(format!("write them as a list, in the order wanted: `{{ {} }}`", as_list.join(", "))),
+            .help(format!("write them as a list, in the order wanted: `{as_list}`")),
         );
     }
     let mut found: Vec<StateEntry> = Vec::with_capacity(list.len() + keyed.len());
@@ -194,10 +222,11 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
         };
         let origin = cx.inside(list_origin, node.origin, text);
         let Some((who, state)) = text.rsplit_once(':') else {
+            let example = cx.spelt(list_origin, EXAMPLE);
             cx.report(
                 Finding::error(codes::CONF_BAD_STATE, format!("`{text}` does not say which state"))
                     .at(origin)
-                    .help(format!("write `component:state`, as in `{EXAMPLE}`")),
+                    .help(format!("write `component:state`, as in `{example}`")),
             );
             continue;
         };
@@ -284,12 +313,8 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
             return None;
         }
         _ => {
-            cx.wrong(
-                &node,
-                "an element of a configuration",
-                "a change",
-                "property_set(\"Dynamics.force_gain\", { 0.1, 0.1, 0.1 })",
-            );
+            let example = cx.either(origin, "property_set(\"Dynamics.force_gain\", { 0.1, 0.1, 0.1 })", EXAMPLE);
+            cx.wrong(&node, "an element of a configuration", "a change", &example);
             return None;
         }
     };
@@ -300,7 +325,7 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
     let kind = match verb {
         "create" => {
             let component = component(cx, &mut fields);
-            let ty = fields.required(cx, "type", "type: youbot.Dynamics");
+            let ty = required(cx, &mut fields, "type", "type: youbot.Dynamics");
             let ty = ty.and_then(|node| name::<TypeName>(cx, &node, "a component type", "youbot.Dynamics"));
             let activity = fields
                 .take("activity")
@@ -349,18 +374,18 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
 }
 
 fn component(cx: &mut Cx, fields: &mut Fields) -> Option<ComponentName> {
-    let node = fields.required(cx, "component", "component: Dynamics")?;
+    let node = required(cx, fields, "component", "component: Dynamics")?;
     name(cx, &node, "a component", "Dynamics")
 }
 
 fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) -> Option<MemberRef> {
-    let node = fields.required(cx, key, &format!("{key}: {example}"))?;
+    let node = required(cx, fields, key, &format!("{key}: {example}"))?;
     name(cx, &node, key, example)
 }
 
 /// The value of `slot`, which is called `what` where its name could not be read.
 fn required_value(cx: &mut Cx, fields: &mut Fields, slot: Option<MemberRef>, what: &str) -> Option<Value> {
-    let node = fields.required(cx, "value", "value: 0.5")?;
+    let node = required(cx, fields, "value", "value: 0.5")?;
     match slot {
         Some(slot) => value(cx, node, &format!("`{slot}`")),
         None => value(cx, node, what),

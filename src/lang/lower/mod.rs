@@ -34,6 +34,7 @@ pub fn name<T: FromStr<Err = NameError>>(cx: &mut Cx, node: &Node, what: &str, e
 
 fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
     let origin = cx.place(node);
+    let example = cx.spelt(node.origin, example);
     let shown: String = error.text.chars().take(60).collect();
     cx.report(
         Finding::error(codes::TEXT_BAD_NAME, format!("`{shown}` is not {} {}", error.article(), error.kind))
@@ -93,6 +94,7 @@ pub fn whole(cx: &mut Cx, node: &Node, what: &str, range: std::ops::RangeInclusi
         Kind::Int(v) => {
             let (min, max) = (range.start(), range.end());
             let origin = cx.place(node);
+            let example = cx.spelt(node.origin, example);
             cx.report(
                 Finding::error(codes::TEXT_BAD_VALUE, format!("{what} must be from {min} to {max}, this is {v}"))
                     .at(origin)
@@ -149,6 +151,7 @@ const LONGEST: f64 = 86_400.0;
 
 /// A time: a positive number of the unit, at most a day.
 pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> Option<Duration> {
+    let example = &cx.spelt(node.origin, example);
     let (word, factor) = match unit {
         Unit::Seconds => ("seconds", 1.0),
         Unit::Milliseconds => ("milliseconds", 1e-3),
@@ -238,6 +241,7 @@ pub fn value(cx: &mut Cx, node: Node, what: &str) -> Option<Value> {
             (fields.len() == length).then_some(Value::Record(fields))
         }
         Kind::Mixed(..) => {
+            // Only Lua can.
             cx.report(
                 Finding::error(codes::TEXT_WRONG_TYPE, format!("{what} mixes list and record"))
                     .at(node.origin)

@@ -3,6 +3,7 @@
 use super::recorder::{Classed, Shared};
 use super::{convert, sandbox};
 use crate::lang::tree::{Entry, Kind, Node};
+use crate::model::finding::{are, count};
 use crate::model::{Code, Finding, Origin, codes};
 use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
 use std::borrow::Cow;
@@ -144,7 +145,8 @@ fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'sta
         let more = rest.count();
         let mut recorder = recorder.borrow_mut();
         if more > 0 {
-            let message = format!("`{verb}` takes {} arguments, this are {}", names.len(), names.len() + more);
+            let (takes, given) = (count(names.len(), "argument"), are(names.len() + more));
+            let message = format!("`{verb}` takes {takes}, {given} given");
             let finding = Finding::error(codes::LUA_ARGUMENTS, message).at(origin);
             recorder.cx.report(finding.help(format!("write `{verb}({})`", names.join(", "))));
         }

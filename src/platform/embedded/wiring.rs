@@ -2,6 +2,7 @@
 
 use super::registry::{ByAddress, Connection, Registry, refused};
 use crate::limits;
+use crate::model::finding::count;
 use crate::model::{ComponentType, Direction, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Value};
 use crate::platform::Cause;
 use crate::runtime::builder::PortEnd;
@@ -241,7 +242,8 @@ fn check_value(ty: &PropertyType, value: &Value) -> Result<(), String> {
 /// Whether these are the values of all properties of a type, in the order of names.
 pub(super) fn check_values(cell_type: &ComponentType, values: &[Value]) -> Result<(), Cause> {
     if values.len() != cell_type.properties.len() {
-        return refused(format!("{} values for {} properties", values.len(), cell_type.properties.len()));
+        let (given, wanted) = (count(values.len(), "value"), count(cell_type.properties.len(), "property"));
+        return refused(format!("{given} for {wanted}"));
     }
     for ((name, ty), value) in cell_type.properties.iter().zip(values) {
         check_value(ty, value).or_else(|why| refused(format!("`{name}`: {why}")))?;

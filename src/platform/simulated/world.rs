@@ -3,6 +3,7 @@
 //! It uses nothing of `system` or `plan`, so that what it accepts and what it ends in is an independent word on what they
 //! accept and end in.
 
+use crate::model::finding::{are, count};
 use crate::model::value::FitError;
 use crate::model::{
     Catalogue, ComponentName, ComponentSnapshot, ComponentType, Direction, Ident, MemberRef, Policy, PortType,
@@ -127,7 +128,7 @@ impl World {
                     .get(&call.operation.member)
                     .ok_or_else(|| format!("there is no operation `{}`", call.operation))?;
                 if ty.args.len() != call.args.len() {
-                    return Err(format!("`{}` takes {} arguments", call.operation, ty.args.len()));
+                    return Err(format!("`{}` takes {}", call.operation, count(ty.args.len(), "argument")));
                 }
                 call.args.iter().zip(&ty.args).try_for_each(|(value, ty)| exactly(value, ty))
             }
@@ -151,12 +152,8 @@ impl World {
             return Err(format!("there is no activity `{activity}`"));
         }
         if properties.len() != ty.properties.len() {
-            return Err(format!(
-                "`{}` has {} properties, {} values are given",
-                ty.name,
-                ty.properties.len(),
-                properties.len()
-            ));
+            let (wanted, given) = (count(ty.properties.len(), "property"), are(properties.len()));
+            return Err(format!("`{}` has {wanted}, {given} given", ty.name));
         }
         for ((name, property), value) in ty.properties.iter().zip(properties) {
             exactly(value, &property.ty)?;

@@ -18,9 +18,25 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 /// Keeps a deployment's log and its life, as long as it is there.
 pub struct Keeper {
-    life: Arc<File>,
+    last: Last,
     tap: Tap<Kept>,
     beat: Arc<Beat>,
+}
+
+/// What a life says last: once, whoever says it first.
+#[derive(Clone)]
+struct Last {
+    life: Arc<File>,
+    said: Arc<Mutex<bool>>,
+}
+
+impl Last {
+    fn say(&self, end: &End) {
+        let mut said = lock(&self.said);
+        if !std::mem::replace(&mut said, true) {
+            let _ = say(&self.life, &serde_json::to_string(end).expect("plain data"));
+        }
+    }
 }
 
 /// Says, in a process that ends at once, that it does.
@@ -54,16 +70,27 @@ impl Keeper {
     pub fn open(name: &str, of: &Path, clock: &Clock) -> io::Result<Self> {
         prepared()?;
         let missing = || io::Error::from(io::ErrorKind::NotFound);
-        let life = Arc::new(locked(&file(name, "life").ok_or_else(missing)?)?);
+        let path = file(name, "life").ok_or_else(missing)?;
+        let life = Arc::new(locked(&path)?);
+        // What stands there of an earlier life stays until this one is written; then nothing stays of one that is not kept.
+        let mut none_before = life.metadata()?.len() == 0;
+        Self::keep(name, of, clock, life, &mut none_before).inspect_err(|_| {
+            if none_before {
+                let _ = std::fs::remove_file(&path);
+            }
+        })
+    }
+
+    /// The same, with the record locked. `gone`: nothing stands in that of a life before.
+    fn keep(name: &str, of: &Path, clock: &Clock, life: Arc<File>, gone: &mut bool) -> io::Result<Self> {
+        let missing = || io::Error::from(io::ErrorKind::NotFound);
         let of = std::path::absolute(of).unwrap_or_else(|_| of.to_owned());
-        let began = Began { pid: std::process::id(), began: Wall::now(), file: of, boot: boot() };
+        let own = Some(name.to_owned());
+        let began = Began { name: own, pid: std::process::id(), began: Wall::now(), file: of, boot: boot() };
         let log = Rotating::open(log_file(name).ok_or_else(missing)?, limits::KEPT_BYTES)?;
-        // Last of what may fail: what says that it began has all that is needed to say how it ended.
+        *gone = true;
         life.set_len(0)?;
-        say(&life, &serde_json::to_string(&began).expect("plain data")).inspect_err(|_| {
-            // Half a word would be told as that of one that died.
-            let _ = file(name, "life").map(std::fs::remove_file);
-        })?;
+        say(&life, &serde_json::to_string(&began).expect("plain data"))?;
         let begins = json!({ "at": 0.0, "what": "began", "when": began.began.to_string(), "pid": began.pid });
         let mut writer = Writer { log, story: Story::default(), missing: 0, begins: Some(begins) };
         writer.begin();
@@ -71,7 +98,7 @@ impl Keeper {
         let beat = Arc::new(Beat::default());
         let lives = (life.clone(), beat.clone());
         std::thread::Builder::new().name("davit-lives".to_owned()).spawn(move || live(&lives.0, &lives.1))?;
-        Ok(Self { life, tap, beat })
+        Ok(Self { last: Last { life, said: Arc::default() }, tap, beat })
     }
 
     /// What to give to the session.
@@ -91,11 +118,10 @@ impl Keeper {
 
     /// For a process that ends at once.
     pub fn leave(&self) -> Leave {
-        let life = self.life.clone();
+        let last = self.last.clone();
         Box::new(move || {
-            let why =
-                Some("it was ended at once, by a third signal: the components were asked nothing more".to_owned());
-            let _ = say(&life, &serde_json::to_string(&End { at: Wall::now(), why, ended: None }).expect("plain data"));
+            let why = "it was ended at once, by a third signal: the components were asked nothing more".to_owned();
+            last.say(&End { at: Wall::now(), why: Some(why), ended: None });
         })
     }
 
@@ -106,7 +132,7 @@ impl Keeper {
         self.tap.put_own(Kept::Own(own));
         self.tap.finish(limits::TAP_END);
         // Last: what says that it ended has all that happened before it.
-        let _ = say(&self.life, &serde_json::to_string(end).expect("plain data"));
+        self.last.say(end);
     }
 }
 
@@ -209,5 +235,22 @@ impl Writer {
 
     fn put(&mut self, line: &Json) -> io::Result<()> {
         self.log.line(&line.to_string(), || self.story.head().to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_behind_the_end_adds_nothing_to_it() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let last = Last { life: Arc::new(file.reopen().unwrap()), said: Arc::default() };
+        let end = |why: &str| End { at: Wall::now(), why: Some(why.to_owned()), ended: None };
+        last.say(&end("it did not come up"));
+        last.clone().say(&end("a third signal"));
+        let mut text = String::new();
+        io::Read::read_to_string(file.as_file_mut(), &mut text).unwrap();
+        assert!(text.lines().count() == 1 && text.contains("come up"), "{text}");
     }
 }

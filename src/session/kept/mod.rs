@@ -3,7 +3,8 @@
 //!
 //! In a directory of the user's own, two things a name. `NAME.life`: a line with the process and when it began, a second
 //! one with how it ended; the process holds a lock on it as long as it lives, and its time of modification says when it lived
-//! last. A life that nobody holds and that has no second line ended without a word. `NAME.log`, and `NAME.log.1` before it: the
+//! last. A life that nobody holds and that has no second line ended without a word; of one in which anything else stands
+//! nothing is known. `NAME.log`, and `NAME.log.1` before it: the
 //! entries of the log, one JSON object a line.
 
 mod keeper;
@@ -20,6 +21,7 @@ use crate::limits;
 use crate::time::{Clock, Wall};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The directory: `$XDG_STATE_HOME/davit`, else `.local/state/davit` in the user's home; none where there is no home.
@@ -43,7 +45,11 @@ pub fn log_file(name: &str) -> Option<PathBuf> {
 
 /// A deployment's process, as it wrote itself down.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Began {
+    /// The deployment's name, which a copy of another one's file gives away.
+    #[serde(default)]
+    name: Option<String>,
     /// Its number.
     pub pid: u32,
     /// When it began.
@@ -56,12 +62,13 @@ pub struct Began {
 
 /// How it ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct End {
     /// When.
     pub at: Wall,
     /// Why it did not come up, or ended at once.
     pub why: Option<String>,
-    /// How far stopping went, where it was stopped.
+    /// How far stopping went; none: the process ended at once, and nobody knows what is up still.
     pub ended: Option<Ended>,
 }
 
@@ -72,8 +79,8 @@ pub struct Life {
     pub name: String,
     /// Its process; none: what it wrote down of itself cannot be read.
     pub process: Option<Began>,
-    /// It wrote something after that, which cannot be read.
-    pub torn: bool,
+    /// What stands in its record is not that, or not that alone.
+    damaged: bool,
     /// When it was seen alive last.
     pub seen: Wall,
     /// Whether it lives.
@@ -85,32 +92,44 @@ pub struct Life {
 }
 
 impl Life {
-    /// Whether what it wrote down of itself cannot be read, or not all of it.
+    /// Whether it does not live, and what it wrote down of itself cannot be read, or not all of it: how it ended is not known.
     pub fn is_damaged(&self) -> bool {
-        self.process.is_none() || self.torn
+        !self.alive && self.damaged
     }
 
-    /// Whether it ended without a word: killed, crashed, or the machine went down under it.
+    /// Whether it was not shut down: killed, crashed, ended at once by signals, or the machine went down under it.
     pub fn died(&self) -> bool {
-        !self.alive && self.end.is_none()
+        !self.alive && !self.damaged && self.end.as_ref().is_none_or(|end| end.ended.is_none())
+    }
+
+    /// Whether nobody knows what is up still of it: it died, or it is not known how it ended.
+    pub fn is_open(&self) -> bool {
+        self.died() || self.is_damaged()
     }
 }
 
 /// What is known of the last life of that name; none: nothing is kept.
 pub fn life(name: &str) -> Option<Life> {
-    let file = reading::opened(&file(name, "life")?).ok()?;
-    let alive = matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
-    let text = reading::end_of(&file, limits::LIFE_BYTES).ok()?;
-    let text = String::from_utf8_lossy(&text);
-    let seen = file.metadata().ok()?.modified().ok()?.into();
-    let mut lines = text.lines();
-    // That it was there is known also where what it wrote is damaged.
-    let process: Option<Began> = lines.next().and_then(|line| serde_json::from_str(line).ok());
-    let last = lines.next();
-    let end: Option<End> = last.and_then(|line| serde_json::from_str(line).ok());
-    let torn = last.is_some() && end.is_none();
+    let path = file(name, "life")?;
+    // That there was something is known also where what stands there is damaged, or no file at all.
+    let seen = fs::symlink_metadata(&path).ok()?.modified().ok()?.into();
+    let opened = reading::opened(&path);
+    let alive = opened.as_ref().is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
+    let text = opened.and_then(|file| reading::end_of(&file, limits::LIFE_BYTES)).unwrap_or_default();
+    let (process, end) = record(name, &text).unzip();
+    let damaged = process.is_none();
     let rebooted = process.as_ref().is_some_and(|began| began.boot.is_some() && began.boot != boot());
-    Some(Life { name: name.to_owned(), process, torn, seen, alive, end, rebooted })
+    Some(Life { name: name.to_owned(), process, damaged, seen, alive, end: end.flatten(), rebooted })
+}
+
+/// What a record of that name says; none: not only that of such a process stands there.
+fn record(name: &str, text: &[u8]) -> Option<(Began, Option<End>)> {
+    let text = std::str::from_utf8(text).ok()?.strip_suffix('\n')?;
+    let mut lines = text.split('\n');
+    let began: Began = serde_json::from_str(lines.next()?).ok()?;
+    let end = lines.next().map(serde_json::from_str).transpose().ok()?;
+    let own = began.name.as_deref().is_none_or(|own| own == name);
+    (own && lines.next().is_none()).then_some((began, end))
 }
 
 /// The same of a deployment that has just gone: what its process held is free a moment after it has closed its connections.
@@ -138,15 +157,23 @@ pub fn lives() -> Vec<Life> {
     names.iter().filter_map(|name| life(name)).collect()
 }
 
-/// Removes what is kept of a deployment that does not run; answers whether there was something.
-pub fn forget(name: &str) -> bool {
+/// Removes what is kept of a deployment that does not run, and what is in the place of it; answers whether there was something.
+///
+/// # Errors
+/// Where something stays: what it is, and why.
+pub fn forget(name: &str) -> Result<bool, (PathBuf, io::Error)> {
     if life(name).is_none_or(|life| life.alive) {
-        return false;
+        return Ok(false);
     }
-    for ending in ["log", "log.1", "life"] {
-        let _ = file(name, ending).map(fs::remove_file);
+    for path in ["log", "log.1", "life"].into_iter().filter_map(|ending| file(name, ending)) {
+        let is_folder = fs::symlink_metadata(&path).is_ok_and(|it| it.is_dir());
+        // Nothing that somebody has put into it is removed.
+        let removed = if is_folder { fs::remove_dir(&path) } else { fs::remove_file(&path) };
+        if let Err(why) = removed.or_else(|why| if why.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(why) }) {
+            return Err((path, why));
+        }
     }
-    true
+    Ok(true)
 }
 
 /// Which start of the machine this is.
@@ -155,8 +182,8 @@ fn boot() -> Option<String> {
 }
 
 /// The directory, made for its owner alone.
-fn prepared() -> std::io::Result<PathBuf> {
-    let missing = || std::io::Error::other("there is no home directory, and XDG_STATE_HOME is not set");
+fn prepared() -> io::Result<PathBuf> {
+    let missing = || io::Error::other("there is no home directory, and XDG_STATE_HOME is not set");
     let directory = directory().ok_or_else(missing)?;
     place::prepare(&directory)?;
     Ok(directory)
