@@ -135,8 +135,12 @@ impl Graph<'_, '_> {
         }
         if !self.product.never_down {
             let slow = self.slow(&bars);
-            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow[&at]);
-            found_at(self, slow.keys().copied().collect(), true, &tell);
+            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow.always[&at]);
+            found_at(self, slow.always.keys().copied().collect(), true, &tell);
+            for (late, certain) in [(&slow.late, true), (&slow.reported, false)] {
+                let tell = |graph: &Self, at| graph.lasts_too_long_late(at, &late[&at]);
+                found_at(self, late.keys().copied().collect(), certain, &tell);
+            }
         }
         let (at, finding) = worst?;
         let told = (finding.severity == Severity::Warning).then_some(at);

@@ -24,6 +24,7 @@ mod follow;
 mod held;
 mod judge;
 mod lasts;
+mod late;
 mod loss;
 mod members;
 mod monitors;

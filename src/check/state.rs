@@ -95,6 +95,11 @@ impl State {
         batches.len() + downs.len().saturating_sub(1) + due + safe + given_up
     }
 
+    /// Whether an answer to a requester is on its way: what the configurator answers it later comes after that.
+    pub fn is_owed(&self, by: Requester) -> bool {
+        self.due.iter().any(|(request, _)| request.requester == by)
+    }
+
     /// Undos that give something up.
     pub fn undos(&self) -> impl Iterator<Item = &Request> {
         self.desk.under_way().iter().flat_map(|turn| turn.given_up.iter().map(|given_up| &given_up.undo))
