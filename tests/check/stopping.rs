@@ -248,6 +248,14 @@ fn a_bring_up_that_has_failed_is_led_down_by_the_event_that_ends_it() {
     // What is not known to mean that it failed is waited in, until that takes too long.
     let small = failing(deaf, false);
     assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+    // Stopped there all the same (by people, or since it is late), it is not waited for, either.
+    let message = "stopped before it is up, it rests in `root.failed` where nobody has heard `e_shutdown`: it is taken back without its \
+                   coordinator";
+    let said = small.check();
+    let found = only(&said, "coord::no_way_down");
+    assert_eq!((found["severity"].as_str(), found["message"].as_str()), (Some("info"), Some(message)));
+    small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+    assert_eq!(fails(&small), 4);
     // What it leads to is looked at as where nothing has failed.
     let small = failing(
         "trans { src = 'failed', tgt = 'waits', events = { 'e_shutdown' } },
@@ -258,6 +266,49 @@ fn a_bring_up_that_has_failed_is_led_down_by_the_event_that_ends_it() {
     assert_eq!((warned(&small), fails(&small)), (vec![message.to_owned()], 4));
     let small = failing("trans { src = 'failed', tgt = 'leaving', events = { 'e_shutdown' } },", true);
     assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+}
+
+/// What is still coming up and is stopped where nobody hears that: what is under way comes to its end, and nothing else.
+#[test]
+fn a_bring_up_that_is_stopped_where_nobody_hears_it_is_told() {
+    let rests = |heard: &str, more: &str| {
+        let way = timed("'e_warm'", "'e_done'")
+            .replace("trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown' } },", more);
+        let small = Small::new(BASE, &way.replace("'base.broken', 'e_shutdown'", heard), "safety: [e_estop]\n");
+        small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+        let said = small.check();
+        let found = said.of("coord::no_way_down").into_iter().filter(|finding| finding["severity"] == "warning");
+        let found: Vec<String> = found.map(|finding| finding["message"].as_str().unwrap().to_owned()).collect();
+        small.demo.write("late.lua", "deploy('small.yaml')\n");
+        let ran = small.demo.run(&["run", "late.lua", "--clock", "simulated", "--platform", "simulated"]);
+        (found, ran.code)
+    };
+    let message = |place: &str| {
+        format!(
+            "stopped before it is up, it rests in `{place}` where nobody has heard `e_shutdown`: it is taken back without its \
+             coordinator"
+        )
+    };
+    let leads = "trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown', 'e_after(1.0)' } },";
+    assert_eq!(rests("'base.broken', 'e_shutdown'", leads), (vec![], 1));
+    let leads = "trans { src = 'warming', tgt = 'leaving', events = { 'e_after(1.0)' } },";
+    assert_eq!(rests("'base.broken', 'e_shutdown'", leads), (vec![message("root.warming")], 4));
+    // It may come before that, too.
+    assert_eq!(rests("'base.broken'", leads), (vec![message("root.warming")], 4));
+    // Nothing is there to be taken back.
+    let way = timed("'e_done'", "'e_done'").replace(
+        "'leaving', events = { 'base.failed', 'base.broken', 'e_shutdown' } },",
+        "'leaving', events = { 'base.broken', 'e_shutdown' } }, bad = state {},
+         trans { src = 'building', tgt = 'bad', events = { 'base.failed' } },
+         trans { src = 'bad', tgt = 'leaving', events = { 'e_after(1.0)' } },",
+    );
+    let small = Small::new(BASE, &way, "safety: [e_estop]\n");
+    small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+    assert!(
+        small.check().of("coord::no_way_down").iter().all(|found| !found["message"].as_str().unwrap().contains("bad"))
+    );
+    small.demo.write("fails.lua", "fault('create a', 'fail', 1)\ndeploy('small.yaml')\n");
+    assert_eq!(small.demo.run(&["run", "fails.lua", "--clock", "simulated"]).code, 1);
 }
 
 /// A state listed in `deploy.failed` on the way up.
