@@ -112,10 +112,16 @@ impl Product<'_> {
         if state.flight.first().is_some_and(|batch| self.meddles(&state, batch)) {
             states.push(state.clone());
         }
-        for batch in std::mem::take(&mut state.flight) {
-            state = self.take_in(state, batch);
+        let mut flight = std::mem::take(&mut state.flight).into_iter();
+        let first = flight.next().map_or_else(|| state.clone(), |batch| self.take_in(state.clone(), batch));
+        // What came with it may find that it has not begun.
+        let mut landed = vec![first];
+        for batch in flight {
+            landed = landed.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+            self.forked |= landed.len() > limits::CHECK_FORKS;
+            landed.truncate(limits::CHECK_FORKS);
         }
-        states.push(state);
+        states.extend(landed);
         states
     }
 

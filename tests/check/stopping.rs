@@ -509,6 +509,21 @@ fn a_way_down_on_which_an_event_comes_late_is_told_where_its_times_add_up() {
     let again = "trans { src = 'cooling', tgt = 'cooling', events = { 'e_one' } },";
     let again = cooling("'e_after(2.0)'", again, "");
     assert_eq!(told(&again), [lasts("cooling", "6", "`e_one` comes late again and again")]);
+    // What leads on as the time does makes nothing longer, whenever it comes.
+    let as_well = cooling(
+        "'e_after(2.0)'",
+        "vents = state {}, airs = state {}, trans { src = 'cooling', tgt = 'vents', events = { 'e_after(2.0)' } },
+         trans { src = 'vents', tgt = 'airs', events = { 'e_after(3.0)', 'e_one' } },
+         trans { src = 'airs', tgt = 'leaving', events = { 'e_after(1.0)' } },",
+        "",
+    );
+    as_well.demo.replace(
+        "coordinator.lua",
+        "src = 'cooling', tgt = 'leaving', events = { 'e_after(2.0)' }",
+        "src = 'cooling', tgt = 'leaving', events = { 'e_never' }",
+    );
+    let found = told(&as_well);
+    assert!(!found.iter().any(|message| message.contains("late")), "{found:?}");
     // A time around it runs on, whatever comes inside.
     let inside = |around: &str| {
         let states = "vents = state {}, cooling = state { first = state {}, second = state {},
