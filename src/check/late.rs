@@ -3,8 +3,8 @@
 //! Where nobody does anything it goes on by itself: by answers, and by the time that is over first; only where that leads nowhere
 //! somebody raises at once what leads on. Whoever raises something else may do so at any moment before.
 
-use super::detours::{Places, quickest};
 use super::explore::Graph;
+use super::places::{Places, quickest};
 use super::state::Move;
 use crate::model::Finding;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

@@ -31,6 +31,7 @@ mod monitors;
 mod nowhere;
 mod outcome;
 mod outside;
+mod places;
 mod product;
 mod purity;
 mod reactions;
