@@ -5,7 +5,7 @@ use davit::check::{Known, Shown};
 use std::collections::BTreeMap;
 
 /// The classes, and of how many cases each was part of.
-pub const CLASSES: [&str; 17] = [
+pub const CLASSES: [&str; 16] = [
     "an undo and a push of which one fails",
     "safe in a batch",
     "e_done",
@@ -17,7 +17,6 @@ pub const CLASSES: [&str; 17] = [
     "reverted",
     "operator",
     "set by an operator",
-    "a setting undone",
     "three waiting",
     "two at once",
     "interrupted by safe",
@@ -129,10 +128,6 @@ impl Classes {
             let set = |end: &str| answer.strip_suffix(end).is_some_and(|subject| subject.contains('.'));
             if set(".ok") {
                 self.meets("set by an operator");
-            }
-            let has_set = CLASSES.iter().zip(self.met).any(|(class, met)| *class == "set by an operator" && met);
-            if has_set && set(".undone") {
-                self.meets("a setting undone");
             }
         }
         if answer.ends_with(".ok") {
