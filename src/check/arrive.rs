@@ -112,10 +112,16 @@ impl Product<'_> {
         if state.flight.first().is_some_and(|batch| self.meddles(&state, batch)) {
             states.push(state.clone());
         }
-        for batch in std::mem::take(&mut state.flight) {
-            state = self.take_in(state, batch);
+        let mut flight = std::mem::take(&mut state.flight).into_iter();
+        let first = flight.next().map_or_else(|| state.clone(), |batch| self.take_in(state.clone(), batch));
+        // What came with it may find that it has not begun.
+        let mut landed = vec![first];
+        for batch in flight {
+            landed = landed.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+            self.forked |= landed.len() > limits::CHECK_FORKS;
+            landed.truncate(limits::CHECK_FORKS);
         }
-        states.push(state);
+        states.extend(landed);
         states
     }
 
@@ -125,7 +131,12 @@ impl Product<'_> {
             state.flight.push(batch);
             return vec![state];
         }
-        let stops = self.stopped_by(&state, &batch);
+        let mut stops = self.stopped_by(&state, &batch);
+        // What an undo would wait its turn behind, but overtake where it has not begun.
+        let about = |turn: &&Turn| batch.requests.iter().any(|undo| given_up_of(undo, &turn.batch.requests).is_some());
+        let behind = state.desk.under_way().iter().filter(about).map(|turn| turn.number);
+        let behind: SmallVec<[u32; 2]> = behind.filter(|of| !stops.contains(of) && !state.is_stopped(*of)).collect();
+        stops.extend(behind.iter().copied());
         let mut states = Vec::with_capacity(1);
         if self.races && self.meddles(&state, &batch) {
             states.push(State { flight: vec![batch.clone()], ..state.clone() });
@@ -134,7 +145,8 @@ impl Product<'_> {
             let among = |turn: &Turn| {
                 let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
-                stops.contains(&turn.number) && (self.tells_all || turn.batch.requests.len() > 1 || twice)
+                let differs = self.tells_all || turn.batch.requests.len() > 1 || twice || behind.contains(&turn.number);
+                stops.contains(&turn.number) && differs
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 // Any of them, but no more than a few at once.

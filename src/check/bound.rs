@@ -83,8 +83,8 @@ impl Bound {
             }
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {
-                "whether one comes up, or down, in time was not followed: a way that was found lasts too long, and there are too many \
-                 to look for the shortest"
+                "whether one comes up, or down, in time was not followed to the end: a time may add up to too much, and there are too many \
+                 ways to look for the shortest"
                     .to_owned()
             }
         };

@@ -1,30 +1,36 @@
 //! Ways down whose times add up to more than there is: beside the way on which everything goes well.
 //!
-//! Counted is from when stopping begins, at least: by the quickest way there, and the quickest on from there. Where the time of
-//! stopping stands still it begins anew.
+//! Counted is from when stopping begins, at least: by the quickest way there, and the quickest on from there. Times of states that
+//! were entered before then have just begun. Where the time of stopping stands still it begins anew. What comes of it that an event
+//! comes late: [`late`](super::late).
 
 use super::bound::Bound;
 use super::explore::{Barred, Edge, Graph};
-use super::lasts::Waits;
+use super::late::Late;
+use super::places::quickest;
 use super::state::{Failed, Move};
-use crate::limits;
 use crate::model::Finding;
 use crate::model::codes::COORD_NO_WAY_DOWN;
-use rustc_hash::FxHashMap;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap, VecDeque};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// From where to where, and how long that takes.
-type Leg = (usize, usize, Duration);
+/// States in which it is being stopped and rests, and that lie on ways down that are not in time.
+#[derive(Default)]
+pub(super) struct Slow {
+    /// On none that is: how long the quickest lasts.
+    pub always: BTreeMap<u32, Duration>,
+    /// Where an event that somebody may raise comes late.
+    pub late: BTreeMap<u32, Late>,
+    /// The same with those that a component may raise, if one does.
+    pub reported: BTreeMap<u32, Late>,
+}
 
 impl Graph<'_, '_> {
-    /// States in which it is being stopped and rests, and that lie on no way down that is in time: how long the quickest lasts.
-    /// `bars`: what leads down there.
-    pub(super) fn slow(&mut self, bars: &[Option<Barred>]) -> BTreeMap<u32, Duration> {
+    /// What is too slow. `bars`: what leads down there.
+    pub(super) fn slow(&mut self, bars: &[Option<Barred>]) -> Slow {
         let within = self.product.deployment.shutdown.within;
         let stops = |at: u32| self.states[at as usize].stopping;
-        let legs = |edge: &Edge| (edge.from as usize, edge.to as usize, self.product.takes(edge.by));
+        let takes = |edge: &Edge| (edge.from as usize, edge.to as usize, self.product.takes(edge.by));
         // What is refused is not raised; what may come leads there, and need not lead on.
         let comes = |(number, edge): &(usize, &Edge)| {
             stops(edge.from) && !matches!(bars[*number], Some(Barred::Closed | Barred::Late))
@@ -32,72 +38,62 @@ impl Graph<'_, '_> {
         let leads = |number: usize| bars[number].is_none_or(|of| of == Barred::Reported);
         let edges = || self.edges.iter().enumerate().filter(comes);
         if !edges().any(|(_, edge)| matches!(edge.by, Move::Time(..))) {
-            return BTreeMap::new();
+            return Slow::default();
         }
         let (people, mut ends) = (self.stands_still(), self.arrives());
         ends.iter_mut().zip(&people).for_each(|(end, people)| *end |= people);
         let begins = |edge: &&Edge| !stops(edge.from) && stops(edge.to);
-        let still = || (0..people.len()).filter(|at| people[*at]);
+        let still = || (0u32..).zip(&people).filter(|(_, people)| **people).map(|(at, _)| at);
+        let first: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).chain(still()).collect();
         // As if no two times ran at once: they last no longer than that.
-        let first: Vec<usize> = self.edges.iter().filter(begins).map(|edge| edge.to as usize).chain(still()).collect();
-        let there = quickest(self.states.len(), edges().map(|(_, edge)| legs(edge)), first);
-        let on = edges().filter(|(number, _)| leads(*number)).map(|(_, edge)| legs(edge));
+        let begin = first.iter().map(|at| *at as usize).collect();
+        let there = quickest(self.states.len(), edges().map(|(_, edge)| takes(edge)), begin);
+        let on = edges().filter(|(number, _)| leads(*number)).map(|(_, edge)| takes(edge));
         let last: Vec<usize> = (0..ends.len()).filter(|at| ends[*at]).collect();
         let on = quickest(self.states.len(), on.map(|(from, to, takes)| (to, from, takes)), last);
-        let rests = |at: usize| self.states[at].stopping && self.states[at].is_at_rest() && !ends[at];
-        let lasts = |at: usize| there[at].zip(on[at]).map(|(there, on)| there + on);
-        if !(0..self.states.len()).any(|at| rests(at) && lasts(at).is_some_and(|lasts| lasts >= within)) {
-            return BTreeMap::new();
+        let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
+        let lasts = |at: u32| there[at as usize].zip(on[at as usize]).map(|(there, on)| there + on);
+        let slow = |at: u32| rests(at) && lasts(at).is_some_and(|lasts| lasts >= within);
+        let comes_late = |number: usize| {
+            let edge = &self.edges[number];
+            let event = matches!(edge.by, Move::Event(_)) && matches!(bars[number], None | Some(Barred::Reported));
+            event && rests(edge.from) && on[edge.to as usize].is_some_and(|on| !on.is_zero())
+        };
+        let late: Vec<bool> = (0..self.edges.len()).map(comes_late).collect();
+        if !(0u32..).zip(&self.states).any(|(at, _)| slow(at)) && !late.contains(&true) {
+            return Slow::default();
         }
         // With the times that run at once.
-        let mut out: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
-        edges().for_each(|(number, edge)| out.entry(edge.from).or_default().push(number));
-        let mut places: Vec<(u32, Waits)> = Vec::new();
-        let mut known: FxHashMap<(u32, Waits), usize> = FxHashMap::default();
-        let mut open: VecDeque<usize> = VecDeque::new();
-        let mut place = |at: u32, waits: Waits, places: &mut Vec<(u32, Waits)>, open: &mut VecDeque<usize>| {
-            *known.entry((at, waits.clone())).or_insert_with(|| {
-                places.push((at, waits));
-                open.push_back(places.len() - 1);
-                places.len() - 1
-            })
+        let some: Vec<usize> = edges().map(|(number, _)| number).collect();
+        let left = self.left_to_enter_anew(&some);
+        let stops = |at: u32| self.states[at as usize].stopping;
+        let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
+        let Some(places) = self.places(&first, &some, &left, rests, &late) else {
+            self.cut(Bound::Times, Failed::Nothing);
+            return Slow::default();
         };
-        let after = |edge: &Edge, waits: &Waits| {
-            let (from, to) = (&self.states[edge.from as usize], &self.states[edge.to as usize]);
-            self.product.waits_after(from, edge.by, to, waits)
-        };
-        for edge in self.edges.iter().filter(begins) {
-            place(edge.to, after(edge, &Waits::new()).0, &mut places, &mut open);
-        }
-        for at in still() {
-            place(u32::try_from(at).unwrap_or_default(), Waits::new(), &mut places, &mut open);
-        }
-        let first: Vec<usize> = (0..places.len()).collect();
-        let mut all: Vec<(Leg, bool)> = Vec::new();
-        while let Some(from) = open.pop_front() {
-            if places.len() > limits::CHECK_DRIVEN {
-                self.cut(Bound::Times, Failed::Nothing);
-                return BTreeMap::new();
-            }
-            let (at, waits) = places[from].clone();
-            for number in out.get(&at).into_iter().flatten() {
-                let edge = &self.edges[*number];
-                let (waits, took) = after(edge, &waits);
-                all.push(((from, place(edge.to, waits, &mut places, &mut open), took), leads(*number)));
-            }
-        }
-        let there = quickest(places.len(), all.iter().map(|(leg, _)| *leg), first);
-        let last: Vec<usize> = (0..places.len()).filter(|at| ends[places[*at].0 as usize]).collect();
-        let back = all.iter().filter(|(_, leads)| *leads).map(|((from, to, took), _)| (*to, *from, *took));
-        let on = quickest(places.len(), back, last);
-        let mut lasts: BTreeMap<u32, Duration> = BTreeMap::new();
-        for (number, (at, _)) in places.iter().enumerate().filter(|(_, (at, _))| rests(*at as usize)) {
+        let count = places.list.len();
+        let legs = || places.legs.iter().filter(|leg| !leg.late);
+        let there = quickest(count, legs().map(|leg| (leg.from, leg.to, leg.takes)), (0..places.first).collect());
+        let last: Vec<usize> = (0..count).filter(|at| ends[places.list[*at].0 as usize]).collect();
+        let back = legs().filter(|leg| leads(leg.edge)).map(|leg| (leg.to, leg.from, leg.takes));
+        let on = quickest(count, back, last.clone());
+        let mut always: BTreeMap<u32, Duration> = BTreeMap::new();
+        for (number, (at, _)) in places.list.iter().enumerate().filter(|(_, (at, _))| rests(*at)) {
             if let Some(all) = there[number].zip(on[number]).map(|(there, on)| there + on) {
-                lasts.entry(*at).and_modify(|least| *least = all.min(*least)).or_insert(all);
+                always.entry(*at).and_modify(|least| *least = all.min(*least)).or_insert(all);
             }
         }
-        lasts.retain(|_, lasts| *lasts >= within);
-        lasts
+        always.retain(|_, lasts| *lasts >= within);
+        let by_itself = self.by_itself(&places, last, leads);
+        let late = |counts: &dyn Fn(Option<Barred>) -> bool| {
+            let mut late = self.late(&places, &by_itself, &there, &on, |edge| counts(bars[edge]));
+            late.retain(|at, _| rests(*at));
+            late
+        };
+        let raised = late(&|bar| bar.is_none());
+        let reported = if raised.is_empty() { late(&|_| true) } else { BTreeMap::new() };
+        Slow { always, late: raised, reported }
     }
 
     /// That no way down by a state is in time.
@@ -109,6 +105,12 @@ impl Graph<'_, '_> {
             lasts.as_secs_f64(),
             deployment.shutdown.within.as_secs_f64()
         );
+        self.too_slow(at, message, "let something lead on sooner")
+    }
+
+    /// A way down by a state is not in time.
+    pub(super) fn too_slow(&self, at: u32, message: String, instead: &str) -> Finding {
+        let state = &self.states[at as usize];
         // The one that is not down yet.
         let late = self
             .product
@@ -120,24 +122,8 @@ impl Graph<'_, '_> {
         Finding::warning(COORD_NO_WAY_DOWN, message)
             .at(member.chart.origin(*leaf))
             .path("shutdown.within_s")
-            .help("give it more time with `shutdown.within_s`, or let something lead on sooner; else what is left is taken down \
-                   without the coordinator")
+            .help(format!(
+                "give it more time with `shutdown.within_s`, or {instead}; else what is left is taken down without the coordinator"
+            ))
     }
-}
-
-/// How long it takes at least from one of the first to each, by such legs; none: none leads there.
-fn quickest(count: usize, legs: impl Iterator<Item = Leg>, first: Vec<usize>) -> Vec<Option<Duration>> {
-    let mut out: Vec<Vec<(usize, Duration)>> = vec![Vec::new(); count];
-    legs.for_each(|(from, to, takes)| out[from].push((to, takes)));
-    let mut least: Vec<Option<Duration>> = vec![None; count];
-    let mut open: BinaryHeap<Reverse<(Duration, usize)>> = BinaryHeap::new();
-    open.extend(first.into_iter().map(|at| Reverse((Duration::ZERO, at))));
-    while let Some(Reverse((took, at))) = open.pop() {
-        if least[at].is_some() {
-            continue;
-        }
-        least[at] = Some(took);
-        open.extend(out[at].iter().map(|(to, takes)| Reverse((took + *takes, *to))));
-    }
-    least
 }

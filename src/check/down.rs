@@ -120,11 +120,16 @@ impl Graph<'_, '_> {
             }
         };
         let mut before = reaches.to_vec();
+        // Nothing comes of what is refused.
+        let stops = |at: u32| self.states[at as usize].stopping;
+        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to).collect();
+        let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
             let lost = |at: &u32| {
                 let state = &self.states[*at as usize];
-                state.stopping && state.is_at_rest() && before[*at as usize] && !after[*at as usize]
+                let rests = state.stopping && state.is_at_rest() && comes[*at as usize];
+                rests && before[*at as usize] && !after[*at as usize]
             };
             let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
             if !(self.product.never_down && matches!(barred, Barred::Closed | Barred::Late)) {
@@ -135,8 +140,12 @@ impl Graph<'_, '_> {
         }
         if !self.product.never_down {
             let slow = self.slow(&bars);
-            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow[&at]);
-            found_at(self, slow.keys().copied().collect(), true, &tell);
+            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow.always[&at]);
+            found_at(self, slow.always.keys().copied().collect(), true, &tell);
+            for (late, certain) in [(&slow.late, true), (&slow.reported, false)] {
+                let tell = |graph: &Self, at| graph.lasts_too_long_late(at, &late[&at]);
+                found_at(self, late.keys().copied().collect(), certain, &tell);
+            }
         }
         let (at, finding) = worst?;
         let told = (finding.severity == Severity::Warning).then_some(at);

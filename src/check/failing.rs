@@ -1,9 +1,10 @@
-//! Bring-ups that fail: a state listed under `deploy.failed` means it, and from there the deployment is stopped.
+//! Bring-ups that fail, or are stopped by people: a state listed under `deploy.failed` means it, and from there the deployment is
+//! stopped; so is one that is late.
 //!
-//! Where nobody hears the event that ends it, and nothing is under way, a running deployment that is still coming up is taken
-//! back without its coordinators at once: a time, or an event, that would lead on there is not waited for.
+//! Where nobody hears the event that ends it, and nothing is under way any more, a running deployment that was still coming up is
+//! taken back without its coordinators at once: a time, or an event, that would lead on there is not waited for.
 
-use super::explore::{Edge, Graph};
+use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
 use super::state::Failed;
 use crate::model::Finding;
@@ -11,20 +12,30 @@ use crate::model::Severity;
 use crate::model::codes::COORD_NO_WAY_DOWN;
 
 impl Graph<'_, '_> {
+    /// Which states a deployment comes to before it is up, or has failed.
+    fn comes_up(&self) -> Vec<bool> {
+        let state = |at: u32| &self.states[at as usize];
+        // What operators ask for there is asked for later.
+        let waits = |at: u32| self.product.members.iter().any(|member| state(at).outstanding(member.by) > 0);
+        let heard = |at: u32| state(at).inbox.is_empty() && state(at).flight.is_empty();
+        let is_up = |at: u32| heard(at) && !waits(at) && self.product.all_in(state(at), |member| member.up);
+        let failed = |at: u32| self.product.failed_in(state(at)).is_some();
+        // From the first of them on it is being stopped.
+        let leads = |_: usize, edge: &Edge| !is_up(edge.from) && !failed(edge.from) && !state(edge.to).stopping;
+        let comes_up = self.spread_from(vec![0], leads);
+        (0u32..).zip(comes_up).map(|(at, comes_up)| comes_up && !is_up(at)).collect()
+    }
+
     /// The states in which a bring-up has failed and rests, with nothing worse than a configuration that was not applied.
     pub(super) fn failed_bring_ups(&self) -> Vec<u32> {
         if self.product.members.iter().all(|member| member.failed.is_empty()) {
             return Vec::new();
         }
         let state = |at: u32| &self.states[at as usize];
-        let is_up = |at: u32| state(at).is_at_rest() && self.product.all_in(state(at), |member| member.up);
         let failed = |at: u32| self.product.failed_in(state(at)).is_some();
-        // From the first of them on it is being stopped.
-        let leads = |_: usize, edge: &Edge| !is_up(edge.from) && !failed(edge.from) && !state(edge.to).stopping;
-        let comes_up = self.spread_from(vec![0], leads);
         let known = |at: u32| self.product.worlds.top(state(at).world).is_none();
         let expected = |at: u32| self.failed[at as usize] <= Failed::Apply;
-        let comes_up = (0u32..).zip(comes_up).filter(|(_, comes_up)| *comes_up).map(|(at, _)| at);
+        let comes_up = (0u32..).zip(self.comes_up()).filter(|(_, comes_up)| *comes_up).map(|(at, _)| at);
         comes_up.filter(|at| failed(*at) && state(*at).is_at_rest() && known(*at) && expected(*at)).collect()
     }
 
@@ -35,26 +46,67 @@ impl Graph<'_, '_> {
         self.spread_from(failed, stops)
     }
 
-    /// That nobody hears the event that ends the deployment where a bring-up has failed; `told` is told already.
+    /// Where it rests, with something left, when it was stopped before it was up and nobody heard that.
+    fn rests_unheard(&self) -> Vec<u32> {
+        let comes_up = self.comes_up();
+        let state = |at: u32| &self.states[at as usize];
+        let dropped = self.edges.iter().filter(|edge| edge.dropped && comes_up[edge.from as usize]);
+        // The event comes once.
+        let goes_on = |_: usize, edge: &Edge| {
+            !state(edge.from).is_at_rest() && state(edge.to).stopping && edge.barred != Some(Barred::Again)
+        };
+        let open = self.spread_from(dropped.map(|edge| edge.to).collect(), goes_on);
+        let left = |at: u32| {
+            let world = self.product.worlds.get(state(at).world);
+            world.is_some_and(|world| !world.system.is_empty() || !world.stack.is_empty())
+        };
+        let open = (0u32..).zip(open).filter(|(_, open)| *open).map(|(at, _)| at);
+        let rests = |at: &u32| state(*at).is_at_rest() && !self.product.is_down(state(*at)) && left(*at);
+        open.filter(|at| rests(at) && self.failed[*at as usize] <= Failed::Apply).collect()
+    }
+
+    /// That nobody hears the event that ends the deployment where a bring-up has failed, or is stopped; `told` is told already.
     pub(super) fn failing(&mut self, told: Option<u32>, found: &mut Traced) {
         let failed = self.failed_bring_ups();
-        let mut unheard: Vec<u32> = self.edges.iter().filter(|edge| edge.dropped).map(|edge| edge.from).collect();
-        unheard.retain(|at| failed.contains(at));
-        let Some(at) = self.best_first(unheard).first().copied() else { return };
+        let is_listed = |graph: &Self, at: u32| {
+            let leaves = &graph.states[at as usize].leaves;
+            failed.iter().any(|failed| graph.states[*failed as usize].leaves == *leaves)
+        };
+        // Where something has failed that it is not known to mean the end, not every coordinator can go on.
+        let warned = |graph: &Self, at: u32| graph.failed[at as usize] == Failed::Nothing || is_listed(graph, at);
+        let all = self.rests_unheard();
+        let some: Vec<u32> = all.iter().copied().filter(|at| warned(self, *at)).collect();
+        let severity = if some.is_empty() { Severity::Info } else { Severity::Warning };
+        let Some(at) = self.best_first(if some.is_empty() { all } else { some }).first().copied() else { return };
         let state = &self.states[at as usize];
         if told.is_some_and(|told| self.states[told as usize].leaves == state.leaves) {
             return;
         }
-        let event = self.product.deployment.shutdown.event;
+        let deployment = self.product.deployment;
+        let (event, place) = (deployment.shutdown.event, self.product.place(state));
         let by = self.product.failed_in(state).unwrap_or_default();
-        let message = format!(
-            "nobody hears `{event}` in `{}`, where the bring-up has failed: it is taken back without its coordinator",
-            self.product.place(state)
-        );
-        let finding = Finding::new(Severity::Warning, COORD_NO_WAY_DOWN, message)
-            .at(self.product.members[by].chart.origin(state.leaves[by]))
+        let finding = match is_listed(self, at) {
+            true => Finding::new(
+                severity,
+                COORD_NO_WAY_DOWN,
+                format!(
+                    "nobody hears `{event}` in `{place}`, where the bring-up has failed: it is taken back without its coordinator"
+                ),
+            )
             .path("deploy.failed")
-            .also(self.product.deployment.key_origin("deploy.failed"), "it means that the bring-up has failed")
+            .also(deployment.key_origin("deploy.failed"), "it means that the bring-up has failed"),
+            false => Finding::new(
+                severity,
+                COORD_NO_WAY_DOWN,
+                format!(
+                    "stopped before it is up, it rests in `{place}` where nobody has heard `{event}`: it is taken back without its \
+                     coordinator"
+                ),
+            )
+            .path("shutdown.event"),
+        };
+        let finding = finding
+            .at(self.product.members[by].chart.origin(state.leaves[by]))
             .help(format!("add a transition on `{event}` that leads down from there"));
         let trace = self.trace(at);
         found.push((finding, trace));

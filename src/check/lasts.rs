@@ -23,8 +23,24 @@ impl Product<'_> {
         }
     }
 
-    /// What is to wait for after a move, and how long the move took.
-    pub(super) fn waits_after(&self, before: &State, by: Move, after: &State, waits: &Waits) -> (Waits, Duration) {
+    /// What is to wait for where everything that has a time was entered just now.
+    pub(super) fn waits_in(&self, state: &State) -> Waits {
+        let mut waits = Waits::new();
+        for (number, member) in self.members.iter().enumerate() {
+            let inside = std::iter::successors(Some(state.leaves[number]), |at| member.chart.parent(*at));
+            let timed = inside.filter_map(|at| member.chart.time_event(at));
+            waits.extend(timed.map(|event| (number, event, member.chart.time_of(event).unwrap_or_default())));
+        }
+        waits
+    }
+
+    /// What is to wait for after a move that left these states (also to enter them anew), and how long the move took.
+    pub(super) fn waits_after(
+        &self,
+        (before, by, after): (&State, Move, &State),
+        left: &[(usize, NodeId)],
+        waits: &Waits,
+    ) -> (Waits, Duration) {
         let due = |number: usize, event: EventId| waits.iter().find(|(n, e, _)| (*n, *e) == (number, event));
         let took = match by {
             Move::Time(number, event) => due(usize::from(number), event).map_or(Duration::ZERO, |(_, _, left)| *left),
@@ -38,7 +54,7 @@ impl Product<'_> {
                 at = member.chart.parent(state);
                 let Some(event) = member.chart.time_event(state) else { continue };
                 let fired = matches!(by, Move::Time(n, e) if (usize::from(n), e) == (number, event));
-                if fired || !member.chart.is_inside(from, state) {
+                if fired || !member.chart.is_inside(from, state) || left.contains(&(number, state)) {
                     still.push((number, event, member.chart.time_of(event).unwrap_or_default()));
                 } else if let Some((_, _, left)) = due(number, event) {
                     still.push((number, event, left.saturating_sub(took)));
@@ -49,11 +65,12 @@ impl Product<'_> {
     }
 
     /// How long these moves last at least, and the time events that they wait for.
-    pub(super) fn lasts(&self, from: &State, moves: &[Next]) -> (Duration, Vec<(usize, EventId)>) {
+    pub(super) fn lasts(&mut self, from: &State, moves: &[Next]) -> (Duration, Vec<(usize, EventId)>) {
         let (mut waits, mut all, mut times) = (Waits::new(), Duration::ZERO, Vec::new());
         let mut before = from;
         for next in moves {
-            let (after, took) = self.waits_after(before, next.by, &next.state, &waits);
+            let left = self.left_by(before, next);
+            let (after, took) = self.waits_after((before, next.by, &next.state), &left, &waits);
             if let (Move::Time(number, event), false) = (next.by, took.is_zero()) {
                 times.push((usize::from(number), event));
             }
@@ -102,7 +119,8 @@ pub(super) fn soonest(product: &mut Product<'_>, way: &Way, tried: &Tried, goal:
             }
             let (mut waits, mut now, mut before) = (waits.clone(), at, &state);
             for next in &moves {
-                let (after, took) = product.waits_after(before, next.by, &next.state, &waits);
+                let left = product.left_by(before, next);
+                let (after, took) = product.waits_after((before, next.by, &next.state), &left, &waits);
                 waits = after;
                 now += took;
                 before = &next.state;

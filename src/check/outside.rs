@@ -174,6 +174,9 @@ impl Product<'_> {
             nexts.all.push(Next::plain(Move::Confirmed(id), left, Failed::Nothing));
             return;
         }
+        if state.is_owed(request.requester) {
+            return;
+        }
         let beside = self.beside(&left, None);
         let comes = self.worlds.comes(state.world, &[request], &beside);
         let told = |verdict: Verdict| Answers::from_iter([request.as_told(verdict)]);

@@ -171,6 +171,8 @@ impl<'a> Product<'a> {
         self.behind_given_up(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
+        let going =
+            going.filter(|turn| turn.batch.requests.first().is_none_or(|first| !state.is_owed(first.requester)));
         let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
         for number in numbers {
             match state.is_stopped(number) {
@@ -209,7 +211,8 @@ impl<'a> Product<'a> {
         // Those that have nothing to do with each other end in any order.
         for (at, request) in state.safe.iter().enumerate() {
             let claim = self.worlds.claims.of([request]);
-            if state.safe[..at].iter().all(|before| !self.worlds.claims.of([before]).meets(&claim)) {
+            let first = state.safe[..at].iter().all(|before| !self.worlds.claims.of([before]).meets(&claim));
+            if first && !state.is_owed(request.requester) {
                 self.safe_ends(state, at, nexts);
             }
         }

@@ -89,10 +89,15 @@ impl State {
         let under_way = self.desk.under_way().iter().map(|turn| &turn.batch);
         let (downs, batches): (Vec<&Batch>, Vec<&Batch>) =
             under_way.chain(self.desk.waiting()).filter(first).partition(|batch| batch.requests[0].why == Why::Down);
-        let due = usize::from(self.due.iter().any(|(request, _)| request.requester == by));
+        let due = usize::from(self.is_owed(by));
         let safe = self.safe.iter().filter(|request| request.requester == by).count();
         let given_up = self.undos().filter(|undo| undo.requester == by).count();
         batches.len() + downs.len().saturating_sub(1) + due + safe + given_up
+    }
+
+    /// Whether an answer to a requester is on its way: what the configurator answers it later comes after that.
+    pub fn is_owed(&self, by: Requester) -> bool {
+        self.due.iter().any(|(request, _)| request.requester == by)
     }
 
     /// Undos that give something up.

@@ -128,7 +128,7 @@ impl Session {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
         let goal = self.deployment().down_states();
-        let (mut deadline, mut said) = (self.clock().now() + take_down.within, false);
+        let (mut deadline, mut said, mut stood) = (self.clock().now() + take_down.within, false, false);
         let ticket = self.offer_watched(take_down.event, "deployment");
         if let Err(refused) = &ticket {
             hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
@@ -152,10 +152,14 @@ impl Session {
             if told.coming_up && unheard() && self.is_still() {
                 break Came::Left(format!("{}, which does not hear `{}`", hub.whereabouts(), take_down.event));
             }
-            let now = self.clock().now();
+            // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when. Then its
+            // time begins anew.
+            let (now, still) = (self.clock().now(), self.stands_still());
+            if std::mem::replace(&mut stood, still.is_some()) && !stood {
+                deadline = now + take_down.within;
+            }
             if now >= deadline {
-                // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when.
-                let Some(still) = self.stands_still() else {
+                let Some(still) = still else {
                     break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
                 };
                 if !std::mem::replace(&mut said, true) {

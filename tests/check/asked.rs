@@ -342,3 +342,42 @@ fn who_is_led_down_and_not_heard_is_led_down_all_the_same() {
     let ran = small.demo.run(&["run", "twice.lua", "--clock", "simulated"]);
     assert!(ran.out.contains("base.undone") && !ran.out.contains("base.undo.failed"), "{}{}", ran.out, ran.err);
 }
+
+/// What is answered later comes later: an answer that is on its way is heard before it, however long that takes, and not in the
+/// next life.
+#[test]
+fn an_answer_on_its_way_is_heard_before_what_is_answered_later() {
+    let configurations =
+        "base = Configuration { create('a', 'Drive') }, one = Configuration { operation_call('a.open') },
+        look = Configuration { property_set('a.gain', 2.0) },";
+    let states = "idle = state {}, building = state { entry = 'base' }, up = state {}, bad = state {},
+        m = state { entry = 'one' }, broken = state {}, undoing = state {},
+        leaving = state { entry = { 'one.undo', 'base.undo' } }, stays = state {},
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'building', events = { 'e_start' } },
+        trans { src = 'building', tgt = 'up', events = { 'base.ok' } },
+        trans { src = 'building', tgt = 'bad', events = { 'base.failed', 'base.broken' } },
+        trans { src = 'building', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'up', tgt = 'm', events = { 'e_one' } },
+        trans { src = 'm', tgt = 'up', events = { 'one.failed' } },
+        trans { src = 'm', tgt = 'broken', events = { 'one.broken' } },
+        trans { src = 'm', tgt = 'undoing', events = { 'e_undo' }, effect = 'one.undo' },
+        trans { src = 'undoing', tgt = 'up', events = { 'one.undone' } },
+        trans { src = 'undoing', tgt = 'broken', events = { 'one.undo.failed', 'one.undo.broken' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'bad', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'm', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'broken', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'undoing', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },
+        trans { src = 'leaving', tgt = 'stays', events = { 'one.undo.failed', 'one.undo.broken', 'base.undo.failed', 'base.undo.broken' } },";
+    for (operator, verdict) in [("one", "warnings"), ("look", "followed")] {
+        let said = Small::new(configurations, states, &format!("operator: [{operator}]\n")).check();
+        assert_eq!(said.0["verdict"], verdict, "{:#}", said.0);
+        let undo = said.refused("base.undo");
+        assert!(undo.iter().all(|(severity, _)| *severity == "info"), "{undo:?}");
+        // As the few states show in which an answer is on its way.
+        assert!(said.0["explored"]["states"].as_u64() < Some(2000), "{:#}", said.0["explored"]);
+    }
+}

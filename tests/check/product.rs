@@ -410,3 +410,40 @@ fn a_full_stack_has_no_more_states_than_there_are() {
     let json = small.demo.run(&["check", "small.yaml", "--json"]).json();
     assert!(json["explored"]["states"].as_u64().unwrap() < 2000, "{:#}", json["explored"]);
 }
+
+/// Two orders lead to the same frames, with other numbers: what is held in the one is found again in the other, and what is
+/// interrupted while the stack gets full is not squashed. (Which of the others is, is followed for one of the orders.)
+#[test]
+fn what_is_interrupted_holds_its_frame_whatever_its_number() {
+    let safe = |id: &str| format!("{id} = Configuration {{ safe = true, property_set('z.gain', 0.0) }},");
+    let configurations = "base = Configuration { create('a', 'Drive') }, zed = Configuration { create('z', 'Drive') },
+        one = Configuration { group = 'g', property_set('a.gain', 2.0) },
+        two = Configuration { group = 'g', property_set('a.gain', 3.0) },"
+        .to_owned()
+        + &["s1", "s2", "s3", "s4", "s5"].map(safe).concat();
+    let states = "idle = state {}, stays = state {},
+        leaving = state { entry = { 's2.undo', 's1.undo', 'two.undo', 'one.undo', 'base.undo' } },
+        life = state { building = state { entry = 'base' }, up = state {},
+          first = state { entry = 's1' }, other = state { entry = 'one' },
+          one = state { entry = 'one' }, two = state { entry = 'two' },
+          calm = state { entry = { 's1', 's2' }, third = state { config = 's3',
+            fourth = state { config = 's4', fifth = state { config = 's5' }, trans { src = 'initial', tgt = 'fifth' } },
+            trans { src = 'initial', tgt = 'fourth' } }, trans { src = 'initial', tgt = 'third' } },
+          trans { src = 'initial', tgt = 'building' },
+          trans { src = 'building', tgt = 'up', events = { 'base.ok' } },
+          trans { src = 'up', tgt = 'first', events = { 'e_calm' } },
+          trans { src = 'first', tgt = 'other', events = { 's1.ok' } },
+          trans { src = 'up', tgt = 'one', events = { 'e_one' } },
+          trans { src = 'one', tgt = 'two', events = { 'one.ok' } },
+          trans { src = 'two', tgt = 'calm', events = { 'e_calm' } } },
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'life', events = { 'e_start' } },
+        trans { src = 'life', tgt = 'leaving', events = { 'e_shutdown', 'base.failed', 'base.broken' } },
+        trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },
+        trans { src = 'leaving', tgt = 'stays', events = { 'base.undo.failed', 'base.undo.broken' } },";
+    let small = Small::new(&configurations, states, "limits: { stack: 6 }\n");
+    let said = Said(small.demo.run(&["check", "small.yaml", "--json"]).json());
+    assert!(!said.refused("s1.undo").is_empty(), "it does get full: {:#}", said.0);
+    assert!(said.refused("one.undo").is_empty(), "{:?}", said.refused("one.undo"));
+}

@@ -248,6 +248,14 @@ fn a_bring_up_that_has_failed_is_led_down_by_the_event_that_ends_it() {
     // What is not known to mean that it failed is waited in, until that takes too long.
     let small = failing(deaf, false);
     assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+    // Stopped there all the same (by people, or since it is late), it is not waited for, either.
+    let message = "stopped before it is up, it rests in `root.failed` where nobody has heard `e_shutdown`: it is taken back without its \
+                   coordinator";
+    let said = small.check();
+    let found = only(&said, "coord::no_way_down");
+    assert_eq!((found["severity"].as_str(), found["message"].as_str()), (Some("info"), Some(message)));
+    small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+    assert_eq!(fails(&small), 4);
     // What it leads to is looked at as where nothing has failed.
     let small = failing(
         "trans { src = 'failed', tgt = 'waits', events = { 'e_shutdown' } },
@@ -258,6 +266,49 @@ fn a_bring_up_that_has_failed_is_led_down_by_the_event_that_ends_it() {
     assert_eq!((warned(&small), fails(&small)), (vec![message.to_owned()], 4));
     let small = failing("trans { src = 'failed', tgt = 'leaving', events = { 'e_shutdown' } },", true);
     assert_eq!((warned(&small), fails(&small)), (vec![], 1));
+}
+
+/// What is still coming up and is stopped where nobody hears that: what is under way comes to its end, and nothing else.
+#[test]
+fn a_bring_up_that_is_stopped_where_nobody_hears_it_is_told() {
+    let rests = |heard: &str, more: &str| {
+        let way = timed("'e_warm'", "'e_done'")
+            .replace("trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown' } },", more);
+        let small = Small::new(BASE, &way.replace("'base.broken', 'e_shutdown'", heard), "safety: [e_estop]\n");
+        small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+        let said = small.check();
+        let found = said.of("coord::no_way_down").into_iter().filter(|finding| finding["severity"] == "warning");
+        let found: Vec<String> = found.map(|finding| finding["message"].as_str().unwrap().to_owned()).collect();
+        small.demo.write("late.lua", "deploy('small.yaml')\n");
+        let ran = small.demo.run(&["run", "late.lua", "--clock", "simulated", "--platform", "simulated"]);
+        (found, ran.code)
+    };
+    let message = |place: &str| {
+        format!(
+            "stopped before it is up, it rests in `{place}` where nobody has heard `e_shutdown`: it is taken back without its \
+             coordinator"
+        )
+    };
+    let leads = "trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown', 'e_after(1.0)' } },";
+    assert_eq!(rests("'base.broken', 'e_shutdown'", leads), (vec![], 1));
+    let leads = "trans { src = 'warming', tgt = 'leaving', events = { 'e_after(1.0)' } },";
+    assert_eq!(rests("'base.broken', 'e_shutdown'", leads), (vec![message("root.warming")], 4));
+    // It may come before that, too.
+    assert_eq!(rests("'base.broken'", leads), (vec![message("root.warming")], 4));
+    // Nothing is there to be taken back.
+    let way = timed("'e_done'", "'e_done'").replace(
+        "'leaving', events = { 'base.failed', 'base.broken', 'e_shutdown' } },",
+        "'leaving', events = { 'base.broken', 'e_shutdown' } }, bad = state {},
+         trans { src = 'building', tgt = 'bad', events = { 'base.failed' } },
+         trans { src = 'bad', tgt = 'leaving', events = { 'e_after(1.0)' } },",
+    );
+    let small = Small::new(BASE, &way, "safety: [e_estop]\n");
+    small.demo.replace("small.yaml", "up: up, within_s: 5", "up: up, within_s: 0.5");
+    assert!(
+        small.check().of("coord::no_way_down").iter().all(|found| !found["message"].as_str().unwrap().contains("bad"))
+    );
+    small.demo.write("fails.lua", "fault('create a', 'fail', 1)\ndeploy('small.yaml')\n");
+    assert_eq!(small.demo.run(&["run", "fails.lua", "--clock", "simulated"]).code, 1);
 }
 
 /// A state listed in `deploy.failed` on the way up.
@@ -402,6 +453,118 @@ fn a_way_down_whose_times_add_up_to_more_than_there_is_is_told() {
     let message = "the way down by `root.again` lasts 6 s at least, and `shutdown.within_s` gives it 5 s";
     let finding = only(&said, "coord::no_way_down");
     assert_eq!((finding["severity"].as_str(), finding["message"].as_str()), (Some("info"), Some(message)));
+}
+
+/// What comes late on the way down, and begins another time there.
+#[test]
+fn a_way_down_on_which_an_event_comes_late_is_told_where_its_times_add_up() {
+    let cooling = |down: &str, states: &str, keys: &str| {
+        let states = format!("stays = state {{}}, {states}");
+        Small::new(BASE, &timed("'e_done'", down).replace("stays = state {},", &states), keys)
+    };
+    let vents = |first: &str, then: &str| {
+        let states = format!(
+            "vents = state {{}}, trans {{ src = 'cooling', tgt = 'vents', events = {{ 'e_estop' }} }},
+             trans {{ src = 'vents', tgt = 'leaving', events = {{ {then} }} }},"
+        );
+        // Half a second before the first time is over.
+        let late = "safety: [e_estop]\nsimulated: { reactions: [{ after: create a, delay_s: 3.0, raise: e_estop, component: a }] }\n";
+        cooling(first, &states, late)
+    };
+    let lasts = |at: &str, all: &str, why: &str| {
+        format!("the way down by `root.{at}` lasts up to {all} s where {why}, and `shutdown.within_s` gives it 5 s")
+    };
+    let late = vec![lasts("vents", "5.5", "`e_estop` comes late")];
+    let cases = [
+        (vents("'e_after(3.0)'", "'e_after(2.5)'"), late.clone(), 4),
+        // Also where it would go on sooner with it than without it, were it raised at once.
+        (vents("'e_after(3.5)'", "'e_after(2.0)'"), late, 0),
+        (vents("'e_after(3.0)'", "'e_after(2.0)'"), vec![], 0),
+        // What somebody else may lead on from is not waited for.
+        (vents("'e_after(3.0)'", "'e_after(2.5)', 'e_estop'"), vec![], 4),
+    ];
+    for (small, told, exit) in cases {
+        let said = small.check();
+        let found = said.of("coord::no_way_down").into_iter().filter(|finding| finding["severity"] == "warning");
+        let messages: Vec<_> = found.map(|finding| finding["message"].as_str().unwrap()).collect();
+        assert_eq!(messages, told, "{:#}", said.0);
+        small.demo.write("late.lua", "deploy('small.yaml')\nwait(0.5)\nshutdown()\n");
+        let ran = small.demo.run(&["run", "late.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, exit, "{}{}", ran.out, ran.err);
+    }
+    let told = |small: &Small| -> Vec<String> {
+        let said = small.check();
+        said.of("coord::no_way_down").iter().map(|found| found["message"].as_str().unwrap().to_owned()).collect()
+    };
+    // One after the other, and one and the same again and again.
+    let both = cooling(
+        "'e_after(2.0)'",
+        "vents = state {}, airs = state {}, trans { src = 'cooling', tgt = 'vents', events = { 'e_one' } },
+         trans { src = 'vents', tgt = 'airs', events = { 'e_two' } },
+         trans { src = 'vents', tgt = 'leaving', events = { 'e_after(2.0)' } },
+         trans { src = 'airs', tgt = 'leaving', events = { 'e_after(1.5)' } },",
+        "",
+    );
+    assert_eq!(told(&both), [lasts("airs", "5.5", "`e_one`, `e_two` come late")]);
+    let again = "trans { src = 'cooling', tgt = 'cooling', events = { 'e_one' } },";
+    let again = cooling("'e_after(2.0)'", again, "");
+    assert_eq!(told(&again), [lasts("cooling", "6", "`e_one` comes late again and again")]);
+    // What leads on as the time does makes nothing longer, whenever it comes.
+    let as_well = cooling(
+        "'e_after(2.0)'",
+        "vents = state {}, airs = state {}, trans { src = 'cooling', tgt = 'vents', events = { 'e_after(2.0)' } },
+         trans { src = 'vents', tgt = 'airs', events = { 'e_after(3.0)', 'e_one' } },
+         trans { src = 'airs', tgt = 'leaving', events = { 'e_after(1.0)' } },",
+        "",
+    );
+    as_well.demo.replace(
+        "coordinator.lua",
+        "src = 'cooling', tgt = 'leaving', events = { 'e_after(2.0)' }",
+        "src = 'cooling', tgt = 'leaving', events = { 'e_never' }",
+    );
+    let found = told(&as_well);
+    assert!(!found.iter().any(|message| message.contains("late")), "{found:?}");
+    // A time around it runs on, whatever comes inside.
+    let inside = |around: &str| {
+        let states = "vents = state {}, cooling = state { first = state {}, second = state {},
+             trans { src = 'initial', tgt = 'first' }, trans { src = 'first', tgt = 'second', events = { 'e_one' } },
+             trans { src = 'first', tgt = 'vents', events = { 'e_after(3.0)' } } },
+             trans { src = 'vents', tgt = 'leaving', events = { 'e_done' } },";
+        let way = timed("'e_done'", around).replace("cooling = state {},", "").replace("stays = state {},", states);
+        Small::new(BASE, &way.replace("leaving = state", "stays = state {}, leaving = state"), "")
+    };
+    assert!(told(&inside("'e_after(4.0)'")).is_empty());
+    // Nobody raises what is refused; a fault, or the event that ends it once more, is no emergency.
+    for event in ["e_one", "a.faulted", "e_shutdown"] {
+        let states = format!(
+            "vents = state {{}}, trans {{ src = 'cooling', tgt = 'vents', events = {{ '{event}' }} }},
+             trans {{ src = 'vents', tgt = 'leaving', events = {{ 'e_after(2.5)' }} }},"
+        );
+        let small = cooling("'e_after(3.0)'", &states, "safety: [e_estop]\n");
+        assert_eq!(told(&small), Vec::<String>::new(), "{event}");
+    }
+}
+
+/// Where it is not heard, stopping begins at any moment of a state that has a time.
+#[test]
+fn a_time_that_has_just_begun_when_stopping_begins_counts_whole() {
+    let way = |within: &str| {
+        let states = "stays = state {}, hot = state {}, trans { src = 'up', tgt = 'hot', events = { 'e_hot' } },
+             trans { src = 'hot', tgt = 'cooling', events = { 'e_after(3.0)' } },";
+        let small = Small::new(BASE, &timed("'e_done'", "'e_after(2.5)'").replace("stays = state {},", states), "");
+        small.demo.replace("small.yaml", "down: idle, within_s: 5", &format!("down: idle, within_s: {within}"));
+        small
+    };
+    let small = way("5");
+    let said = small.check();
+    let message = "the way down by `root.hot` lasts 5.5 s at least, and `shutdown.within_s` gives it 5 s";
+    assert_eq!(only(&said, "coord::no_way_down")["message"], message);
+    let script = "deploy('small.yaml')\nraise('e_hot')\nwait(0.1)\nshutdown()\n";
+    for (small, exit) in [(small, 4), (way("6"), 0)] {
+        small.demo.write("hot.lua", script);
+        let ran = small.demo.run(&["run", "hot.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, exit, "{}{}", ran.out, ran.err);
+    }
 }
 
 #[test]

@@ -20,6 +20,8 @@ types:
       address: { type: int, default: 0, tunable: unconfigured }
     operations:
       weld: { effect: irreversible }
+      open: { effect: { undo: close } }
+      close: { effect: { undo: open } }
       raise: { effect: { undo: lower }, moves: true }
       lower: { effect: { undo: raise }, moves: true }
   Arm:

@@ -5,7 +5,7 @@ use davit::check::{Known, Shown};
 use std::collections::BTreeMap;
 
 /// The classes, and of how many cases each was part of.
-pub const CLASSES: [&str; 15] = [
+pub const CLASSES: [&str; 16] = [
     "an undo and a push of which one fails",
     "safe in a batch",
     "e_done",
@@ -16,6 +16,7 @@ pub const CLASSES: [&str; 15] = [
     "cancelled",
     "reverted",
     "operator",
+    "set by an operator",
     "three waiting",
     "two at once",
     "interrupted by safe",
@@ -123,6 +124,11 @@ impl Classes {
         }
         if by == "operator" {
             self.meets("operator");
+            // A member of a component, as no configuration that is written is called.
+            let set = |end: &str| answer.strip_suffix(end).is_some_and(|subject| subject.contains('.'));
+            if set(".ok") {
+                self.meets("set by an operator");
+            }
         }
         if answer.ends_with(".ok") {
             if self.life == 2 {

@@ -4,6 +4,7 @@
 use crate::classes::Classes;
 use crate::generate::{CONFIRMS, Chance, EVENTS, Made, event};
 use crate::laws::Laws;
+use crate::settings::{Setting, followed};
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
@@ -50,6 +51,7 @@ struct Case<'a> {
     log: Vec<String>,
     classes: &'a mut Classes,
     names: Vec<String>,
+    settings: Vec<Setting>,
 }
 
 /// What goes wrong. Left out: what leaves a component faulted or in quarantine, and a platform that lies, which `check` takes
@@ -94,7 +96,9 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
         })
         .collect();
     let lent: Vec<&Chart> = charts.iter().map(|chart| &**chart).collect();
-    let Some(follower) = Follower::new(&made.deployment, &lent, &made.catalogue) else { return Ok(false) };
+    let settings = Setting::all(chance);
+    let followed = followed(&made.deployment, &settings);
+    let Some(follower) = Follower::new(&followed, &lent, &made.catalogue) else { return Ok(false) };
     let clock = Clock::simulated();
     let me = clock.enter();
     let options = Options { delays: delays(chance), ..Options::default() };
@@ -131,8 +135,9 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     let names = made.deployment.coordinators.iter().map(|c| c.name.to_string()).collect();
     let safes = safe(made).iter().map(ToString::to_string).collect();
     let laws = Laws::of(safes, made.deployment.limits.stack < 16);
+    let log = vec![said];
     let mut case =
-        Case { session, platform, clock: clock.clone(), follower, notes, log: vec![said], classes, names, laws };
+        Case { session, platform, clock: clock.clone(), follower, notes, log, classes, names, settings, laws };
     let went = case.go(made, chance);
     let overflowed = case.follower.overflowed();
     let log = std::mem::take(&mut case.log);
@@ -163,7 +168,10 @@ impl Case<'_> {
                     let first = if all.len() > 3 { 3 } else { 0 };
                     let id = all[first + chance.below(all.len() - first)].id;
                     if chance.percent(90) && !(id.as_str() == "c3" && made.kept) {
-                        self.operator(Ask::Apply(id))?;
+                        match chance.percent(25) {
+                            true => self.set(chance)?,
+                            false => self.operator(Ask::Apply(id))?,
+                        }
                         self.rest(action)?;
                         for _ in 0..chance.below(12) {
                             self.clock.sleep(Duration::from_millis(1));
@@ -185,6 +193,7 @@ impl Case<'_> {
                     };
                     self.operator(ask)?;
                 }
+                19 => self.set(chance)?,
                 _ => {}
             }
             self.rest(action)?;
@@ -222,6 +231,22 @@ impl Case<'_> {
         self.follower.see(seen).map_err(|why| format!("the operator's {ask}: {why}"))?;
         self.session.request(ask, "operator", true);
         Ok(())
+    }
+
+    /// An operator sets something, or takes back what was set.
+    fn set(&mut self, chance: &mut Chance) -> Result<(), String> {
+        let setting = &self.settings[chance.below(self.settings.len())];
+        let (id, name, value) = (setting.id(), setting.member.to_string(), setting.value);
+        if chance.percent(25) && self.session.setting(&name).is_some() {
+            return self.operator(Ask::UndoOf(id));
+        }
+        // What is not there, or is being set already, is refused without a request.
+        if self.session.set(0, &name, &value.into(), true).is_err() {
+            return Ok(());
+        }
+        self.log.push(format!("{} operator sets {name} to {value}", self.clock.now()));
+        let seen = Seen::Operator { ask: Ask::Apply(id), force: true };
+        self.follower.see(seen).map_err(|why| format!("the operator's {id}: {why}"))
     }
 
     /// Lets everything that happens now happen, and compares.

@@ -14,6 +14,7 @@ mod drive;
 mod generate;
 mod laws;
 mod mutations;
+mod settings;
 
 use classes::{CLASSES, Classes};
 use generate::Chance;

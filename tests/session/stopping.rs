@@ -65,6 +65,11 @@ fn coordinator(leading: &str) -> String {
   trans {{ src = "lowering", tgt = "safe", events = {{ "e_estop" }} }},
   trans {{ src = "lowering", tgt = "removing", events = {{ "lift.undone" }} }},
   trans {{ src = "lowering", tgt = "failed", events = {{ "lift.undo.failed", "lift.undo.broken" }} }},
+  easing = state {{}}, held = state {{ entry = "calm" }}, releasing = state {{ entry = "calm.undo" }}, cooling = state {{}},
+  trans {{ src = "easing", tgt = "held", events = {{ "e_estop" }} }},
+  trans {{ src = "held", tgt = "releasing", events = {{ "e_stop" }} }},
+  trans {{ src = "releasing", tgt = "cooling", events = {{ "calm.undone" }} }},
+  trans {{ src = "cooling", tgt = "lowering", events = {{ "e_after(2.5)" }} }},
   trans {{ src = "removing", tgt = "idle", events = {{ "base.undone" }} }},
   trans {{ src = "removing", tgt = "failed", events = {{ "base.undo.failed", "base.undo.broken" }} }},
 }}
@@ -321,6 +326,18 @@ fn an_emergency_on_the_way_down_stops_the_time() {
     assert!(ended.is_clean(), "{ended:?}");
     let calls = small.steps().iter().filter(|step| step.contains("operation_call a.")).count();
     assert_eq!(calls, 2, "nothing moves before somebody asks: {:?}", small.heard.lock().unwrap());
+}
+
+/// From when people let it go on it has as long as from the beginning, whenever that was.
+#[test]
+fn after_an_emergency_on_the_way_down_the_time_begins_anew() {
+    for again in [3.5, 9.0] {
+        let small = Small::up("easing");
+        small.after(1.0, |session| session.raise(event("e_estop"), "test"));
+        small.after(again, |session| session.command(Command::Shutdown { force: false }));
+        let (ended, took) = small.stop();
+        assert!(ended.is_orderly() && (again + 4.5..again + 5.0).contains(&took), "{again}: {took} {ended:?}");
+    }
 }
 
 /// An emergency while it comes up: late as it is then, nothing is lowered before somebody asks.
