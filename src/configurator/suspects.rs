@@ -42,9 +42,9 @@ impl Suspects {
         self.reported.iter().copied()
     }
 
-    /// Whether nobody is to be looked at.
+    /// Whether nobody is to be looked at, nor is being looked at.
     pub fn is_empty(&self) -> bool {
-        self.reported.is_empty()
+        self.reported.is_empty() && self.looks.is_empty()
     }
 
     /// When something must be looked at again, if nothing comes; none: no look is under way.

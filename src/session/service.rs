@@ -9,6 +9,7 @@ use super::routes::Acted;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
 use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, recovery};
+use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, RequestId};
 use serde_json::{Value as Json, json};
@@ -64,12 +65,19 @@ const LOOK_WITHIN: f64 = 0.3;
 /// It takes what it takes: who asks knows how long that is waited for.
 const DOWN_WITHIN: f64 = 1e6;
 
+/// The longest for what ends when who asked is gone.
+const WITHIN_MOST: f64 = 1e6;
+
 fn within(params: &Json, usual: f64) -> Result<Duration, RpcError> {
+    within_at_most(params, usual, WITHIN_MOST)
+}
+
+fn within_at_most(params: &Json, usual: f64, most: f64) -> Result<Duration, RpcError> {
     let seconds: f64 = optional(params, "within_s")?.unwrap_or(usual);
-    if seconds.is_finite() && (0.0..=1e6).contains(&seconds) {
+    if seconds.is_finite() && (0.0..=most).contains(&seconds) {
         Ok(Duration::from_secs_f64(seconds))
     } else {
-        Err(RpcError::new(INVALID_PARAMS, "`within_s` is a number of seconds from 0 to 1000000"))
+        Err(RpcError::new(INVALID_PARAMS, format!("`within_s` is a number of seconds from 0 to {most}")))
     }
 }
 
@@ -143,9 +151,9 @@ impl Service for SessionService {
                 };
                 request(&session, line, ask, params, gone)
             }
-            "look" => Ok(view(&session.look(within(params, LOOK_WITHIN)?))),
+            "look" => Ok(view(&session.look(within_at_most(params, LOOK_WITHIN, limits::READ_WITHIN)?))),
             "get" => {
-                let within = within(params, GET_WITHIN)?;
+                let within = within_at_most(params, GET_WITHIN, limits::READ_WITHIN)?;
                 session.get(&param::<String>(params, "name")?, within).map(|seen| view(&seen)).map_err(no_member)
             }
             "set" => {
@@ -291,7 +299,7 @@ fn not_raised(why: NotRaised) -> RpcError {
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {
-    match session.drift(within(params, WITHIN)?) {
+    match session.drift(within_at_most(params, WITHIN, limits::READ_WITHIN)?) {
         Some(differences) => Ok(view(&differences)),
         None => Err(RpcError {
             code: TIMED_OUT,
@@ -310,7 +318,8 @@ fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
             RpcError::new(INVALID_PARAMS, "`direction` is `back` or `accept`")
         });
     };
-    let recovered = session.recover(how, "operator", within(params, WITHIN)?);
+    let within = within_at_most(params, WITHIN, limits::RECOVER_WITHIN)?;
+    let recovered = session.recover(how, "operator", within);
     recovered.map(|recovered| view(&recovered)).ok_or_else(|| {
         let message = "the recovery was not over in time; it goes on".to_owned();
         RpcError {

@@ -3,8 +3,9 @@
 use crate::rig::*;
 use davit::configurator::Requester;
 use davit::model::{Ask, Configuration, RequestId, RunState, Value, Verdict};
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
 use davit::stack::{Batch, Request, Scope};
+use std::sync::Arc;
 use std::time::Duration;
 
 fn up() -> Rig {
@@ -451,4 +452,25 @@ fn an_undo_that_is_refused_and_interrupted_is_not_about_the_next_visit() {
     rig.wait(5.0);
     assert_eq!(rig.frames(), ["make", "gain", "low", "low"], "that of the second visit goes with it");
     rig.in_step();
+}
+
+/// What is reported faulted is looked at before something is planned: what is safe does not wait for that.
+#[test]
+fn a_safe_configuration_does_not_wait_for_a_look() {
+    let rig = Rig::with(scenario(), Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
+    for word in ["make", "wire", "run"] {
+        rig.ask(word);
+    }
+    // Nobody answers questions: a look lasts as long as it may.
+    rig.platform.set_faults(Faults { blind: true, ..Faults::default() });
+    assert!(rig.platform.fault(name("B"), "it burns"));
+    rig.wait(0.001);
+    rig.submit("eight");
+    rig.wait(0.01);
+    assert_eq!(rig.events().len(), 3, "the look is not over");
+    rig.submit("quiet");
+    rig.wait(0.2);
+    assert!(rig.events()[3..].contains(&"quiet.ok".to_owned()), "{:?}", rig.events());
+    rig.wait(100.0);
+    rig.each_answered_once();
 }
