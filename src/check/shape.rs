@@ -2,13 +2,13 @@
 
 use super::alike::{FrameBook, FrameNumber};
 use crate::model::ConfigId;
-use crate::stack::{Frame, FrameId, Requester, Stack, is_kept};
+use crate::stack::{Frame, FrameId, Requester, Stack, is_kept, staying};
 use crate::system::Slot;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
-/// these would take over.
+/// these would take over and of its calls they keep.
 pub type Counted = (FrameNumber, bool, Vec<Slot>);
 
 /// Which frames count.
@@ -59,6 +59,8 @@ impl Shapes {
             let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
             let over: FxHashSet<Slot> = above.iter().flat_map(|f| f.saved.iter().map(|s| s.slot)).collect();
             let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(|slot| over.contains(slot)).collect();
+            let others: Vec<Arc<Frame>> = frames.iter().filter(|f| !self.undone.counts(f)).cloned().collect();
+            handed.extend(staying(frame, &others));
             handed.sort_unstable();
             handed.dedup();
             let blocked = !above.is_empty() && is_kept(frame, above.into_iter());

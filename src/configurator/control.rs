@@ -1,8 +1,8 @@
 //! What the session asks of the configurator beside requests: how things stand, and to take everything down.
 
 use super::request::{Reason, Request, Residual};
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, RequestId, Snapshot, Step};
-use crate::stack::{FrameId, Requester};
+use crate::model::{ComponentName, ConfigId, Configuration, RequestId, Snapshot, Step};
+use crate::stack::{Frame, FrameId, Requester};
 use crate::time::{Sender, Time};
 use serde::Serialize;
 use std::sync::Arc;
@@ -62,17 +62,41 @@ pub struct View {
     pub quarantined: Vec<ComponentName>,
 }
 
-/// What was in force when stopping began.
+/// A moment, and what of the stack is from before it.
 #[derive(Debug, Clone)]
-pub(super) struct Began {
+pub(super) struct Moment {
     /// The number that the next frame got.
     pub next: FrameId,
     /// When.
     pub at: Time,
+    /// What was asked for and not answered then: it counts as before, also where it begins at the same instant.
+    pub asked: Vec<RequestId>,
+    /// The frames of those that were answered since.
+    pub before: Vec<FrameId>,
+}
+
+impl Moment {
+    /// Whether a frame is of what was asked for since. What is not answered yet has none that counts.
+    pub fn has_come(&self, frame: &Frame) -> bool {
+        frame.id >= self.next && frame.at >= self.at && !self.before.contains(&frame.id)
+    }
+
+    /// A request is answered, and has left this frame on the stack, if it has left one.
+    pub fn answered(&mut self, request: &Request, frame: Option<FrameId>) {
+        if let Some(at) = self.asked.iter().position(|asked| *asked == request.id) {
+            self.asked.swap_remove(at);
+            self.before.extend(frame);
+        }
+    }
+}
+
+/// What was in force when stopping began.
+#[derive(Debug, Clone)]
+pub(super) struct Began {
+    /// When that was.
+    pub since: Moment,
     /// The number of the next frame when its coordinators were left out.
     pub led: Option<FrameId>,
-    /// What was asked for and not answered then, and by whom: it counts as before, also where it begins at the same instant.
-    pub asked: Vec<(Ask, Requester)>,
 }
 
 /// What a stage of stopping came to.

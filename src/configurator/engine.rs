@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{Began, Busy, Command, View};
+use super::control::{Began, Busy, Command, Moment, View};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -92,8 +92,8 @@ pub(super) struct Engine {
     pub taking_down: bool,
     /// When stopping began, and what was in force then.
     pub began: Option<Began>,
-    /// The event that ends the deployment came, and it is not down since.
-    pub leaving: bool,
+    /// When the event that ends the deployment came, and it is not down since.
+    pub leaving: Option<Moment>,
     /// What takes its time has been broken off, since force is wanted.
     pub hurried: bool,
 }
@@ -126,7 +126,7 @@ impl Engine {
             stopping: false,
             taking_down: false,
             began: None,
-            leaving: false,
+            leaving: None,
             hurried: false,
         }
     }
@@ -198,7 +198,7 @@ impl Engine {
     /// The next batch that may begin, by its number.
     pub fn turn(&mut self) -> Option<u32> {
         let Self { desk, given, world, leaving, .. } = self;
-        let alone = |batch: &Batch| *leaving && world.stack.goes_alone(batch);
+        let alone = |batch: &Batch| leaving.is_some() && world.stack.goes_alone(batch);
         desk.turn(&given.claims, alone).map(|turn| turn.number)
     }
 
@@ -264,7 +264,7 @@ impl Engine {
                         let _ = reply.try_send(());
                     }
                     Command::Stopping => self.stopping_begins(),
-                    Command::Leaving(leaving) => self.leaving = leaving,
+                    Command::Leaving(leaving) => self.leaves(leaving),
                     Command::Hurry => {}
                     // Stands in its coordinator's queue like a request.
                     Command::Down(requester) => {
@@ -383,6 +383,7 @@ impl Engine {
         };
         // No longer owed, whatever the listeners do with it.
         let (_, begun) = self.current.remove(at);
+        self.note_answered(&request);
         if self.current.is_empty() {
             self.confirmations.nothing_under_way();
         }

@@ -106,7 +106,7 @@ impl Engine {
                 if self.all_down() && !self.desk.asks_on() {
                     self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
                     self.counts.told.store(false, std::sync::atomic::Ordering::Release);
-                    self.leaving = false;
+                    self.leaves(false);
                 }
                 if self.all_down() && self.world.settle_down() {
                     self.confirmations.clear();

@@ -68,6 +68,7 @@ impl Engine {
                 touched.add_state(component, entry.state);
             }
         }
+        touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
         self.safety.troubles.push((request.id, troubles));
         let spec = Spec { asked_back: false, ..self.effort([configuration.id]) };
@@ -155,6 +156,8 @@ impl Engine {
         let failed = broken.as_ref().map(|part| part.frame.as_ref());
         let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };
         let (pushed, verdict) = self.world.settle_safe(edits, frame, &how, &held);
+        // What failed of it is nothing that it keeps.
+        self.world.stack.frame(pushed).into_iter().for_each(|frame| touched.leaves(frame));
         if let Some(part) = &broken {
             // Those that came later took what this one was to do for done.
             let later = self.running.iter().filter(|other| other.after.contains(&number));

@@ -2,9 +2,10 @@
 //!
 //! What is under way is given up as by a rollback that nobody asked for. Frames are popped, newest first, compensations
 //! included: but those that came since stopping began, those of safe configurations, and what these block. What was put to
-//! rest since is not raised again: where one of them moved hardware nothing is popped at all.
+//! rest is not raised again: where something moved hardware since stopping began, or since the event that ends the deployment,
+//! nothing is popped at all.
 
-use super::control::{Began, TakenDown};
+use super::control::{Began, Moment, TakenDown};
 use super::engine::Engine;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -22,10 +23,7 @@ impl Engine {
         if self.began.is_some() {
             return;
         }
-        let under_way = self.current.iter().map(|(request, _)| request).chain(&self.safety.waiting);
-        let asked = under_way.map(|request| (request.ask, request.requester)).collect();
-        let (next, at) = (self.world.stack.next(), self.given.clock.now());
-        self.began = Some(Began { next, at, led: None, asked });
+        self.began = Some(Began { since: self.moment(), led: None });
         let operators = |request: &Request| request.why == Why::Asked && request.requester == Requester::Operator;
         for request in self.desk.cancel_waiting(operators) {
             self.refuse(request);
@@ -99,22 +97,43 @@ impl Engine {
         self.world.stack.frames().iter().any(before)
     }
 
-    /// Whether a frame is of what began since stopping did.
-    pub(super) fn came_since(&self, frame: &Frame) -> bool {
-        // What began before and ended since counts as before.
-        let asked = (Ask::Apply(frame.configuration), frame.requester);
-        let since = |began: &Began| frame.id >= began.next && frame.at >= began.at && !began.asked.contains(&asked);
-        self.began.as_ref().is_some_and(since)
+    /// This moment.
+    fn moment(&self) -> Moment {
+        let under_way = self.current.iter().map(|(request, _)| request).chain(&self.safety.waiting);
+        let asked = under_way.map(|request| request.id).collect();
+        Moment { next: self.world.stack.next(), at: self.given.clock.now(), asked, before: Vec::new() }
     }
 
-    /// What moved hardware since stopping began.
+    /// The deployment is led down from now on, or it is no more.
+    pub(super) fn leaves(&mut self, leaving: bool) {
+        self.leaving = leaving.then(|| self.moment());
+    }
+
+    /// What was asked for and is answered now counts as from when it was asked for.
+    pub(super) fn note_answered(&mut self, request: &Request) {
+        let Self { began, leaving, world, .. } = self;
+        let Ask::Apply(id) = request.ask else { return };
+        let frame = || world.stack.newest_of(id, Some(request.requester)).map(|frame| frame.id);
+        for moment in began.iter_mut().map(|began| &mut began.since).chain(leaving) {
+            moment.answered(request, frame());
+        }
+    }
+
+    /// Whether a frame is of what was asked for since stopping began.
+    pub(super) fn came_since(&self, frame: &Frame) -> bool {
+        self.began.as_ref().is_some_and(|began| began.since.has_come(frame))
+    }
+
+    /// What moved hardware since it is led down: since stopping began, or since the event that ends the deployment, whoever
+    /// raised that.
     fn put_to_rest(&self) -> Option<ConfigId> {
         let moved = |frame: &&Arc<Frame>| match &frame.inverse {
             Inverse::Steps(steps) => steps.iter().any(|planned| planned.moves),
             Inverse::List(items) => items.iter().any(|item| step::moves(&item.step, &self.world.system)),
         };
+        let led = |frame: &Frame| self.leaving.as_ref().is_some_and(|since| since.has_come(frame));
         let frames = self.world.stack.frames().iter();
-        frames.rev().filter(|frame| self.came_since(frame)).find(moved).map(|frame| frame.configuration)
+        frames.rev().filter(|frame| self.came_since(frame) || led(frame)).find(moved).map(|frame| frame.configuration)
     }
 
     /// Pops frame after frame, newest first; what cannot be popped stays, with every older frame that shares a component with

@@ -297,6 +297,7 @@ pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
         revision: system.revision(),
         warnings: Vec::new(),
         popped: Vec::new(),
+        kept: rustc_hash::FxHashSet::default(),
     }
 }
 

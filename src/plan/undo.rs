@@ -8,7 +8,7 @@ use super::footprint::{Saved, Slot};
 use super::{PlannedStep, SavedValue, Stage, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 pub use crate::system::step::absolute;
-use crate::system::touch::components;
+use crate::system::touch::{components, slot};
 use crate::system::{Overlay, System, Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -53,6 +53,16 @@ impl Item {
             _ => (None, None),
         };
         Self { step: step.clone(), call, was, stage: done.stage, origin: done.origin, of: Self::NOWHERE }
+    }
+
+    /// The call that it takes back, if it is the undo of one.
+    pub fn takes_back_call(&self) -> Option<&Call> {
+        self.call.as_ref().filter(|_| matches!(self.step, Step::Operation(_)))
+    }
+
+    /// What it takes back, where that may stay as it is while everything around it goes: an absolute write, a call.
+    pub fn may_stay(&self) -> Option<Slot> {
+        absolute(&self.step).or_else(|| self.takes_back_call().map(|call| Slot::Operation(call.operation)))
     }
 
     /// A step by itself.
@@ -291,7 +301,8 @@ impl<'o, 's> Script<'o, 's> {
 }
 
 /// The steps that undo `steps` on the system they led to, last first, with as much room for parallel work as the steps
-/// themselves had. `saved` has the values of absolute writes; those in slots for which `skip` is true stay as they are.
+/// themselves had. `saved` has the values of absolute writes; those in slots for which `skip` is true stay as they are, and so
+/// do calls of such operations.
 ///
 /// # Errors
 /// The false preconditions, where the system is not as the steps left it.
@@ -320,9 +331,8 @@ pub fn undo(
             restore(script, unwritten.pop().expect("it was just seen"), skip, wave)?;
         }
         let mut last = back.waits(i);
-        let slot = absolute(&done.step);
-        if slot.is_none_or(|slot| !skip(slot)) {
-            let kept = slot.and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
+        if !skip(slot(&done.step)) {
+            let kept = absolute(&done.step).and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
             let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
             for step in steps {
                 if let Some(id) = script.add(Item::undoing(step, done), wave, &last)? {

@@ -11,6 +11,7 @@ use crate::plan::undo::{absolute, items};
 use crate::plan::{Context, PlannedStep, SavedValue, plan_on};
 use crate::system::{Overlay, System};
 use crate::time::Time;
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// A safe configuration, planned as far as it goes.
@@ -121,8 +122,10 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
     };
     let revision = system.revision();
     let parts = vec![part];
-    let planned =
-        Planned { steps, of: Vec::new(), whole: Vec::new(), parts, revision, warnings: Vec::new(), popped: Vec::new() };
+    // As much of it as goes: nothing of it is taken back.
+    let kept = FxHashSet::default();
+    let (of, whole, warnings, popped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let planned = Planned { steps, of, whole, parts, revision, warnings, popped, kept };
     Effort { planned, frame, troubles }
 }
 

@@ -8,7 +8,11 @@ use super::request::{Batch, Request, Requester, Why};
 use super::share::{self, Hindrance};
 use super::{Frame, FrameId, Inverse, Stack, World};
 use crate::model::Finding;
+use crate::plan::PlannedStep;
+use crate::plan::undo::Item;
+use crate::system::touch::{Slot, slot};
 use crate::system::{View, step};
+use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -51,7 +55,7 @@ pub(super) fn along(
         let Err(hindrance) = share::look(&rest, at) else { continue };
         let Hindrance { by, finding } = *hindrance;
         let frame = rest.iter().find(|frame| Some(frame.id) == by);
-        let why = match frame.map(|frame| stays(world, frame, repaired)) {
+        let why = match frame.map(|frame| stays(world, frame, &rest, repaired)) {
             Some(None) => None,
             Some(Some(why)) => Some(why),
             None => Some(None),
@@ -73,15 +77,15 @@ pub(super) fn along(
     Ok(along)
 }
 
-/// Whether a frame is not taken along, and why, where it could be thought to be.
-fn stays(world: &World, frame: &Frame, repaired: bool) -> Option<Option<String>> {
+/// Whether a frame is not taken along from among these, and why, where it could be thought to be.
+fn stays(world: &World, frame: &Frame, frames: &[Arc<Frame>], repaired: bool) -> Option<Option<String>> {
     if frame.requester != Requester::Operator {
         return Some(None);
     }
     if frame.safe {
         return Some(Some("it is a safe configuration, and people let it go".to_owned()));
     }
-    if let Some(step) = moving(frame, &world.system) {
+    if let Some(step) = moving(frame, frames, &world.system) {
         return Some(Some(format!("`{step}` moves, and nobody asked for that")));
     }
     let mut components = share::components(&frame.footprint).into_iter();
@@ -89,15 +93,19 @@ fn stays(world: &World, frame: &Frame, repaired: bool) -> Option<Option<String>>
     Some(Some(format!("what it is about is broken: {}", broken.residual.cause)))
 }
 
-/// What moves when a frame is undone.
-fn moving(frame: &Frame, view: &impl View) -> Option<String> {
+/// What moves when a frame is undone that is one of these.
+fn moving(frame: &Frame, frames: &[Arc<Frame>], view: &impl View) -> Option<String> {
+    let staying: FxHashSet<Slot> = share::staying(frame, frames).collect();
     match &frame.inverse {
         Inverse::Steps(steps) => {
-            let back = steps.iter().rev().filter(|planned| planned.undo_moves);
+            let moves = |planned: &&PlannedStep| planned.undo_moves && !staying.contains(&slot(&planned.step));
+            let back = steps.iter().rev().filter(moves);
             back.flat_map(|planned| planned.undo.steps()).map(ToString::to_string).next()
         }
         Inverse::List(items) => {
-            items.iter().find(|item| step::moves(&item.step, view)).map(|item| item.step.to_string())
+            let goes = |item: &&Item| item.may_stay().is_none_or(|slot| !staying.contains(&slot));
+            let mut back = items.iter().filter(goes);
+            back.find(|item| step::moves(&item.step, view)).map(|item| item.step.to_string())
         }
     }
 }

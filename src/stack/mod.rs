@@ -37,7 +37,7 @@ pub use permanent::may_commit;
 pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
-pub use share::{HandOver, components, is_kept, shares};
+pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, Seen, World};
 

@@ -1,17 +1,20 @@
-//! Whether a frame below the top may be popped, and which values it then hands over (design §5).
+//! Whether a frame may be popped, which values it then hands over, and which calls stay (design §5).
+//!
+//! What a safe configuration has called stays while it is in force, whoever else called the same: nothing takes it back.
 
 use super::{Frame, FrameId, Inverse};
-use crate::model::{ComponentName, Finding, codes};
+use crate::model::{Call, ComponentName, Finding, MemberRef, Step, codes};
 use crate::plan::SavedValue;
 use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot};
-use crate::plan::undo::{absolute, restoring};
+use crate::plan::undo::{Item, absolute, restoring};
+use crate::system::Undo;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
-/// What becomes of a popped frame's absolute writes.
+/// What becomes of a popped frame's absolute writes and calls.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HandOver {
-    /// Slots that a frame above wrote: nothing is sent for them.
+    /// Slots that a frame above wrote, and operations whose calls stay: nothing is sent for them.
     pub(super) slots: FxHashSet<Slot>,
     /// The frame that takes over the saved value.
     takers: Vec<(FrameId, Slot, Saved)>,
@@ -41,6 +44,31 @@ fn meet(mine: &FxHashSet<ComponentName>, theirs: &Footprint) -> bool {
         let (a, b) = touch.slot.components();
         mine.contains(&a) || mine.contains(&b)
     })
+}
+
+/// The operations that a frame calls and takes back by itself.
+pub fn calls(frame: &Frame) -> impl Iterator<Item = MemberRef> + '_ {
+    let (steps, items) = match &frame.inverse {
+        Inverse::Steps(steps) => (steps.as_slice(), [].as_slice()),
+        Inverse::List(items) => ([].as_slice(), items.as_slice()),
+    };
+    let called = |call: &Call| call.operation;
+    let done = steps.iter().filter_map(move |planned| match &planned.step {
+        Step::Operation(call) if planned.undo != Undo::Nothing => Some(called(call)),
+        _ => None,
+    });
+    done.chain(items.iter().filter_map(Item::takes_back_call).map(called))
+}
+
+/// The operations whose calls stay, since safe ones among these frames have called them.
+pub fn kept_calls<'f>(frames: impl IntoIterator<Item = &'f Arc<Frame>>) -> FxHashSet<MemberRef> {
+    frames.into_iter().filter(|frame| frame.safe).flat_map(|frame| calls(frame)).collect()
+}
+
+/// The slots of a frame's calls that stay when it is popped from among these.
+pub fn staying<'f>(frame: &'f Frame, frames: &[Arc<Frame>]) -> impl Iterator<Item = Slot> + 'f {
+    let kept = kept_calls(frames.iter().filter(|other| other.id != frame.id));
+    calls(frame).filter(move |operation| kept.contains(operation)).map(Slot::Operation)
 }
 
 /// Whether the frame at `at` may be popped.
@@ -73,7 +101,7 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
             }
         }
     }
-    let mut hand = HandOver::default();
+    let mut hand = HandOver { slots: staying(frame, frames).collect(), ..HandOver::default() };
     let above = &frames[at + 1..];
     if above.is_empty() {
         return Ok(hand);

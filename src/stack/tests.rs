@@ -34,7 +34,7 @@ fn types() -> Arc<Catalogue> {
     for (name, effect) in
         [("open", Effect::Undo(ident("close"))), ("close", Effect::None), ("weld", Effect::Irreversible)]
     {
-        let operation = OperationType::new(effect);
+        let operation = OperationType { moves: name == "close", ..OperationType::new(effect) };
         ty.operations.insert(ident(name), operation);
     }
     let mut catalogue = Catalogue::new();
@@ -458,4 +458,28 @@ fn numbers_of_frames_are_never_used_again() {
     bench.ok(&[Op::Undo(second)]);
     let third = bench.ok(&[push(&conf)]).1[0];
     assert!(first < second && second < third && bench.stack.next() > third, "{first:?} {second:?} {third:?}");
+}
+
+#[test]
+fn what_stands_in_the_way_goes_along_where_a_safe_configuration_keeps_what_would_move() {
+    let coordinator = Requester::Coordinator(ComponentName::new("c").unwrap());
+    let lower = conf("lower", None, &[("B", Wanted::Stopped)], vec![], &[]);
+    let both = conf("both", None, &[], vec![call("A.open")], &[("B", Wanted::Running)]);
+    let hold = conf("hold", None, &[], vec![call("A.open")], &[]);
+    for safe in [false, true] {
+        let mut bench = Bench::new(64);
+        let hold = Configuration { safe, ..hold.clone() };
+        let by = |configuration, requester| Op::Push { configuration, requester, at: Time(0), scope: None };
+        bench.ok(&[by(&lower, coordinator)]);
+        bench.ok(&[by(&hold, coordinator)]);
+        bench.ok(&[by(&both, Requester::Operator)]);
+        let world = super::World::new(bench.system.clone(), bench.stack.clone());
+        let frames = bench.stack.frames();
+        let undo = super::Request::new(RequestId(1), Ask::UndoOf(lower.id), coordinator);
+        let along = super::leave::along(&world, frames, &undo, frames[0].id, false);
+        match safe {
+            true => assert_eq!(along.unwrap()[..], [frames[2].id]),
+            false => assert!(along.unwrap_err().message.contains("`operation_call A.close()` moves")),
+        }
+    }
 }

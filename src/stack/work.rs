@@ -6,9 +6,9 @@ use crate::model::finding::count;
 use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
 use crate::plan::undo::{Item, Script, undo};
 use crate::plan::{Context, Plan, PlannedStep, Refusal, StepId, plan_on};
-use crate::system::touch::absolute;
 use crate::system::{Overlay, System, View, Violation};
 use crate::time::Time;
+use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 use std::ops::Range;
 use std::sync::Arc;
@@ -88,6 +88,8 @@ pub struct Planned {
     pub warnings: Findings,
     /// The frames that will be popped, as they are now.
     pub popped: Vec<Arc<Frame>>,
+    /// Operations that safe configurations have called whose frames stay: no call of them is taken back.
+    pub kept: FxHashSet<MemberRef>,
 }
 
 impl Planned {
@@ -290,7 +292,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             Inverse::List(items) => {
                 let wave = self.script.next_wave();
                 for item in items {
-                    if absolute(&item.step).is_some_and(skip) {
+                    if item.may_stay().is_some_and(skip) {
                         continue;
                     }
                     let after: SmallVec<[StepId; 1]> =
@@ -419,7 +421,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             Some((steps, of)) => (Arc::new(steps), of, whole),
             None => (lone.unwrap_or_else(|| Arc::new(whole)), Vec::new(), Vec::new()),
         };
-        Ok(Planned { steps, of, whole, parts, revision, warnings, popped })
+        let kept = share::kept_calls(frames.iter().filter(|frame| !pushed.contains(&frame.id)));
+        Ok(Planned { steps, of, whole, parts, revision, warnings, popped, kept })
     }
 }
 

@@ -92,8 +92,8 @@ impl WayBack {
 pub(super) struct GoesBack<'t> {
     /// It came in after they had begun: what takes it back leads to what they have led to.
     pub late: bool,
-    /// They have written the same since: nothing takes it back.
-    pub overwritten: bool,
+    /// They have written the same since, or called it as well: nothing takes it back.
+    pub stays: bool,
     /// What is still to be done for it.
     pub steps: &'t [Step],
 }
@@ -171,7 +171,7 @@ impl Transaction {
                 continue;
             }
             let before = way.list.len();
-            let mut left_out = goes_back.overwritten;
+            let mut left_out = goes_back.stays;
             for back in goes_back.steps {
                 let goes = goes_back.instead_of(back, &mut heed, &view);
                 left_out |= goes.is_empty();
@@ -273,13 +273,24 @@ impl Transaction {
             heed.came_late(&step.step);
         }
         let overwritten = late.is_some_and(|(_, revision)| touched.overwrote(&step.step, revision));
+        let stays = overwritten || self.is_kept(&step.step, touched);
         let undo = late.map_or_else(|| self.undo_of(i, part), |(undo, _)| undo).steps();
         let done = self.partly.get(&i).map_or(0, |done| *done.min(&undo.len()));
-        GoesBack { late: late.is_some(), overwritten, steps: if overwritten { &[] } else { &undo[done..] } }
+        GoesBack { late: late.is_some(), stays, steps: if stays { &[] } else { &undo[done..] } }
+    }
+
+    /// Whether a call stays, whoever made it, since safe configurations that are in force, or that these were touched by, have
+    /// made it too.
+    fn is_kept(&self, step: &Step, touched: &Touched) -> bool {
+        let kept = |of| self.planned.kept.contains(of) || touched.calls.contains(of);
+        matches!(step, Step::Operation(call) if kept(&call.operation))
     }
 
     /// The steps that are still to be done to take a step of the forward list back.
     pub(super) fn steps_back(&self, i: u32, part: usize) -> &[Step] {
+        if self.is_kept(&self.forward_step(i).step, &self.touched) {
+            return &[];
+        }
         let steps = self.late(i).map_or_else(|| self.undo_of(i, part), |(undo, _)| undo).steps();
         &steps[self.partly.get(&i).map_or(0, |done| *done.min(&steps.len()))..]
     }
@@ -431,7 +442,8 @@ impl Transaction {
         finished.sort_unstable();
         let call = |place: &u32| {
             let planned = &self.whole()[*place as usize];
-            let undo = matches!(planned.step, Step::Operation(_)).then(|| planned.undo.steps().first()).flatten();
+            let goes = matches!(planned.step, Step::Operation(_)) && !self.is_kept(&planned.step, &self.touched);
+            let undo = goes.then(|| planned.undo.steps().first()).flatten();
             undo.map(|back| (Some(*place), back.clone()))
         };
         let calls: Vec<(Option<u32>, Step)> = finished.iter().rev().filter_map(call).collect();

@@ -218,7 +218,9 @@ impl Transaction {
         let part = self.failed_part();
         let open = |i: &u32| {
             let back = self.steps_back(*i, part);
-            !self.taken_back.contains(i) && back.iter().all(|back| step::precondition(back, live).is_empty())
+            !self.taken_back.contains(i)
+                && !back.is_empty()
+                && back.iter().all(|back| step::precondition(back, live).is_empty())
         };
         self.perhaps = self.perhaps_done().into_iter().filter(open).collect();
     }

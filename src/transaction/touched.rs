@@ -1,6 +1,7 @@
 //! What safe configurations touched.
 
 use crate::model::{ComponentName, MemberRef, RunState, Step, Value, Wanted};
+use crate::stack::{Frame, calls};
 use crate::system::touch::{Slot, components, slot};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -15,6 +16,8 @@ pub struct Touched {
     pub(super) properties: FxHashMap<MemberRef, Value>,
     pub(super) ports: FxHashMap<MemberRef, Option<Value>>,
     pub(super) states: FxHashMap<ComponentName, RunState>,
+    /// Operations that they have called, and take back by themselves.
+    pub(super) calls: FxHashSet<MemberRef>,
 }
 
 impl Touched {
@@ -41,6 +44,11 @@ impl Touched {
         self.states.insert(component, wanted.into());
     }
 
+    /// That is the frame that they leave: its calls are theirs, and only theirs.
+    pub fn leaves(&mut self, frame: &Frame) {
+        self.calls = calls(frame).collect();
+    }
+
     /// It was all planned on the model of this revision.
     pub fn planned_at(&mut self, revision: u64) {
         self.planned = self.slots.iter().map(|slot| (*slot, revision)).collect();
@@ -64,6 +72,7 @@ impl Touched {
         self.properties.extend(other.properties);
         self.ports.extend(other.ports);
         self.states.extend(other.states);
+        self.calls.extend(other.calls);
     }
 
     /// The run state that is wanted of `component`, if one is.

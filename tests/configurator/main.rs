@@ -4,6 +4,7 @@ mod atomicity;
 mod batches;
 mod brief;
 mod claims;
+mod kept_calls;
 mod observing;
 mod prepared;
 mod repair;

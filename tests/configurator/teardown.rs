@@ -64,6 +64,25 @@ fn frames_of_stopping_itself_and_safe_ones_are_not_popped() {
     assert!(rig.see().components.values().all(|c| c.state != RunState::Running), "what it stopped stays so");
 }
 
+/// What was asked for before stopping began counts as before, whenever it ends; what is asked for by the same name afterwards
+/// does not.
+#[test]
+fn what_is_asked_for_again_has_come_since() {
+    let rig = up();
+    rig.platform
+        .set_delays(Delays { of: vec![(StepPattern::new("stop"), Duration::from_millis(800))], ..Delays::default() });
+    rig.submit("quiet");
+    rig.handle.stopping();
+    rig.wait(20.0);
+    let last = |rig: &Rig| rig.view().stack.last().map(|frame| (frame.configuration, frame.since_stopping));
+    assert_eq!(last(&rig), Some((id("quiet"), false)), "{:?}", rig.events());
+    assert_eq!(rig.ask("quiet.undo"), ["quiet.undone"]);
+    assert_eq!(rig.ask("quiet"), ["quiet.ok"]);
+    assert_eq!(last(&rig), Some((id("quiet"), true)));
+    let told = down(&rig, false);
+    assert!(!told.held && told.still, "{told:?}");
+}
+
 /// From the first moment of stopping on nobody but the coordinator asks for anything.
 #[test]
 fn operators_are_refused_also_those_that_wait() {

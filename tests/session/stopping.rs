@@ -51,7 +51,7 @@ fn coordinator(leading: &str) -> String {
         r#"return state {{
   idle = state {{}}, building = state {{ entry = "base" }}, lifting = state {{ entry = "lift" }}, up = state {{}}, failed = state {{}},
   lowering = state {{ entry = "lift.undo" }}, removing = state {{ entry = "base.undo" }}, deaf = state {{}},
-  safe = state {{ entry = "calm" }},
+  safe = state {{ entry = "calm" }}, resting = state {{ entry = "rest" }},
   trans {{ src = "initial", tgt = "idle" }},
   trans {{ src = "idle", tgt = "building", events = {{ "e_start" }} }},
   trans {{ src = "building", tgt = "lifting", events = {{ "base.ok" }} }},
@@ -247,6 +247,25 @@ fn a_coordinator_that_does_not_come_down_is_left_out_and_everything_is_taken_bac
         |what: &str| steps.iter().position(|step| step.contains(what)).unwrap_or_else(|| panic!("{what}: {steps:?}"));
     assert!(at("a.lower") < at("stop a"), "{steps:?}");
     small.is_empty();
+}
+
+/// It comes to rest by the event that ends the deployment and no further; what was lowered is not raised again by whoever
+/// stops it then.
+#[test]
+fn what_was_put_to_rest_before_it_was_stopped_is_not_raised_again() {
+    for by_event in [true, false] {
+        let small = Small::up("resting");
+        if by_event {
+            small.session.raise(event("e_stop"), "test");
+            small.clock.sleep(Duration::from_secs(60));
+            assert!(small.heard("rest.ok"), "{:?}", small.heard.lock().unwrap());
+        }
+        let (ended, _) = small.stop();
+        assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+        let steps = small.steps();
+        assert!(!steps.iter().any(|step| step.contains("a.raise")), "{steps:?}");
+        small.is_empty();
+    }
 }
 
 #[test]

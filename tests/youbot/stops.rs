@@ -190,3 +190,43 @@ fn table() {
 fn step(usual: f64) -> f64 {
     std::env::var("DAVIT_STOPS_EVERY").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
+
+/// Two have stopped it: that one of them lets go is not enough.
+#[test]
+fn the_drives_hold_until_whoever_stopped_it_last_lets_go() {
+    for operator_first in [false, true] {
+        let live = Live::copying("youbot_arm");
+        let apply = || {
+            let id = davit::model::ConfigId::new("safe_hold").unwrap();
+            live.session.request(davit::model::Ask::Apply(id), "operator", false);
+            live.run(0.5);
+        };
+        if operator_first {
+            apply();
+        }
+        live.raise("e_estop");
+        live.run(0.5);
+        if !operator_first {
+            apply();
+        }
+        let holds = |live: &Live| {
+            let in_force =
+                live.session.status().stack.iter().filter(|f| f.configuration.as_str() == "safe_hold").count();
+            (in_force, live.rows().iter().all(|row| row.mode != 6))
+        };
+        live.rows();
+        live.run(0.1);
+        assert_eq!(holds(&live), (2, true), "{}", live.story(0.0));
+        let release = |operator: bool| match operator {
+            true => _ = live.session.request(davit::model::Ask::Undo, "operator", false),
+            false => live.raise("e_reset"),
+        };
+        release(!operator_first);
+        live.run(1.0);
+        assert_eq!(holds(&live), (1, true), "{}", live.story(0.0));
+        release(operator_first);
+        live.run(1.0);
+        assert_eq!(holds(&live), (0, false), "{}", live.story(0.0));
+        live.down();
+    }
+}
