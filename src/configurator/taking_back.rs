@@ -35,7 +35,7 @@ impl Engine {
     /// force may do it, which `check` does not follow); none: nothing of it is left. What is safe is never refused.
     pub(super) fn without_refused(&mut self, mut batch: Batch) -> Option<Batch> {
         let stopping = self.began.is_some();
-        if stopping || self.leaving {
+        if stopping || self.leaving.is_some() {
             let safe = |id: ConfigId| self.given.configurations.get(&id).is_some_and(|c| c.safe);
             let refused = |request: &Request| {
                 let safe = matches!(request.ask, Ask::Apply(id) if safe(id));
