@@ -41,6 +41,8 @@ ConfiguratorConf {
     property_set("follower.cart_share", 0.0),
     property_set("cart.enabled", false),
   },
+  brake_again = Configuration { safe = true, port_write("follower.follow", false) },
+  resume      = Configuration { operation_call("arm.acknowledge") },
   clear_faults       = Configuration { operation_call("arm.acknowledge") },
   restart_controller = Configuration { pre_conf_state  = { "follower:unconfigured" },
                                        post_conf_state = { "follower:running" } },

@@ -132,6 +132,14 @@ ConfiguratorConf {
     property_set("Base_Ctrl.enabled", false),
   },
 
+  brake_again = Configuration { safe = true, description = "what an operator moves in spite of safe_hold; nothing is released by its end",
+    operation_call("youbot.stop"),
+  },
+
+  resume = Configuration { description = "what take_over stands for is so again, whatever the drives did meanwhile",
+    operation_call("youbot.resume"),
+  },
+
   clear_faults = Configuration {
     operation_call("youbot.clear_faults"),
   },

@@ -9,18 +9,33 @@
 local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e_EC_TIMEOUT", "e_ENCODER_ERR",
                 "e_overspeed", "e_base_overspeed" }
 
--- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop that comes while
--- `safe_hold` is undone applies it again when that is answered. `more`: what is particular to a place.
+-- What is told where the drives take torques and part of what commands or watches them has died.
+local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost" }
+
+-- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
+-- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
+-- `again`; one that comes while `safe_hold` is undone applies it again when that is answered. `more`: what is particular to a place.
 local function stopped(more)
   local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
+  local braked_again = { "brake_again.ok", "brake_again.failed", "brake_again.broken" }
+  local ended = { "brake_again.undone", "brake_again.undo.failed", "brake_again.undo.broken" }
+  local not_released = { "safe_hold.undo.failed", "safe_hold.undo.broken" }
   local all = {
     braking = state { entry = "safe_hold",
       staying = state {},
       leaving = state {},
       trans { src = "initial", tgt = "staying" },
       trans { src = "staying", tgt = "leaving", events = { "e_shutdown" } },
+      trans { src = "leaving", tgt = "staying", events = STOPS },
     },
     waiting   = state {},
+    again     = state { entry = "brake_again" },
+    ending    = state { entry = "brake_again.undo",
+      on      = state {},
+      stopped = state {},
+      trans { src = "initial", tgt = "on" },
+      trans { src = "on",      tgt = "stopped", events = STOPS },
+    },
     releasing = state { entry = "safe_hold.undo",
       on              = state {},
       leaving         = state {},
@@ -29,16 +44,26 @@ local function stopped(more)
       trans { src = "initial", tgt = "on" },
       trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
       trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
-      trans { src = "on",      tgt = "stopped",         events = STOPS },
-      trans { src = "leaving", tgt = "stopped_leaving", events = STOPS },
+      trans { src = "on",              tgt = "stopped", events = STOPS },
+      trans { src = "leaving",         tgt = "stopped", events = STOPS },
+      trans { src = "stopped_leaving", tgt = "stopped", events = STOPS },
     },
     trans { src = "initial",                    tgt = "braking" },
     trans { src = ".braking.staying",           tgt = "waiting",            events = braked },
     trans { src = ".braking.leaving",           tgt = ".releasing.leaving", events = braked },
+    trans { src = "waiting",                    tgt = "again",              events = STOPS },
+    trans { src = "again",                      tgt = "ending",             events = braked_again },
+    trans { src = ".ending.on",                 tgt = "waiting",            events = ended },
+    trans { src = ".ending.stopped",            tgt = "again",              events = ended },
     trans { src = "waiting",                    tgt = ".releasing.leaving", events = { "e_shutdown" } },
+    trans { src = "again",                      tgt = ".releasing.leaving", events = { "e_shutdown" }, effect = "brake_again.undo" },
+    trans { src = "ending",                     tgt = ".releasing.leaving", events = { "e_shutdown" } },
     trans { src = ".releasing.stopped",         tgt = "braking",            events = { "safe_hold.undone" } },
     trans { src = ".releasing.stopped_leaving", tgt = ".braking.leaving",   events = { "safe_hold.undone" } },
-    trans { src = "releasing", tgt = "waiting", events = { "safe_hold.undo.failed", "safe_hold.undo.broken" } },
+    trans { src = ".releasing.on",              tgt = "waiting",            events = not_released },
+    trans { src = ".releasing.leaving",         tgt = "waiting",            events = not_released },
+    trans { src = ".releasing.stopped",         tgt = "again",              events = not_released },
+    trans { src = ".releasing.stopped_leaving", tgt = "again",              events = not_released },
   }
   for name, particular in pairs(more) do
     if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
@@ -191,19 +216,24 @@ return state {
     trans { src = "soft_stop", tgt = "unsync",    events = { "e_reset" } },
   },
 
-  -- Stopped in operation. What took torques takes them again when it is released, and nothing couples before the arms are
-  -- aligned again.
+  -- Stopped in operation. When it is released the drives are asked to take torques, whatever they did meanwhile, and nothing
+  -- couples before the arms are aligned again.
   fault = stopped {
     clearing  = state { entry = "clear_faults" },
     losing    = state { entry = "safe_hold",
       on      = state {},
+      staying = state {},
       leaving = state {},
       trans { src = "initial", tgt = "on" },
+      trans { src = "on",      tgt = "staying", events = STOPS },
+      trans { src = "leaving", tgt = "staying", events = STOPS },
       trans { src = "on",      tgt = "leaving", events = { "e_shutdown" } },
+      trans { src = "staying", tgt = "leaving", events = { "e_shutdown" } },
     },
     repairing = state { entry = "restart_controller" },
+    resuming  = state { entry = "resume" },
     trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
-    trans { src = "clearing",           tgt = "waiting",            events = STOPS },
+    trans { src = "clearing",           tgt = "again",              events = STOPS },
     trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
     trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
     trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
@@ -211,13 +241,22 @@ return state {
     -- The controller itself stopped: the same, then it is started again without asking anybody.
     trans { src = ".losing.on",         tgt = "repairing",          events = { "safe_hold.ok" } },
     trans { src = ".losing.on",         tgt = "waiting",            events = { "safe_hold.failed", "safe_hold.broken" } },
+    trans { src = ".losing.staying",    tgt = "waiting",
+            events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
     trans { src = ".losing.leaving",    tgt = ".releasing.leaving",
             events = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" } },
-    trans { src = "repairing",          tgt = "waiting",            events = STOPS },
+    trans { src = "repairing",          tgt = "again",              events = STOPS },
     trans { src = "repairing",          tgt = ".releasing.on",      events = { "restart_controller.ok" } },
     trans { src = "repairing",          tgt = "waiting",
             events = { "restart_controller.failed", "restart_controller.broken" } },
     trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
+
+    -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
+    trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
+    trans { src = ".releasing.on",      tgt = "resuming",           events = { "safe_hold.undone" } },
+    trans { src = "resuming",           tgt = "braking",            events = STOPS },
+    trans { src = "resuming",           tgt = "braking",            events = LOSSES },
+    trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
   },
 
   -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
@@ -291,15 +330,16 @@ return state {
 
   trans { src = "operational", tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "operational", tgt = "fault", events = STOPS },
+  trans { src = "operational", tgt = "fault", events = LOSSES },
   trans { src = "operational", tgt = "fault",
-          events = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost", "e_drives_let_go",
-                     "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
+          events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
                      "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
   -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault", tgt = "fault.braking",
+  trans { src = "fault", tgt = "fault.again",
           events = { "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "fault.releasing.on",       tgt = "operational",   events = { "safe_hold.undone" } },
+  trans { src = "fault.resuming",           tgt = "operational",   events = { "resume.ok" } },
+  trans { src = "fault.resuming",           tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",  tgt = "shutting_down", events = { "safe_hold.undone" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },

@@ -81,7 +81,7 @@ Monitors {
     when = any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
                  silent("Base_Ctrl.cmd_twist", DEAD) },
     event = "e_control_lost", repeat_every = AGAIN },
-  -- Told once: where the drives are meant to hold by themselves nobody listens.
+  -- Where the drives are meant to hold by themselves nobody listens.
   drives_let_go = monitor { description = "the drives do not take torques any more",
-    when = differs("youbot.control_mode", 6):for_at_least(0.01), event = "e_drives_let_go" },
+    when = differs("youbot.control_mode", 6):for_at_least(0.01), event = "e_drives_let_go", repeat_every = AGAIN },
 }

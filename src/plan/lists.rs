@@ -72,9 +72,12 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
     let named: FxHashSet<ComponentName> = list.named().collect();
     let scope = b.configuration.id.prefix();
     let wanted = RunState::from(entry.state);
+    // Before the changes it is a matter of standing still, and what has faulted does: to bring it out of that could only fail.
+    let stands = |state| state == RunState::Faulted && b.stage == Stage::Pre && wanted == RunState::Stopped;
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
         if node.state != wanted
+            && !stands(node.state)
             && node.name.prefix() == scope
             && !named.contains(&node.name)
             && !b.context.avoid.contains(&node.name)

@@ -209,6 +209,18 @@ fn defaults_stop_producers_first_and_start_consumers_first() {
     assert_eq!(plan.warnings[0].code, codes::ACTUATOR_BY_DEFAULT);
 }
 
+/// What has faulted is not configured only to be stopped; where it is to be something, it is brought there.
+#[test]
+fn what_has_faulted_is_stopped_enough() {
+    let mut system = base();
+    assert!(system.set_state(ComponentName::new("A").unwrap(), RunState::Faulted));
+    let of = |pre: &[&str], post: &[&str]| steps(&attempt(&system, &conf("c", pre, vec![], post)).unwrap());
+    assert_eq!(of(&["_default:stopped"], &[]), ["stop B"]);
+    assert_eq!(of(&["_default:unconfigured"], &[]), ["cleanup A", "stop B", "cleanup B"]);
+    assert_eq!(of(&[], &["_default:stopped"]), ["cleanup A", "configure A", "stop B"]);
+    assert_eq!(of(&["A:stopped"], &[]), ["cleanup A", "configure A"]);
+}
+
 #[test]
 fn default_stays_in_the_file_of_its_configuration() {
     let mut system = System::new(types());

@@ -117,6 +117,46 @@ fn every_deployment_is_followed_within_the_bounds() {
     }
 }
 
+/// Each of the deployments' safety events is heard in every state, but for those below.
+#[test]
+fn every_state_hears_every_stop() {
+    // Nothing is there yet, or any more; safe_hold or brake_again is being asked for, and a stop was the last word; drives that
+    // are off, while what is left is disconnected or destroyed.
+    let deaf = [
+        "root.idle",
+        ".braking.staying",
+        ".losing.staying",
+        ".again",
+        ".ending.stopped",
+        ".releasing.stopped",
+        "unwiring.braked.braking",
+        "unwiring.braked.waiting",
+        "destroying.braked.braking",
+        "destroying.braked.waiting",
+    ];
+    for name in DEPLOYMENTS {
+        let (deployment, _) = deployment(name);
+        let model = &deployment.first_coordinator().chart;
+        let (chart, findings) = davit::statechart::compile(model);
+        let chart = chart.unwrap_or_else(|| panic!("{findings:?}"));
+        let parents: Vec<_> = chart.nodes().filter_map(|node| chart.parent(node)).collect();
+        let leaves = || chart.nodes().filter(|node| chart.is_state(*node) && !parents.contains(node));
+        let hears = |leaf, event| {
+            std::iter::successors(Some(leaf), |node| chart.parent(*node))
+                .any(|node| chart.outgoing(node).any(|edge| chart.may_trigger(edge, chart.event(event))))
+        };
+        let mut unheard = Vec::new();
+        for leaf in leaves() {
+            let place = chart.fqn(leaf).to_string();
+            let missed = deployment.safety.iter().filter(|(event, _)| !hears(leaf, *event));
+            unheard.extend(missed.map(|(event, _)| (place.clone(), *event)));
+        }
+        assert!(leaves().count() > 60 && !deployment.safety.is_empty());
+        unheard.retain(|(place, _)| !deaf.iter().any(|end| place.ends_with(end)));
+        assert!(unheard.is_empty(), "{name}: {unheard:?}");
+    }
+}
+
 /// The hypothesis of the paper: one coordinator, unchanged, over two platforms.
 #[test]
 fn the_same_coordinator_over_another_platform() {

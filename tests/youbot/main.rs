@@ -6,6 +6,7 @@ mod coupling;
 mod faults;
 mod files;
 mod golden;
+mod last_word;
 mod live;
 mod motion;
 mod robot;

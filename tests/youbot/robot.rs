@@ -294,3 +294,14 @@ fn the_same_run_twice_is_the_same() {
     };
     assert_eq!(run(), run());
 }
+
+/// That nobody watches is told as long as it lasts: who did not hear it at first hears it then.
+#[test]
+fn that_nobody_watches_is_told_again() {
+    let mut bench = Bench::up("youbot_arm");
+    bench.state("Monitors", Transition::Stop);
+    let t = bench.now();
+    bench.run(1.2);
+    let told = bench.since(t).iter().filter(|(_, event)| event == "e_watch_lost").count();
+    assert_eq!(told, 3);
+}

@@ -218,9 +218,10 @@ impl Drives {
         self.handover.begin();
     }
 
-    /// The same while the drives have torque; drives that are off stay off: the arm is on its stops, or sinks onto them.
+    /// The same of what moves or takes torques. Drives that are off stay off: the arm is on its stops, or sinks onto them. Those
+    /// that hold already, or come to rest, go on with that: held anew each time, the arm would give way under a load.
     pub fn brake(&mut self) {
-        if self.mode != Mode::MotorStop {
+        if self.busy() || self.mode == Mode::Torque {
             self.hold();
         }
     }

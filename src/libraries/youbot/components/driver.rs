@@ -16,6 +16,8 @@ const DROP: f64 = 0.02;
 const PUSH_STALE: f64 = 0.05;
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
+/// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
+const AGAIN: f64 = 0.5;
 /// Heating per current squared and time constant of a motor, °C/A² and s (assumed).
 const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
@@ -74,7 +76,8 @@ pub struct Driver {
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
-    unwatched: bool,
+    /// For how long nobody has been watching, since that was told last, in s.
+    unwatched: Option<f64>,
 }
 
 impl Component for Driver {
@@ -144,6 +147,18 @@ impl Component for Driver {
                 c.task = None;
                 c.drives.brake();
                 Answer::Done(())
+            });
+        b.doc("The same, and nothing takes it back: for what moves although they were braked before.")
+            .no_effect()
+            .operation("stop", |c, _, (): ()| {
+                c.task = None;
+                c.drives.brake();
+                Answer::Done(())
+            });
+        b.doc("The drives take torques, as mode 6 which was set before says: for after they held by themselves.")
+            .no_effect()
+            .operation("resume", |c, _, (): ()| {
+                c.drives.set_mode(Mode::Torque).map_or_else(Answer::failed, Answer::Done)
             });
         b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
             .undone_by("brake")
@@ -237,7 +252,7 @@ impl Component for Driver {
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
-            unwatched: false,
+            unwatched: None,
         }
     }
 
@@ -288,11 +303,13 @@ impl Component for Driver {
             }
         });
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
-        let unwatched = lost && self.drives.mode() == Mode::Torque;
-        if unwatched && !self.unwatched {
-            self.events.raise(self.names.unwatched);
-        }
-        self.unwatched = unwatched;
+        let told = self.unwatched.map(|since| since + cx.dt()).filter(|since| *since < AGAIN);
+        self.unwatched = (lost && self.drives.mode() == Mode::Torque).then(|| {
+            told.unwrap_or_else(|| {
+                self.events.raise(self.names.unwatched);
+                0.0
+            })
+        });
         self.publish(cx);
     }
 }

@@ -146,3 +146,26 @@ fn braking_brings_a_moving_arm_and_its_base_to_rest() {
     drives.brake();
     assert_eq!(drives.mode(), Mode::MotorStop);
 }
+
+/// Asked to brake again and again, drives that hold an arm under a load do not give way to it.
+#[test]
+fn what_is_held_stays_where_it_is() {
+    let mut drives = parked();
+    drives.calibrate().unwrap();
+    run(&mut drives, 3.0);
+    drives.unfold().unwrap();
+    run(&mut drives, 6.0);
+    let pushed = |drives: &mut Drives| {
+        for _ in 0..50 {
+            drives.update(None, None, &Vector3::new(0.0, 0.0, -5.0), 0.001, &mut |_| ());
+        }
+    };
+    (0..10).for_each(|_| pushed(&mut drives));
+    let held = drives.arm.q;
+    for _ in 0..20 {
+        drives.brake();
+        pushed(&mut drives);
+    }
+    let gave_way = (drives.arm.q - held).amax();
+    assert!(gave_way < 0.002, "{gave_way} rad");
+}

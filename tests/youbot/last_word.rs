@@ -1,0 +1,116 @@
+//! The last word counts: a stop that comes while the robot is stopped already, or on its way out of that, is heard, and it
+//! stays braked until somebody asks once more.
+
+use crate::live::{Live, jolt};
+use davit::model::{Ask, ComponentName, ConfigId, EventName, Step, Transition};
+use davit::session::Happening;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A hand that brings the arms together and holds them there.
+const HAND: &str = "free 0.5; align 600";
+
+fn insists(live: &Live, id: &str) {
+    live.session.request(Ask::Apply(ConfigId::new(id).unwrap()), "test", true);
+}
+
+/// Raises an event when it comes to a state the first time, before anything else is heard there.
+fn when_in(live: &Live, state: &'static str, event: &'static str) {
+    let (session, done) = (Arc::downgrade(&live.session), AtomicBool::new(false));
+    live.session.hub().observe(Arc::new(move |_, what| {
+        let Happening::State { active } = what else { return };
+        if active.last().is_some_and(|place| place.ends_with(state)) && !done.swap(true, Ordering::Relaxed) {
+            let session = session.upgrade().expect("it is alive");
+            session.raise(EventName::new(event).unwrap(), "test");
+        }
+    }));
+}
+
+fn monitors(live: &Live, transition: Transition) {
+    live.step(&Step::State { component: ComponentName::new("Monitors").unwrap(), transition });
+}
+
+/// It has come to rest in that state, and stays there at rest with the drives holding.
+fn stays(live: &Live, state: &str, what: &str) {
+    live.run(0.3);
+    live.rows();
+    live.run(1.0);
+    let rows = live.rows();
+    let fastest = rows.iter().map(|row| row.speed.norm()).fold(0.0, f64::max);
+    assert!(live.place().ends_with(state), "{what}: in {}\n{}", live.place(), live.story(live.now() - 3.0));
+    assert!(fastest < 0.02, "{what}: {fastest} m/s in {state}");
+    assert!(rows.iter().all(|row| row.mode == 1), "{what}: the drives do not hold in {state}");
+}
+
+fn released(live: &Live, what: &str) {
+    live.raise("e_reset");
+    live.run(0.3);
+    assert!(live.session.in_state("operational"), "{what}: in {}", live.place());
+    assert_eq!(live.rows().last().unwrap().mode, 6, "{what}");
+}
+
+fn last_words(name: &str) {
+    let live = Live::with_hand(name, HAND);
+    live.bring_up();
+    live.until_state("copying", 5.0);
+
+    // The controller is lost, which goes on by itself; a stop does not.
+    when_in(&live, "losing.on", "e_estop");
+    live.raise("e_controller_lost");
+    stays(&live, "fault.waiting", "a stop behind a controller that was lost");
+
+    // A reset that was raised before the stop, and not taken up before it.
+    live.raise("e_reset");
+    live.raise("e_estop");
+    stays(&live, "fault.waiting", "a stop behind a reset");
+
+    // An operator insists on moving what is stopped.
+    live.rows();
+    insists(&live, "park");
+    live.run(1.0);
+    assert!(live.rows().last().unwrap().speed.norm() > 0.05, "it does not park");
+    let t = live.now();
+    live.raise("e_OVERCURRENT");
+    stays(&live, "fault.waiting", "a fault while an operator moves it");
+    assert!(live.first("park.broken", t).is_some(), "{}", live.story(t));
+
+    // Whatever the drives were told meanwhile, they take torques where it operates.
+    insists(&live, "hold");
+    live.run(0.1);
+    released(&live, "after `hold`");
+    let rows = live.rows();
+    let (step, at) = jolt(&rows);
+    assert!(step < 0.5, "{step} N m in 1 ms at {at} s\n{}", live.story(at - 0.1));
+
+    // Nobody watches any more: it does not operate before somebody does.
+    monitors(&live, Transition::Stop);
+    live.until_state("fault.waiting", 0.1);
+    live.raise("e_reset");
+    stays(&live, "fault.waiting", "released while nobody watches");
+    monitors(&live, Transition::Start);
+    released(&live, "somebody watches again");
+
+    // On the way down, and the order to go on before the stop.
+    live.raise("e_shutdown");
+    live.until_state("parking", 1.0);
+    live.run(0.3);
+    live.raise("e_estop");
+    stays(&live, "lowering.waiting", "a stop while it parks");
+    live.raise("e_shutdown");
+    live.raise("e_estop");
+    stays(&live, "lowering.waiting", "a stop behind the order to go down");
+    live.raise("e_shutdown");
+    live.until_state("idle", 20.0);
+    assert_eq!(live.first("e_arm_dropped", 0.0), None);
+    live.clock.shutdown();
+}
+
+#[test]
+fn a_stop_is_the_last_word() {
+    last_words("youbot_arm");
+}
+
+#[test]
+fn a_stop_is_the_last_word_scoped() {
+    last_words("youbot_arm_scoped");
+}
