@@ -10,7 +10,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use signal_hook::SigId;
 use signal_hook::consts::SIGINT;
 use std::cell::Cell;
-use std::io::IsTerminal;
 use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -139,11 +138,9 @@ impl Following {
         let watched = signal_hook::flag::register_conditional_default(SIGINT, interrupted.clone());
         let watched =
             watched.and_then(|ends| Ok(vec![ends, signal_hook::flag::register(SIGINT, interrupted.clone())?]));
-        let shown = std::io::stderr().is_terminal() && !silent;
-        let bar = ProgressBar::with_draw_target(
-            None,
-            if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() },
-        );
+        // It draws on a terminal only.
+        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(None, target);
         bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
         let clock = Clock::real();
         let began = clock.now();

@@ -28,7 +28,7 @@ fn rig(slow: &[(&str, f64)]) -> Rig {
     let limits = DeploymentLimits { step_timeout: Duration::from_secs(1), ..DeploymentLimits::default() };
     let rig = Rig::full(all, Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform), limits);
     assert_eq!(rig.ask("base mode"), ["base.ok", "mode.ok"]);
-    let rules = slow.iter().map(|(step, s)| FaultRule::on(*step, Fault::Slow(Duration::from_secs_f64(*s))));
+    let rules = slow.iter().map(|(step, s)| FaultRule::on(step, Fault::Slow(Duration::from_secs_f64(*s))));
     rig.platform.set_faults(Faults::new(rules));
     rig
 }
