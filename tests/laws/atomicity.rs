@@ -79,7 +79,7 @@ impl Bench {
 
     pub fn drive(&mut self, planned: Planned) -> Vec<PartEnd> {
         let spec = Spec {
-            limits: SmallVec::from_iter([Limit::patient(Duration::from_secs(1))]),
+            limits: [Limit::patient(Duration::from_secs(1))].into_iter().collect(),
             best_effort: false,
             asked_back: false,
         };
