@@ -70,6 +70,8 @@ impl Graph<'_, '_> {
             out[edge.from as usize].push(edge.to);
         }
         let mut reached = vec![false; self.states.len()];
+        // Where a coordinator cannot be entered there are none.
+        open.retain(|at| (*at as usize) < self.states.len());
         while let Some(at) = open.pop() {
             if !std::mem::replace(&mut reached[at as usize], true) {
                 open.extend(&out[at as usize]);
