@@ -158,7 +158,9 @@ impl Engine {
             }
             let mut did = self.serve_safe();
             if !self.running.iter().any(Running::is_safe) {
-                while let Some(number) = self.turn() {
+                while !self.waits_for_a_look()
+                    && let Some(number) = self.turn()
+                {
                     did = true;
                     self.begin(number);
                     if self.urgent() {

@@ -1,6 +1,5 @@
-//! Components that were reported faulted are looked at, and what is planned waits for that.
+//! Components that were reported faulted are looked at, and what begins waits for that.
 
-use super::control::Command;
 use super::engine::Engine;
 use super::suspects::generation_of;
 use crate::model::ComponentName;
@@ -20,20 +19,13 @@ impl Engine {
         generation_of(&self.world.system, component)
     }
 
-    /// Waits until everything that was reported faulted has been looked at: what is planned then knows of it. What is safe, and
-    /// what is under way, does not wait for that, nor does the end.
-    pub(super) fn settle_suspects(&mut self) {
-        loop {
-            self.look_at_suspects();
-            let Some(until) = self.suspects.until() else { return };
-            self.glance();
-            let did = self.serve_safe() | self.advance_all();
-            if self.stopping || self.commands.iter().any(Command::is_urgent) {
-                return;
-            }
-            if !did {
-                self.pump(until.min(self.running_until()));
-            }
+    /// Whether something that was reported faulted is being looked at: what begins afterwards knows of it. What is safe, and
+    /// what is under way, does not wait for that; nor is there a look at what is being worked on.
+    pub(super) fn waits_for_a_look(&mut self) -> bool {
+        if self.suspects.is_empty() {
+            return false;
         }
+        self.look_at_suspects();
+        self.suspects.until().is_some()
     }
 }

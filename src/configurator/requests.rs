@@ -37,13 +37,6 @@ impl Engine {
         for request in &requests {
             self.owe(*request);
         }
-        if !self.suspects.is_empty() {
-            self.settle_suspects();
-            // Something safe may have come meanwhile.
-            if self.desk.turn_of(number).is_none() {
-                return;
-            }
-        }
         if let [request] = requests[..]
             && self.running.is_empty()
             && request.why == Why::Asked

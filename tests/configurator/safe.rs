@@ -454,10 +454,13 @@ fn an_undo_that_is_refused_and_interrupted_is_not_about_the_next_visit() {
     rig.in_step();
 }
 
-/// What is reported faulted is looked at before something is planned: what is safe does not wait for that.
+/// What is reported faulted is looked at before something is planned: what is safe does not wait for that, and what does is
+/// something that waits.
 #[test]
 fn a_safe_configuration_does_not_wait_for_a_look() {
-    let rig = Rig::with(scenario(), Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
+    let mut all = scenario();
+    all.push(Configuration { safe: true, ..configuration("low", "", "", "A:stopped") });
+    let rig = Rig::with(all, Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
     for word in ["make", "wire", "run"] {
         rig.ask(word);
     }
@@ -468,9 +471,13 @@ fn a_safe_configuration_does_not_wait_for_a_look() {
     rig.submit("eight");
     rig.wait(0.01);
     assert_eq!(rig.events().len(), 3, "the look is not over");
-    rig.submit("quiet");
-    rig.wait(0.2);
-    assert!(rig.events()[3..].contains(&"quiet.ok".to_owned()), "{:?}", rig.events());
+    rig.submit("low");
+    rig.wait(0.01);
+    assert_eq!(rig.events()[3..], ["eight.cancelled", "low.ok"]);
+    rig.submit("five");
+    rig.wait(0.01);
+    assert_eq!(rig.events().len(), 5, "the look is not over");
     rig.wait(100.0);
+    assert_eq!(rig.events()[5..], ["five.ok"]);
     rig.each_answered_once();
 }

@@ -194,11 +194,11 @@ fn step(usual: f64) -> f64 {
 /// Two have stopped it: that one of them lets go is not enough.
 #[test]
 fn the_drives_hold_until_whoever_stopped_it_last_lets_go() {
+    let safe_hold = davit::model::ConfigId::new("safe_hold").unwrap();
     for operator_first in [false, true] {
         let live = Live::copying("youbot_arm");
         let apply = || {
-            let id = davit::model::ConfigId::new("safe_hold").unwrap();
-            live.session.request(davit::model::Ask::Apply(id), "operator", false);
+            live.session.request(davit::model::Ask::Apply(safe_hold), "operator", false);
             live.run(0.5);
         };
         if operator_first {
@@ -218,15 +218,25 @@ fn the_drives_hold_until_whoever_stopped_it_last_lets_go() {
         live.run(0.1);
         assert_eq!(holds(&live), (2, true), "{}", live.story(0.0));
         let release = |operator: bool| match operator {
-            true => _ = live.session.request(davit::model::Ask::Undo, "operator", false),
+            true => _ = live.session.request(davit::model::Ask::UndoOf(safe_hold), "operator", false),
             false => live.raise("e_reset"),
         };
         release(!operator_first);
         live.run(1.0);
-        assert_eq!(holds(&live), (1, true), "{}", live.story(0.0));
-        release(operator_first);
+        // A reset is refused by the drives as long as an operator has them brake: it stays stopped, and says so.
+        let left = if operator_first { 2 } else { 1 };
+        assert_eq!(holds(&live), (left, true), "{}", live.story(0.0));
+        assert_eq!(live.first("resume.failed", 0.0).is_some(), operator_first);
+        if operator_first {
+            assert!(live.place().ends_with("fault.waiting"), "{}", live.place());
+            release(true);
+            live.run(1.0);
+            assert_eq!(holds(&live), (1, true), "{}", live.story(0.0));
+        }
+        release(false);
         live.run(1.0);
         assert_eq!(holds(&live), (0, false), "{}", live.story(0.0));
+        assert!(live.session.in_state("operational"), "{}", live.place());
         live.down();
     }
 }

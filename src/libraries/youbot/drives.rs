@@ -131,6 +131,8 @@ pub struct Drives {
     mode: Mode,
     /// They took torques before they braked.
     resumes: bool,
+    /// They were told to brake, and that was not taken back.
+    braked: bool,
     calibrated: bool,
     task: Task,
     target: J5,
@@ -152,6 +154,7 @@ impl Drives {
             limit_safety: true,
             mode: Mode::MotorStop,
             resumes: false,
+            braked: false,
             calibrated: false,
             task: Task::Idle,
             target,
@@ -200,8 +203,20 @@ impl Drives {
         Ok(())
     }
 
+    /// They take torques as they were meant to, after they held by themselves.
+    ///
+    /// # Errors
+    /// In words: while they are told to brake, and as [`set_mode`](Self::set_mode).
+    pub fn resume(&mut self) -> Result<(), &'static str> {
+        if self.braked {
+            return Err("the drives were told to brake, and that was not taken back: undo what stopped them");
+        }
+        self.set_mode(Mode::Torque)
+    }
+
     /// Takes back that the drives braked, whoever asked for that: they take torques again if they did before.
     pub fn release(&mut self) {
+        self.braked = false;
         if std::mem::take(&mut self.resumes) && !self.busy() {
             self.mode = Mode::Torque;
             self.handover.begin();
@@ -218,9 +233,15 @@ impl Drives {
         self.handover.begin();
     }
 
-    /// The same of what moves or takes torques. Drives that are off stay off: the arm is on its stops, or sinks onto them. Those
-    /// that hold already, or come to rest, go on with that: held anew each time, the arm would give way under a load.
+    /// They come to rest, and hold until they are released.
     pub fn brake(&mut self) {
+        self.braked = true;
+        self.stop();
+    }
+
+    /// Whatever is under way ends, as with [`hold`](Self::hold), of what moves or takes torques. Drives that are off stay off: the arm is on its stops, or sinks onto them. Those
+    /// that hold already, or come to rest, go on with that: held anew each time, the arm would give way under a load.
+    pub fn stop(&mut self) {
         if self.busy() || self.mode == Mode::Torque {
             self.hold();
         }

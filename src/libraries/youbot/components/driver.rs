@@ -152,14 +152,15 @@ impl Component for Driver {
             .no_effect()
             .operation("stop", |c, _, (): ()| {
                 c.task = None;
-                c.drives.brake();
+                c.drives.stop();
                 Answer::Done(())
             });
-        b.doc("The drives take torques, as mode 6 which was set before says: for after they held by themselves.")
-            .no_effect()
-            .operation("resume", |c, _, (): ()| {
-                c.drives.set_mode(Mode::Torque).map_or_else(Answer::failed, Answer::Done)
-            });
+        b.doc(
+            "The drives take torques, as mode 6 which was set before says: for after they held by themselves. Fails while they \
+             brake and were not released.",
+        )
+        .no_effect()
+        .operation("resume", |c, _, (): ()| c.drives.resume().map_or_else(Answer::failed, Answer::Done));
         b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
             .undone_by("brake")
             .operation("release", |c, _, (): ()| {
