@@ -55,6 +55,7 @@ mod types;
 mod unheard;
 mod universe;
 mod unknown;
+mod unwatched;
 mod verdict;
 mod way;
 mod ways;

@@ -10,7 +10,7 @@ use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
     beside, configurations as single, coordinator, declared, monitors as watched, purity, safety, settings, simulated,
-    types, unheard, universe, ways,
+    types, unheard, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -53,6 +53,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
         let charts: Vec<&Chart> = charts.iter().collect();
         let mut findings = watched::events(deployment, &charts);
         findings.extend(simulated::events(deployment, &charts));
+        findings.extend(unwatched::check(deployment, &universe, &charts));
         let of = |number| beside::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
         for (view, chart) in views.iter().zip(&charts) {

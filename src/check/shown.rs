@@ -74,6 +74,7 @@ pub const READ: &[(&str, &[Code])] = &[
             DEPLOY_EVENT_UNHEARD,
             DEPLOY_NO_REST,
             DEPLOY_ONE_EVENT,
+            DEPLOY_UNWATCHED,
             MONITOR_EVENT_TAKEN,
             MONITOR_NOT_A_NUMBER,
             MONITOR_NOT_RUN,

@@ -72,6 +72,11 @@ impl Universe {
         self.components.values().flatten().filter_map(|creation| creation.description.as_deref())
     }
 
+    /// The components that there may be.
+    pub fn components(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        self.components.keys().copied()
+    }
+
     /// How a component of that name may have been created; empty when none creates it.
     pub fn of(&self, component: ComponentName) -> &[Creation] {
         self.components.get(&component).map_or(&[], SmallVec::as_slice)

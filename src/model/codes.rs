@@ -505,6 +505,13 @@ codes! {
         "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
          everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \
          that, in their order. Name them, or see that it may stop where it is; this is only a note.";
+    DEPLOY_UNWATCHED = "deploy::unwatched", "part of what commands an actuator may die unnoticed",
+        "A component whose activity hangs, or that was stopped by hand, sends nothing any more; whoever receives its data goes on with \
+         the last value. Where there is an actuator this is told of components that a configuration starts: those whose data reach it, over as \
+         many connections as it takes, those that a `holds` reads (it stays true with the last value), and those that run the monitors. A \
+         component counts as watched where a monitor whose event a transition hears reads one of its ports, whoever receives its data has an \
+         out-port of events, or a transition hears `COMPONENT.faulted` (which comes of a panic, not of a component that is stopped or \
+         hangs). Watch what it sends: a monitor with `when = silent(\"COMPONENT.port\", 0.05)`. What sends nothing is not asked for.";
     DEPLOY_SAFETY_ANSWER = "deploy::safety_answer", "an answer of the configurator is listed as a safety event",
         "`safety` lists events from outside that must lead to a `safe` configuration: what a component, a monitor or an operator \
          raises. An answer (`ID.ok`, `ID.failed`, …) comes only to who asked for something. Hear it with a transition of the \

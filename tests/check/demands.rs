@@ -368,3 +368,49 @@ fn one_shutdown_event_leads_all_coordinators_down() {
     let once = check("park.ok");
     assert!(once.of("coord::no_way_down").iter().all(|f| f["severity"] == "info"), "{:#}", once.0);
 }
+
+/// Where there is an actuator, what commands it is watched: as far as data reach, and what a configuration stands for.
+#[test]
+fn what_commands_an_actuator_and_dies_is_noticed() {
+    let base = |more: &str| {
+        format!(
+            "base = Configuration {{ create(\"arm\", \"Arm\"), create(\"a\", \"Drive\"), create(\"b\", \"Drive\"),
+                connect(\"a.out\", \"b.in\"), connect(\"b.out\", \"arm.push\"), create(\"aside\", \"Drive\"), {more}
+                post_conf_state = {{ \"_default:running\" }} }},"
+        )
+    };
+    let unwatched = |configurations: &str, chart: &str, keys: &str| {
+        let small = Small::new(configurations, &format!("{STATES}{chart}"), keys);
+        small.demo.write("mon.yaml", "monitors: { dead: { when: { silent: [a.out, 0.05] }, event: e_dead } }\n");
+        let said = small.check();
+        let found = said.of("deploy::unwatched");
+        assert!(!said.0.to_string().contains("\"severity\":\"error\""), "{:#}", said.0);
+        assert!(found.iter().all(|finding| finding["severity"] == "warning"), "{:#}", said.0);
+        let named =
+            |finding: &serde_json::Value| finding["message"].as_str().unwrap().split('`').nth(1).unwrap().to_owned();
+        found.iter().map(|finding| named(finding)).collect::<Vec<_>>()
+    };
+    // What sends to nobody who moves is nobody's business.
+    assert_eq!(unwatched(&base(""), "", ""), ["a", "b"]);
+    assert!(unwatched(&base("").replace("connect(\"b.out\", \"arm.push\"),", ""), "", "").is_empty());
+    // Somebody receives it who can tell.
+    let guarded = base("create(\"guard\", \"Guard\"), connect(\"b.out\", \"guard.seen\"),");
+    assert_eq!(unwatched(&guarded, "", ""), ["a"]);
+    // Its fault is heard.
+    let heard = "trans { src = \"up\", tgt = \"failed\", events = { \"a.faulted\" } },";
+    assert_eq!(unwatched(&guarded, heard, ""), [""; 0]);
+    // A monitor reads it, and its event is heard; and somebody watches the monitors.
+    let monitors = "monitors: [mon.yaml]\n";
+    let watched =
+        base("create(\"guard\", \"Guard\"), connect(\"b.out\", \"guard.seen\"), create(\"mon\", \"davit.Monitors\"),");
+    assert_eq!(unwatched(&watched, "", monitors), ["a", "mon"], "nobody hears `e_dead`");
+    let hears = "trans { src = \"up\", tgt = \"failed\", events = { \"e_dead\" } },";
+    assert_eq!(unwatched(&watched, hears, monitors), ["mon"]);
+    let both = format!("{hears}trans {{ src = \"up\", tgt = \"failed\", events = {{ \"mon.faulted\" }} }},");
+    assert_eq!(unwatched(&watched, &both, monitors), [""; 0]);
+    // What a configuration stands for is no truth of who died.
+    let holds = base("")
+        .replace("post_conf_state", "holds = equals(\"aside.out\", 1), post_conf_state")
+        .replace("connect(\"b.out\", \"arm.push\"),", "");
+    assert_eq!(unwatched(&holds, "", ""), ["aside"]);
+}

@@ -26,6 +26,9 @@ types:
       lower: { effect: { undo: raise }, moves: true }
   Arm:
     actuator: true
+    ports: { push: { direction: in, type: float } }
+  Guard:
+    ports: { seen: { direction: in, type: float }, alarms: { direction: out, type: event } }
 configurations: [conf.lua]
 ";
 

@@ -1,0 +1,147 @@
+//! That part of what commands an actuator may die, and nobody would notice.
+//!
+//! It is demanded where there is an actuator, of components that a configuration starts: those whose data reach one, over as
+//! many connections as it takes, those that a configuration's `holds` reads (what it stands for stays true with their last
+//! value), and those that run the monitors. What sends nothing cannot be missed. A component is watched where a monitor reads
+//! it, or whoever receives its data can raise events, or its fault is heard.
+
+use super::universe::Universe;
+use crate::model::codes::DEPLOY_UNWATCHED;
+use crate::model::monitor::MONITORS_TYPE;
+use crate::model::{
+    ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, Finding, Findings, MemberRef, Origin,
+    RunState, Target, ValueType,
+};
+use crate::statechart::Chart;
+use rustc_hash::FxHashSet;
+
+/// Components that may die unnoticed.
+pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) -> Findings {
+    if !universe.types().any(|ty| ty.actuator) {
+        return Vec::new();
+    }
+    let look = Look { deployment, universe, charts };
+    let (read, reach) = (look.read_by_holds(), look.reaching_an_actuator());
+    let watched = look.read_by_monitors();
+    let mut names: Vec<ComponentName> = universe.components().filter(|name| look.is_started(*name)).collect();
+    names.sort_unstable_by_key(ComponentName::as_str);
+    let missed = names.into_iter().filter(|name| look.sends(*name) && !watched.contains(name));
+    let missed = missed.filter(|name| !look.reports(*name) && !look.is_fault_heard(*name));
+    missed
+        .filter_map(|name| {
+            let why = if let Some((_, at)) = read.iter().find(|(read, _)| *read == name) {
+                (*at, "a configuration stands for what it sends")
+            } else if look.is(name, |ty| ty.name.as_str() == MONITORS_TYPE) {
+                (Origin::NONE, "it runs the monitors")
+            } else if reach.contains(&name) {
+                (Origin::NONE, "what it sends reaches an actuator")
+            } else {
+                return None;
+            };
+            Some(look.finding(name, why))
+        })
+        .collect()
+}
+
+struct Look<'a> {
+    deployment: &'a Deployment,
+    universe: &'a Universe,
+    charts: &'a [&'a Chart],
+}
+
+impl Look<'_> {
+    fn finding(&self, name: ComponentName, (stands, why): (Origin, &str)) -> Finding {
+        let message = format!("`{name}` may die unnoticed, and {why}");
+        let origin = self.universe.of(name).first().map_or(Origin::NONE, |creation| creation.origin);
+        let port = self.types(name).flat_map(|ty| &ty.ports).find(|(_, port)| port.direction == Direction::Out);
+        let port = port.map_or_else(|| name.to_string(), |(port, _)| name.member(*port).to_string());
+        let finding = Finding::warning(DEPLOY_UNWATCHED, message).at(origin).labelled("nobody watches it");
+        let finding = if stands.is_some() { finding.also(stands, "what it stands for") } else { finding };
+        finding.path("monitors").help(format!(
+            "let a monitor tell that `{port}` is silent, and a transition hear its event; or let one hear `{name}.faulted`"
+        ))
+    }
+
+    fn types(&self, name: ComponentName) -> impl Iterator<Item = &ComponentType> {
+        self.universe.of(name).iter().filter_map(|creation| creation.description.as_deref())
+    }
+
+    fn is(&self, name: ComponentName, what: impl Fn(&ComponentType) -> bool) -> bool {
+        self.types(name).any(what)
+    }
+
+    /// Whether some configuration brings it to running.
+    fn is_started(&self, name: ComponentName) -> bool {
+        self.deployment.configurations.iter().any(|configuration| {
+            configuration.pre.iter().chain(configuration.post.iter()).any(|entry| {
+                let of_all = || configuration.id.prefix() == name.prefix();
+                RunState::from(entry.state) == RunState::Running
+                    && match entry.target {
+                        Target::Component(component) => component == name,
+                        Target::Default => of_all(),
+                    }
+            })
+        })
+    }
+
+    fn sends(&self, name: ComponentName) -> bool {
+        self.is(name, |ty| ty.ports.values().any(|port| port.direction == Direction::Out))
+    }
+
+    fn is_fault_heard(&self, name: ComponentName) -> bool {
+        let Ok(event) = EventName::new(&format!("{name}.faulted")) else { return false };
+        self.hears(event)
+    }
+
+    fn hears(&self, event: EventName) -> bool {
+        self.charts.iter().any(|chart| chart.events().contains(&event))
+    }
+
+    /// Whether somebody receives its data who can raise events.
+    fn reports(&self, name: ComponentName) -> bool {
+        let tells = |ty: &ComponentType| {
+            ty.ports.values().any(|port| port.direction == Direction::Out && port.ty == ValueType::Event)
+        };
+        self.connections().any(|(from, to)| from.component == name && self.is(to.component, tells))
+    }
+
+    fn connections(&self) -> impl Iterator<Item = (MemberRef, MemberRef)> {
+        self.deployment.configurations.iter().flat_map(|c| &c.changes).filter_map(|change| match change.kind {
+            ChangeKind::Connect { from, to, .. } => Some((from, to)),
+            _ => None,
+        })
+    }
+
+    fn reaching_an_actuator(&self) -> FxHashSet<ComponentName> {
+        let mut reach: FxHashSet<ComponentName> =
+            self.universe.components().filter(|name| self.is(*name, |ty| ty.actuator)).collect();
+        loop {
+            let further = self.connections().filter(|(_, to)| reach.contains(&to.component));
+            let further: Vec<ComponentName> =
+                further.map(|(from, _)| from.component).filter(|from| !reach.contains(from)).collect();
+            if further.is_empty() {
+                return reach;
+            }
+            reach.extend(further);
+        }
+    }
+
+    /// Components that what configurations stand for looks at, and where that is said.
+    fn read_by_holds(&self) -> Vec<(ComponentName, Origin)> {
+        let mut read = Vec::new();
+        for holds in self.deployment.configurations.iter().filter_map(|c| c.holds.as_ref()) {
+            holds.for_each_component(&mut |component, at| read.push((component, at)));
+        }
+        read
+    }
+
+    /// Components that monitors look at whose events are heard.
+    fn read_by_monitors(&self) -> FxHashSet<ComponentName> {
+        let mut read = FxHashSet::default();
+        let heard = |event: EventName| self.hears(event);
+        for monitor in self.deployment.monitors.iter().filter(|monitor| monitor.events().any(heard)) {
+            monitor.when.for_each_component(&mut |component, _| _ = read.insert(component));
+        }
+        read
+    }
+}
