@@ -209,3 +209,32 @@ fn the_socket_and_the_scripts_are_documented() {
         assert!(scripts.contains(&format!("`{function}(")), "docs/scripts.md has no `{function}`");
     }
 }
+
+/// `docs/promises.md` names, behind each promise, tests that are there.
+#[test]
+fn each_promise_has_its_tests() {
+    let text = std::fs::read_to_string(root().join("docs/promises.md")).expect("the table of promises");
+    let mut named = 0;
+    for line in text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| promise")) {
+        let tests = line.split('|').nth(2).expect("promise, tests");
+        let before = named;
+        for test in tests.split('`').skip(1).step_by(2) {
+            let (binary, path) = test.split_once(' ').expect("a test binary and a test");
+            let (modules, name) = path.rsplit_once("::").unwrap_or(("", path));
+            let module = modules.replace("::", "/");
+            let places = match (binary, module.as_str()) {
+                ("lib", module) => [format!("src/{module}.rs"), format!("src/{module}/mod.rs")],
+                (binary, "") => [format!("tests/{binary}.rs"), format!("tests/{binary}/main.rs")],
+                (binary, module) => [format!("tests/{binary}/{module}.rs"), format!("tests/{binary}/{module}/mod.rs")],
+            };
+            let source: String =
+                places.iter().filter_map(|place| std::fs::read_to_string(root().join(place)).ok()).collect();
+            let found =
+                source.find(&format!("fn {name}()")).and_then(|at| source[..at].rfind("#[test]").map(|test| at - test));
+            assert!(found.is_some_and(|distance| distance < 200), "there is no test `{test}` ({places:?})");
+            named += 1;
+        }
+        assert!(named > before || line.starts_with("|---"), "no test behind: {line}");
+    }
+    assert!(named > 80, "{named}");
+}
