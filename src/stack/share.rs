@@ -5,7 +5,7 @@
 use super::{Frame, FrameId, Inverse};
 use crate::model::{Call, ComponentName, Finding, MemberRef, Step, codes};
 use crate::plan::SavedValue;
-use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot};
+use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot, Touch};
 use crate::plan::undo::{Item, absolute, restoring};
 use crate::system::Undo;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -71,6 +71,39 @@ pub fn staying<'f>(frame: &'f Frame, frames: &[Arc<Frame>]) -> impl Iterator<Ite
     calls(frame).filter(move |operation| kept.contains(operation)).map(Slot::Operation)
 }
 
+/// The slots that only calls touch which stay when the frame is popped, those of what would take them back included: in which
+/// order they were called does not count.
+fn untouched(frame: &Frame, stay: &FxHashSet<Slot>) -> FxHashSet<Slot> {
+    if stay.is_empty() {
+        return FxHashSet::default();
+    }
+    let (steps, items) = match &frame.inverse {
+        Inverse::Steps(steps) => (steps.as_slice(), [].as_slice()),
+        Inverse::List(items) => ([].as_slice(), items.as_slice()),
+    };
+    let operation = |step: &Step| match step {
+        Step::Operation(call) => Some(call.operation),
+        _ => None,
+    };
+    let done = steps
+        .iter()
+        .filter_map(|planned| Some((operation(&planned.step)?, planned.undo.steps().first().and_then(operation))));
+    let undone = items.iter().filter_map(|item| {
+        let own = operation(&item.step)?;
+        Some(item.takes_back_call().map_or((own, None), |call| (call.operation, Some(own))))
+    });
+    let (mut only, mut also) = (FxHashSet::default(), Vec::new());
+    for (of, undo) in done.chain(undone) {
+        let both = std::iter::once(of).chain(undo).map(Slot::Operation);
+        match stay.contains(&Slot::Operation(of)) {
+            true => only.extend(both),
+            false => also.extend(both),
+        }
+    }
+    also.iter().for_each(|slot| _ = only.remove(slot));
+    only
+}
+
 /// Whether the frame at `at` may be popped.
 pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Finding>> {
     look(frames, at).map_err(|hindrance| Box::new(hindrance.finding))
@@ -116,7 +149,10 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
             }
         }
     }
-    let index = Index::new(&frame.footprint, |touch| touch.serves.is_none_or(|slot| !hand.slots.contains(&slot)));
+    let untouched = untouched(frame, &hand.slots);
+    let keep =
+        |touch: &Touch| touch.serves.is_none_or(|slot| !hand.slots.contains(&slot)) && !untouched.contains(&touch.slot);
+    let index = Index::new(&frame.footprint, keep);
     for other in above.iter().rev() {
         if let Some(touch) = other.footprint.touches.iter().find(|touch| index.shares(touch)) {
             let did = match touch.access {
