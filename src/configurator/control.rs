@@ -139,9 +139,9 @@ impl TakenDown {
         self.popped.is_empty() && self.kept.is_empty() && self.forced.is_empty() && self.troubles.is_empty()
     }
 
-    /// Whether nothing is left.
+    /// Whether nothing is left, as the platform shows it: where it does not answer, that is not known.
     pub fn is_clean(&self) -> bool {
-        self.left.is_empty() && self.quarantined.is_empty()
+        self.observed && self.left.is_empty() && self.quarantined.is_empty()
     }
 }
 

@@ -150,7 +150,9 @@ impl Session {
         let (of, member) = name
             .split_once('.')
             .ok_or_else(|| no(format!("`{name}` names no property or port"), "it is written `Component.member`"))?;
-        let system = self.system();
+        let system = self
+            .system()
+            .map_err(|unanswered| no(unanswered.to_string(), "try again: `davit status` shows what is known"))?;
         let component = system.components.iter().find(|(known, _)| known.as_str() == of);
         let (component, ty) = component
             .and_then(|(known, it)| Some((*known, self.platform().catalogue().get(it.ty)?)))
