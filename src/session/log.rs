@@ -234,11 +234,6 @@ impl Log {
     pub fn last(&self, last: usize) -> Vec<Arc<Entry>> {
         self.0.newest(last).cloned().collect()
     }
-
-    /// How many entries were dropped.
-    pub fn dropped(&self) -> u64 {
-        self.0.dropped()
-    }
 }
 
 /// A component that failed, or whose call has not returned.
