@@ -287,8 +287,13 @@ pub const BRIEF_STEPS: usize = 256;
 /// waiting by their number.
 pub const BRIEF_TURN: Duration = Duration::from_millis(10);
 
-/// Workers that may be stuck in calls a platform never answered, beside those at work.
+/// Workers that may be stuck in calls a platform never answered, beside those at work: then no further call is made, since
+/// each holds a thread for ever.
 pub const WORKERS_GIVEN_UP: usize = 64;
+
+/// Workers beside all those, at work or stuck, for what is safe and for what is taken down: it must get through though others
+/// hold all threads there are. Half of them may also look what came of a call.
+pub const WORKERS_SAFE: usize = 64;
 
 /// How long after its deadline a platform call may answer before its worker is given up: a platform promises "a little
 /// later at most".

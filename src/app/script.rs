@@ -19,7 +19,7 @@ use crate::model::finding::{Finding, did_you_mean};
 use crate::model::{Ask, ConfigId, Ident};
 use crate::runtime::Libraries;
 use crate::session::tap::Hears;
-use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, recovery};
+use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
 pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
@@ -238,12 +238,12 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
     function!("port", String, |h, lua, name| looks::port(h, lua, &name));
     function!("system", (), |h, lua, ()| values::to_lua(
         lua,
-        &serde_json::to_value(session(h)?.system()).expect("plain data")
+        &serde_json::to_value(looks::system(h)?).expect("plain data")
     ));
-    function!("stack", (), |h, lua, ()| values::to_lua(
-        lua,
-        &serde_json::to_value(session(h)?.status().stack).expect("plain data")
-    ));
+    function!("stack", (), |h, lua, ()| {
+        let stack = session(h)?.status().stack.ok_or_else(|| error(Unanswered.to_string()))?;
+        values::to_lua(lua, &serde_json::to_value(stack).expect("plain data"))
+    });
     function!("active", (), |h, lua, ()| lua.create_sequence_from(session(h)?.hub().active()));
     function!("now", (), |h, _lua, ()| Ok(clock(h).now().as_secs_f64()));
     function!("say", String, |h, _lua, text| {

@@ -327,6 +327,7 @@ impl Product<'_> {
                 state.world = world;
                 state.unconfirmed.clear();
                 state.lost.clear();
+                self.review_standings(state);
             }
         }
     }

@@ -139,6 +139,7 @@ impl Product<'_> {
     fn applied(&self, state: &mut State, request: &Request, verdict: Verdict, went: &Went) {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
         state.lost.retain(|lost| *lost != id);
+        self.stands_for(state, id);
         let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
         // One batch may push several of them.
         let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);

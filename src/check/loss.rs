@@ -1,9 +1,10 @@
-//! How what a configuration stands for is lost on the simulated platform.
+//! Which configurations in force are watched for what they stand for, and how that is lost on the simulated platform.
 
 use super::product::Product;
 use super::state::State;
 use crate::model::monitor::Condition;
 use crate::model::{ComponentName, ConfigId};
+use crate::stack::{is_stood_down, running_for};
 use crate::system::View;
 
 /// How a loss comes about.
@@ -16,15 +17,48 @@ pub enum Loss {
 }
 
 impl Product<'_> {
+    /// A configuration has been applied: what of it runs now is watched.
+    pub(super) fn stands_for(&self, state: &mut State, id: ConfigId) {
+        let Some(holds) = self.worlds.configuration(id).and_then(|c| c.holds.as_ref()) else { return };
+        state.over.retain(|over| *over != id);
+        state.stands.retain(|(of, _)| *of != id);
+        // What else is under way may have started it, or be about to stop it: nobody knows which came first.
+        if let Some(world) = self.worlds.get(state.world).filter(|_| state.desk.under_way().is_empty()) {
+            state.stands.extend(running_for(holds, &world.system).into_iter().map(|name| (id, name)));
+            state.stands.sort_unstable();
+        }
+    }
+
+    /// The world is another one: what something stands for that is in force is watched on, or no more.
+    pub(super) fn review_standings(&self, state: &mut State) {
+        if state.stands.is_empty() && state.over.is_empty() {
+            return;
+        }
+        let State { stands, over, world, .. } = state;
+        let in_force = |id: ConfigId| self.worlds.is_in_force(*world, id);
+        over.retain(|id| in_force(*id));
+        stands.retain(|(id, _)| in_force(*id));
+        let Some(world) = self.worlds.get(*world) else { return };
+        let of = |id: ConfigId| stands.iter().filter(move |(of, _)| *of == id).map(|(_, name)| *name);
+        let down: Vec<ConfigId> =
+            stands.iter().map(|(id, _)| *id).filter(|id| is_stood_down(of(*id), &world.system)).collect();
+        stands.retain(|(id, _)| !down.contains(id));
+        over.extend(down);
+        over.sort_unstable();
+        over.dedup();
+    }
+
     /// How a configuration in force is lost, and no other one with it.
     pub fn loss(&self, state: &State, id: ConfigId) -> Option<Loss> {
         let world = self.worlds.get(state.world)?;
-        let Some(holds) = &self.worlds.configuration(id)?.holds else { return Some(Loss::Lie) };
+        let holds = self.worlds.configuration(id)?.holds.as_ref().filter(|_| !state.over.contains(&id));
+        let Some(holds) = holds else { return Some(Loss::Lie) };
+        let watched = |id: &ConfigId| !state.lost.contains(id) && !state.over.contains(id);
         let others: Vec<&Condition> = self
             .deployment
             .configurations
             .iter()
-            .filter(|c| c.id != id && !state.lost.contains(&c.id) && world.stack.is_in_force(c.id))
+            .filter(|c| c.id != id && watched(&c.id) && world.stack.is_in_force(c.id))
             .filter_map(|c| c.holds.as_ref())
             .collect();
         let looked_at = |component: ComponentName| others.iter().any(|holds| names(holds).contains(&component));

@@ -49,6 +49,7 @@ impl Product<'_> {
             next.world = world;
             next.leaving = false;
             next.unconfirmed.clear();
+            self.review_standings(&mut next);
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
     }
@@ -122,6 +123,7 @@ impl Product<'_> {
         }
         for at in 0..self.losable.len() {
             let (id, holds) = self.losable[at];
+            let holds = holds && !state.over.contains(&id);
             let busy = |request: &Request| matches!(request.ask, Ask::Apply(of) | Ask::UndoOf(of) if of == id);
             let under_way = state.desk.under_way().iter().any(|turn| turn.batch.requests.iter().any(busy));
             if state.lost.contains(&id) || under_way || !self.worlds.is_in_force(state.world, id) {

@@ -141,6 +141,8 @@ impl<'a> Product<'a> {
             inbox: SmallVec::new(),
             unconfirmed: SmallVec::new(),
             lost: SmallVec::new(),
+            stands: Vec::new(),
+            over: SmallVec::new(),
             down: 0,
             stopping: false,
             leaving: false,
@@ -261,6 +263,7 @@ impl<'a> Product<'a> {
                 None => false,
             });
         }
+        self.review_standings(state);
     }
 
     /// What `requests` come to in the state's world.

@@ -1,7 +1,7 @@
 //! The states of the product, and the moves between them.
 
 use super::outcome::WorldId;
-use crate::model::{Ask, ConfigId, Findings, Verdict};
+use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
 use crate::stack::{Batch, Desk, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
@@ -71,6 +71,10 @@ pub struct State {
     pub unconfirmed: SmallVec<[Unconfirmed; 1]>,
     /// Configurations that were lost, and are not applied anew.
     pub lost: SmallVec<[ConfigId; 1]>,
+    /// Components that ran when something in force was applied, and that what it stands for looks at.
+    pub stands: Vec<(ConfigId, ComponentName)>,
+    /// Configurations in force of which one of those was stopped since: what they stand for is watched no more.
+    pub over: SmallVec<[ConfigId; 1]>,
     /// Coordinators that have come to *down* and asked for nothing since, by their bits.
     pub down: u64,
     /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.

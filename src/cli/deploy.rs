@@ -16,7 +16,7 @@ use crate::session::kept::Leave;
 use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
-use crate::session::{Command, Ended, NotUp, Session, Stage};
+use crate::session::{Command, Ended, NotUp, Session, Stage, Unanswered};
 use crate::time::{Clock, lock};
 use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex};
@@ -238,14 +238,20 @@ pub(super) fn short(error: std::io::Error) -> Failure {
 
 fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {
     let status = session.status();
+    let what = match (&status.system, &status.stack) {
+        (Some(system), Some(stack)) => format!(
+            "{}, {}, {} on the stack",
+            count(system.components.len(), "component"),
+            count(system.connections.len(), "connection"),
+            count(stack.len(), "frame"),
+        ),
+        _ => format!("with what is not known: {Unanswered}"),
+    };
     progress.line(format!(
-        "{} {} after {:.3} s: {}, {}, {} on the stack",
+        "{} {} after {:.3} s: {what}",
         out.paint(Style::Bold, &status.name),
         out.paint(Style::Good, "up"),
         status.at,
-        count(status.system.components.len(), "component"),
-        count(status.system.connections.len(), "connection"),
-        count(status.stack.len(), "frame"),
     ));
     let way = if in_background { "`davit shutdown` takes it down in order" } else { "Ctrl-C shuts it down in order" };
     progress.line(out.paint(Style::Dim, way));

@@ -8,9 +8,9 @@ use super::output::{Output, Style, Table};
 use super::remote::{ASK, failure};
 use super::{Answer, Context, Failure, Run};
 use crate::model::finding::count;
-use crate::session::StoppingView;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::Life;
+use crate::session::{StoppingView, Unanswered};
 use serde_json::{Value as Json, json};
 
 /// Show a running deployment: its phase, the coordinator's states, components, faults. Of one that died: when, and how far it
@@ -191,7 +191,12 @@ fn print(out: &Output, status: &Json) {
         }
     }
     let empty = Vec::new();
-    let stack = status["stack"].as_array().unwrap_or(&empty);
+    let Some(stack) = status["stack"].as_array() else {
+        out.line(format!("stack        {}", out.paint(Style::Bad, not_known())));
+        out.line(format!("components   {}", out.paint(Style::Bad, not_known())));
+        faults(out, status);
+        return;
+    };
     out.line(format!(
         "stack        {}{}",
         count(stack.len(), "frame"),
@@ -228,7 +233,16 @@ fn print(out: &Output, status: &Json) {
         out.line(out.paint(Style::Bad, "what remains of what broke it"));
         out.text(listed(residual));
     }
-    for fault in status["faults"].as_array().unwrap_or(&empty) {
+    faults(out, status);
+}
+
+/// What only the configurator knows, where it has not answered.
+pub fn not_known() -> String {
+    format!("not known: {Unanswered}")
+}
+
+fn faults(out: &Output, status: &Json) {
+    for fault in status["faults"].as_array().into_iter().flatten() {
         out.line(format!(
             "{} {}: {}",
             out.paint(Style::Bad, "fault"),

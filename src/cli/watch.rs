@@ -9,7 +9,7 @@ use super::list::silent;
 use super::log::duration;
 use super::output::{self, Output, Style, Table};
 use super::remote::{connect, failure, seconds};
-use super::status::{state_style, text};
+use super::status::{not_known, state_style, text};
 use super::{Answer, Context, Run};
 use crate::model::finding::count;
 use crate::session::client::{Client, ClientError};
@@ -201,12 +201,14 @@ fn margin(monitor: &Json) -> String {
 fn line(out: &Output, look: &Json) -> String {
     let status = &look["status"];
     let phase = text(&status["phase"]);
-    let frames = status["stack"].as_array().map_or(0, Vec::len);
+    let frames = status["stack"]
+        .as_array()
+        .map_or_else(|| out.paint(Style::Bad, format!("stack {}", not_known())), |stack| count(stack.len(), "frame"));
     let mut parts = vec![
         format!("{:>12.3} s", status["at"].as_f64().unwrap_or_default()),
         out.paint(state_style(phase), phase),
         out.paint(Style::Name, leaves(status)),
-        count(frames, "frame"),
+        frames,
     ];
     let monitors = look["monitors"].as_array().into_iter().flatten();
     parts.extend(
@@ -237,7 +239,12 @@ fn drawn(out: &Output, look: &Json) -> String {
     }
     let frames: Vec<String> =
         status["stack"].as_array().into_iter().flatten().map(|frame| framed(out, frame)).collect();
-    page += &format!("stack        {}\n", if frames.is_empty() { "empty".to_owned() } else { frames.join(", ") });
+    let stack = match frames.is_empty() {
+        _ if status["stack"].is_null() => out.paint(Style::Bad, not_known()),
+        true => "empty".to_owned(),
+        false => frames.join(", "),
+    };
+    page += &format!("stack        {stack}\n");
     for fault in status["faults"].as_array().into_iter().flatten() {
         let word = out.paint(Style::Bad, "fault");
         page += &format!("{word}        {}: {}\n", text(&fault["component"]), text(&fault["reason"]));

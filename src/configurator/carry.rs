@@ -3,7 +3,7 @@
 use super::engine::Engine;
 use super::hands::Hands;
 use super::inbox::Reply;
-use super::pool::Call;
+use super::pool::{Call, Whose};
 use super::progress::{Progress, StepEnd, StepName};
 use super::running::{Flight, Purpose, Running};
 use crate::limits;
@@ -71,7 +71,7 @@ impl Engine {
                 Poll::Read(components) => {
                     did = true;
                     let deadline = self.given.clock.now() + self.given.limits.step_timeout;
-                    let ticket = self.pool.start(Call::ObserveSome(components), deadline);
+                    let ticket = self.call(Call::ObserveSome(components), deadline, self.whose(running, Whose::Look));
                     running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
                 }
                 Poll::Ask(question) => {
@@ -130,8 +130,17 @@ impl Engine {
         }
     }
 
-    /// Whether a call that takes time may begin: one worker stays free for each of the others that has none.
+    /// Whose calls a transaction makes.
+    fn whose(&self, running: &Running, plain: Whose) -> Whose {
+        if running.is_safe() || self.taking_down { Whose::Safe } else { plain }
+    }
+
+    /// Whether a call that takes time may begin: one worker stays free for each of the others that has none. What is safe waits
+    /// for none of the others.
     fn has_room(&self, running: &Running) -> bool {
+        if self.whose(running, Whose::Plain) == Whose::Safe {
+            return self.pool.has_room_for_safe(running.flights.len());
+        }
         let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
         self.pool.has_room_beside(if running.flights.is_empty() { 0 } else { others })
     }
@@ -154,7 +163,7 @@ impl Engine {
                 (Call::Several(several, patience, stop.clone()), until)
             }
         };
-        let ticket = self.pool.start(call, deadline);
+        let ticket = self.call(call, deadline, self.whose(running, Whose::Plain));
         running.flights.push(Flight { ticket, steps, started, deadline, stop });
     }
 

@@ -30,28 +30,13 @@ pub struct FrameView {
     pub since_stopping: bool,
 }
 
-/// What is under way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Busy {
-    /// The request.
-    pub request: RequestId,
-    /// Since when.
-    pub since: Time,
-}
-
 /// How things stand, at one moment.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Changes whenever anything below does; equal numbers mean an equal view.
-    pub revision: u64,
     /// The system as the configurator knows it, if it was asked for.
     pub system: Option<Arc<Snapshot>>,
     /// Frames in force, newest last.
     pub stack: Vec<FrameView>,
-    /// What is under way.
-    pub busy: Option<Busy>,
-    /// Requests that wait.
-    pub waiting: usize,
     /// What is broken longest, if anything is.
     pub broken: Option<Arc<Residual>>,
     /// All that is broken.
@@ -139,9 +124,9 @@ impl TakenDown {
         self.popped.is_empty() && self.kept.is_empty() && self.forced.is_empty() && self.troubles.is_empty()
     }
 
-    /// Whether nothing is left.
+    /// Whether nothing is left, as the platform shows it: where it does not answer, that is not known.
     pub fn is_clean(&self) -> bool {
-        self.left.is_empty() && self.quarantined.is_empty()
+        self.observed && self.left.is_empty() && self.quarantined.is_empty()
     }
 }
 
@@ -231,11 +216,5 @@ impl Command {
     /// Whether what is under way gives way to it.
     pub fn is_urgent(&self) -> bool {
         matches!(self, Self::TakeBack { .. } | Self::Force { .. } | Self::Stop)
-    }
-}
-
-impl Busy {
-    pub(super) fn of(request: &Request, since: Time) -> Self {
-        Self { request: request.id, since }
     }
 }

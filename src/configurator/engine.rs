@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{Began, Busy, Command, Moment, View};
+use super::control::{Began, Command, Moment, View};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -420,11 +420,8 @@ impl Engine {
             }
         });
         Arc::new(View {
-            revision: self.revision,
             system,
             stack,
-            busy: self.current.first().map(|(request, since)| Busy::of(request, *since)),
-            waiting: self.desk.len(),
             broken: self.broken_longest(),
             residuals: self.world.broken.iter().map(|broken| broken.residual.clone()).collect(),
             partial: self.left_partial(),

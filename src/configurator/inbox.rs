@@ -78,6 +78,7 @@ pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
         + limits::PLATFORM_REPORTS
         + limits::WORKERS_MOST
         + limits::WORKERS_GIVEN_UP
+        + 2 * limits::WORKERS_SAFE
         + limits::CONFIGURATOR_COMMANDS
         + limits::CONFIGURATOR_CONTROL
         + 1;

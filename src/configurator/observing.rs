@@ -4,7 +4,7 @@
 use super::engine::Engine;
 use super::inbox::Reply;
 use super::looks::Look;
-use super::pool::Call;
+use super::pool::{Call, Whose};
 use super::progress::Progress;
 use super::request::{Reason, Residual};
 use crate::limits;
@@ -80,7 +80,7 @@ impl Engine {
         }
         let deadline = now + self.given.limits.step_timeout;
         let names = components.iter().map(|(name, _)| *name).collect();
-        let ticket = self.pool.start(Call::ObserveSome(names), deadline);
+        let ticket = self.call(Call::ObserveSome(names), deadline, Whose::Plain);
         self.observing.out = Some(Look { ticket, components, until: deadline + limits::PLATFORM_GRACE });
     }
 

@@ -3,13 +3,13 @@
 //!
 //! A worker is given one call at a time and reports its end to the configurator's inbox. A platform promises to answer
 //! by the deadline; a worker whose call is not back a while after it is given up and replaced, and its late report is
-//! told apart by its ticket.
+//! told apart by its ticket. Where too many are stuck no further call is made, but for what is safe.
 
 use super::inbox::{Mail, Post, Reply, Ticket};
 use crate::limits;
 use crate::model::{ComponentName, Step};
 use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
-use crate::time::{Clock, Receiver, Sender, Time};
+use crate::time::{Clock, Receiver, Sender, Time, TrySendError};
 use rustc_hash::FxHashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -25,6 +25,17 @@ pub(super) enum Call {
     Observe,
     ObserveSome(Vec<ComponentName>),
     ObserveComponent(ComponentName),
+}
+
+/// Whose call it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Whose {
+    /// Anybody's.
+    Plain,
+    /// A look that tells what a call has done: without it that is not known, and the system broken.
+    Look,
+    /// Of a safe configuration, or of what takes everything down: it has workers beside those of all others.
+    Safe,
 }
 
 struct Job {
@@ -47,6 +58,10 @@ pub(super) struct Pool {
     replies: Vec<(Ticket, Reply)>,
     /// Calls that nobody waits for any more.
     given_up: FxHashSet<Ticket>,
+    /// No call was made since too many are stuck, and nobody was told yet.
+    refused: Option<String>,
+    /// That was told, and none has come back since.
+    told: bool,
 }
 
 /// Calls `platform` and survives its panic: whether the step happened is then unknown.
@@ -84,7 +99,7 @@ fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
 
 impl Pool {
     pub fn new(clock: Clock, platform: Arc<dyn Platform>, post: Post, bound: usize) -> Self {
-        let jobs = clock.channel(bound.max(1) + limits::WORKERS_GIVEN_UP);
+        let jobs = clock.channel(bound.max(1) + limits::WORKERS_GIVEN_UP + 2 * limits::WORKERS_SAFE);
         Self {
             clock,
             platform,
@@ -96,6 +111,8 @@ impl Pool {
             next: 0,
             replies: Vec::new(),
             given_up: FxHashSet::default(),
+            refused: None,
+            told: false,
         }
     }
 
@@ -104,25 +121,64 @@ impl Pool {
         self.busy + others.min(self.bound - 1) < self.bound
     }
 
+    /// Whether a worker can be had for what is safe, of which so many calls are out: it does not wait for others that are stuck.
+    pub fn has_room_for_safe(&self, out: usize) -> bool {
+        out < self.bound && self.busy < self.bound + limits::WORKERS_SAFE
+    }
+
     /// Hands `call` to a worker.
-    pub fn start(&mut self, call: Call, deadline: Time) -> Ticket {
-        if self.busy >= self.workers {
-            self.hire();
-        }
+    pub fn start(&mut self, call: Call, deadline: Time, whose: Whose) -> Ticket {
         self.next += 1;
         let ticket = Ticket(self.next);
         self.busy += 1;
-        // There is room: at most `bound` calls are out at once.
-        if self.jobs.0.try_send(Job { ticket, call, deadline }).is_err() {
-            self.post.send(Mail::Reply(ticket, Reply::Executed(Outcome::NotDone(Cause::Lost("no worker".to_owned())))));
+        let more = match whose {
+            Whose::Plain => 0,
+            Whose::Look => limits::WORKERS_SAFE / 2,
+            Whose::Safe => limits::WORKERS_SAFE,
+        };
+        if self.given_up.len() >= limits::WORKERS_GIVEN_UP + more {
+            let why = format!("{} calls have not returned: no further one is made", self.given_up.len());
+            self.refuse(ticket, &call, &why);
+            if !std::mem::replace(&mut self.told, true) {
+                self.refused = Some(why);
+            }
+            return ticket;
+        }
+        if self.busy > self.workers {
+            self.hire();
+        }
+        if let Err(TrySendError::Full(job) | TrySendError::Closed(job)) =
+            self.jobs.0.try_send(Job { ticket, call, deadline })
+        {
+            self.refuse(ticket, &job.call, "no worker is free");
         }
         ticket
+    }
+
+    /// A call is not made.
+    fn refuse(&mut self, ticket: Ticket, call: &Call, why: &str) {
+        let reply = match call {
+            Call::Execute(..) => Reply::Executed(Outcome::NotDone(Cause::Lost(why.to_owned()))),
+            Call::Several(..) => {
+                let outcome = Outcome::NotDone(Cause::Lost(why.to_owned()));
+                Reply::Several(vec![Ended { outcome, took: None }])
+            }
+            Call::Observe | Call::ObserveSome(_) => Reply::Observed(Err(ObserveError::Lost(why.to_owned()))),
+            Call::ObserveComponent(_) => Reply::ObservedComponent(Err(ObserveError::Lost(why.to_owned()))),
+        };
+        self.came(ticket, reply);
+    }
+
+    /// That no further call is made, and why: once for as long as it is so.
+    pub fn take_refused(&mut self) -> Option<String> {
+        self.refused.take()
     }
 
     /// A worker is back with what came of its call.
     pub fn came(&mut self, ticket: Ticket, reply: Reply) {
         if self.given_up.remove(&ticket) {
             self.workers += 1;
+            self.told = false;
         } else {
             self.busy = self.busy.saturating_sub(1);
             self.replies.push((ticket, reply));

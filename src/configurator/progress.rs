@@ -114,6 +114,8 @@ pub enum Progress {
     Recovered,
     /// The configurator itself failed, and goes on.
     Survived(String),
+    /// So many calls have not returned that no further one is made, but for what is safe: told once until one comes back.
+    Stuck(String),
 }
 
 /// Hears the progress, in the configurator's thread: must not block.

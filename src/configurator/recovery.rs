@@ -2,8 +2,8 @@
 
 use super::control::{Drift, Recovery};
 use super::engine::Engine;
-use super::inbox::Reply;
-use super::pool::Call;
+use super::inbox::{Reply, Ticket};
+use super::pool::{Call, Whose};
 use super::progress::Progress;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -11,6 +11,7 @@ use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot};
 use crate::stack::{Broken, Frame, Op, Planned, Residual, transaction};
 use crate::system::{self, System, View as _, step};
+use crate::time::Time;
 use crate::transaction::{PartEnd, Transaction};
 use std::sync::Arc;
 
@@ -23,10 +24,20 @@ impl Engine {
         }
     }
 
+    /// Has a worker make a call. Where none is made any more that is told.
+    pub(super) fn call(&mut self, call: Call, deadline: Time, whose: Whose) -> Ticket {
+        let ticket = self.pool.start(call, deadline, whose);
+        if let (Some(why), Some(progress)) = (self.pool.take_refused(), &self.given.progress) {
+            progress(&Progress::Stuck(why));
+        }
+        ticket
+    }
+
     /// Asks the platform something on a worker, while everything else goes on. None: no answer.
     pub(super) fn ask(&mut self, call: Call) -> Option<Reply> {
         let deadline = self.given.clock.now() + self.given.limits.step_timeout;
-        let ticket = self.pool.start(call, deadline);
+        let whose = if self.taking_down { Whose::Safe } else { Whose::Look };
+        let ticket = self.call(call, deadline, whose);
         let until = deadline + limits::PLATFORM_GRACE;
         loop {
             if let Some(reply) = self.pool.take(ticket) {

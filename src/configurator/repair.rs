@@ -10,7 +10,7 @@ use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
+use crate::stack::{Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
 use crate::system::{self, View as _, step};
 use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
 use std::sync::Arc;
@@ -59,13 +59,11 @@ impl Engine {
         match parts.first_mut() {
             Some(PartEnd::Done | PartEnd::Broken(_)) => self.forget_broken(of),
             Some(part @ PartEnd::Failed(_)) if !interrupted => {
-                let Some(at) = self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of)) else {
-                    return parts;
-                };
-                if let (Some(cause), broken) = (part.reason(), self.world.broken.remove(at)) {
-                    let difference = system::diff(&self.world.as_meant(&broken), &self.world.system);
+                let Some(at) = self.place_of(of) else { return parts };
+                if let (Some(cause), broken) = (part.reason(), &self.world.broken[at]) {
+                    let difference = system::diff(&self.world.as_meant(broken), &self.world.system);
                     let residual = Arc::new(Residual { cause, difference, ..(*broken.residual).clone() });
-                    self.world.broken.insert(at, Broken { residual: residual.clone(), ..broken });
+                    self.world.broken[at].residual = residual.clone();
                     *part = PartEnd::Broken(Box::new(BrokenPart {
                         residual,
                         frame: None,
@@ -82,7 +80,7 @@ impl Engine {
     }
 
     pub(super) fn forget_broken(&mut self, of: &Arc<Residual>) {
-        if let Some(at) = self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of)) {
+        if let Some(at) = self.place_of(of) {
             let broken = self.world.broken.remove(at);
             self.world.hand_meant(&broken);
         }
@@ -107,10 +105,16 @@ impl Engine {
         }
     }
 
-    /// Brings what is broken to where the model has it. What is unsettled is accepted by that.
+    /// Where something broken stands, by what is left of it.
+    fn place_of(&self, of: &Arc<Residual>) -> Option<usize> {
+        self.world.broken.iter().position(|broken| Arc::ptr_eq(&broken.residual, of))
+    }
+
+    /// Brings what is broken to where the model has it. What is unsettled is accepted by that. It counts as broken until that is
+    /// done: who comes while it is looked and mended plans with it, and who asks is told of it.
     pub(super) fn repair(&mut self, at: usize, by: By) -> Result<(), Arc<Residual>> {
         let serves = self.request_of(by).map_or(RequestId(0), |request| request.id);
-        let broken = self.world.broken.remove(at);
+        let broken = self.world.broken[at].clone();
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut observed = self.read(&components);
         let mut withheld = None;
@@ -141,9 +145,8 @@ impl Engine {
             broken.residual.unsettled.iter().any(out)
         };
         if observed && system::diff::reached(&self.world.system, &wanted) && !out() && !self.world.is_hidden(&broken) {
-            self.world.hand_meant(&broken);
+            self.forget_broken(&broken.residual);
             self.drop_empty(broken.frame);
-            self.changed();
             return Ok(());
         }
         let mut faulted: Vec<ComponentName> = Vec::new();
@@ -162,7 +165,9 @@ impl Engine {
             withheld: withheld.or_else(|| broken.residual.withheld.clone()),
             ..(*broken.residual).clone()
         });
-        self.world.broken.insert(at.min(self.world.broken.len()), Broken { residual: residual.clone(), ..broken });
+        if let Some(at) = self.place_of(&broken.residual) {
+            self.world.broken[at].residual = residual.clone();
+        }
         self.changed();
         Err(residual)
     }

@@ -5,7 +5,8 @@ use super::engine::Engine;
 use super::progress::Progress;
 use super::request::Reason;
 use super::running::{Asked, Running};
-use crate::model::{ComponentName, ConfigId, RunState};
+use crate::model::ConfigId;
+use crate::stack::{is_stood_down, running_for};
 use crate::system::View as _;
 use crate::time::Time;
 use crate::transaction::{Input, Question};
@@ -92,13 +93,8 @@ impl Engine {
     pub(super) fn applied(&mut self, id: ConfigId, number: Option<u64>) {
         self.forget_standing(id);
         let Some(number) = number else { return };
-        let mut runs: Vec<ComponentName> = Vec::new();
-        if let Some(condition) = self.given.configurations.get(&id).and_then(|c| c.holds.as_ref()) {
-            condition.for_each_component(&mut |name, _| runs.push(name));
-        }
-        runs.sort_unstable();
-        runs.dedup();
-        runs.retain(|name| self.world.system.component(*name).is_some_and(|node| node.state == RunState::Running));
+        let holds = self.given.configurations.get(&id).and_then(|c| c.holds.as_ref());
+        let runs = holds.map_or_else(Vec::new, |holds| running_for(holds, &self.world.system));
         self.standings.of.insert(id, Standing { watch: Watch::On(number, None), runs, lost: false });
     }
 
@@ -161,13 +157,10 @@ impl Engine {
             }
             let worked_on = self.running.iter().any(|running| !running.over && self.works_on(running, id));
             let standing = &self.standings.of[&id];
-            let stopped = |name: &ComponentName| {
-                let node = self.world.system.component(*name);
-                node.is_none_or(|node| !matches!(node.state, RunState::Running | RunState::Faulted))
-            };
+            let stood_down = || is_stood_down(standing.runs.iter().copied(), &self.world.system);
             let next = match &standing.watch {
                 Watch::On(..) if worked_on => Watch::Paused,
-                Watch::On(..) | Watch::Paused if !worked_on && standing.runs.iter().any(stopped) => Watch::Over,
+                Watch::On(..) | Watch::Paused if !worked_on && stood_down() => Watch::Over,
                 Watch::Paused if !worked_on => {
                     let holds = self.given.configurations.get(&id).and_then(|c| c.holds.clone());
                     match (holds, self.given.conditions.clone()) {

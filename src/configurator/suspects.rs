@@ -1,7 +1,7 @@
 //! Components that were reported faulted: looked at, since the report may be older than what was done since.
 
 use super::inbox::{Reply, Ticket};
-use super::pool::{Call, Pool};
+use super::pool::{Call, Pool, Whose};
 use crate::limits;
 use crate::model::{ComponentName, RunState};
 use crate::system::{System, View as _};
@@ -100,7 +100,7 @@ impl Suspects {
                 continue;
             }
             let deadline = now + timeout;
-            let ticket = pool.start(Call::ObserveComponent(component), deadline);
+            let ticket = pool.start(Call::ObserveComponent(component), deadline, Whose::Plain);
             let until = deadline + limits::PLATFORM_GRACE;
             self.looks.push(SuspectLook { ticket, component, generation: generation_of(system, component), until });
         }

@@ -411,11 +411,6 @@ impl Hub {
         self.lock().heard.count()
     }
 
-    /// Whether `event` was heard after the `since`-th; answers its number.
-    pub fn heard_since(&self, event: &str, since: u64) -> Option<u64> {
-        self.heard_but(event, since, &[])
-    }
-
     /// Which of these was heard first after the `since`-th.
     pub fn first_heard(&self, events: &[String], since: u64) -> Option<String> {
         let state = self.lock();
@@ -423,7 +418,7 @@ impl Hub {
         news.next().map(|(_, event)| event.clone())
     }
 
-    /// The same, leaving out those of some numbers.
+    /// Whether `event` was heard after the `since`-th, leaving out those of some numbers; answers its number.
     pub fn heard_but(&self, event: &str, since: u64, but: &[u64]) -> Option<u64> {
         let state = self.lock();
         let mut news = state.heard.iter().filter(|(number, text)| *number > since && *text == event);

@@ -11,13 +11,12 @@ pub struct Lanes<T> {
     most: usize,
     most_reports: usize,
     count: u64,
-    dropped: u64,
 }
 
 impl<T> Lanes<T> {
     /// An empty one with room for `most` things, and beside them for `most_reports` reports of components.
     pub fn new(most: usize, most_reports: usize) -> Self {
-        Self { own: VecDeque::new(), reports: VecDeque::new(), most, most_reports, count: 0, dropped: 0 }
+        Self { own: VecDeque::new(), reports: VecDeque::new(), most, most_reports, count: 0 }
     }
 
     /// Adds something; answers its number, from 1.
@@ -25,7 +24,6 @@ impl<T> Lanes<T> {
         let (lane, most) = if is_report { (&mut self.reports, self.most_reports) } else { (&mut self.own, self.most) };
         if lane.len() >= most {
             lane.pop_front();
-            self.dropped += 1;
         }
         self.count += 1;
         lane.push_back((self.count, what));
@@ -35,11 +33,6 @@ impl<T> Lanes<T> {
     /// How many things were added so far.
     pub fn count(&self) -> u64 {
         self.count
-    }
-
-    /// How many were dropped.
-    pub fn dropped(&self) -> u64 {
-        self.dropped
     }
 
     /// All that is remembered with its numbers, oldest first.
@@ -75,6 +68,6 @@ mod tests {
         let all: Vec<u64> = lanes.iter().map(|(number, what)| (*what == number).then_some(number).unwrap()).collect();
         assert_eq!(all, [5, 7, 8, 9, 10]);
         assert_eq!(lanes.newest(2).copied().collect::<Vec<_>>(), [9, 10]);
-        assert_eq!((lanes.count(), lanes.dropped()), (10, 5));
+        assert_eq!(lanes.count(), 10);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::log::{Happening, Phase};
 use super::stages::Stage;
-use super::{Command, Session};
+use super::{Command, Session, Unanswered};
 use crate::model::Snapshot;
 use crate::time::Time;
 use crate::time::clock::panic_text;
@@ -65,7 +65,7 @@ impl Session {
         let began = hub.heard();
         hub.set_phase(Phase::Deploying);
         self.raise(bring_up.event, "deployment");
-        let mut force = false;
+        let (mut force, mut unanswered) = (false, false);
         let why = loop {
             if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
                 force = by_force;
@@ -83,8 +83,13 @@ impl Session {
             }
             // Stopped in an emergency: what stopping it would move, nobody has asked for.
             let now = self.clock().now();
-            if now >= deadline && self.waits_for_people(start) {
-                deadline = now + bring_up.within;
+            if now >= deadline {
+                match self.waits_for_people(start) {
+                    Ok(true) => deadline = now + bring_up.within,
+                    // It may be one: asked once more, before anything moves.
+                    Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => deadline = now + bring_up.within,
+                    _ => {}
+                }
             }
             if now >= deadline {
                 let waiting = hub.outstanding();
@@ -162,6 +167,9 @@ impl Session {
 pub(super) fn survived<T>(what: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(what)).map_err(|panic| panic_text(&*panic))
 }
+
+/// What is left where the platform does not answer.
+pub(super) const UNSEEN: &str = "what is there is not known: the platform has not answered";
 
 /// What is left of a system, one line each.
 pub(super) fn leftovers(system: &Snapshot, quarantined: &[String]) -> Vec<String> {

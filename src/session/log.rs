@@ -234,11 +234,6 @@ impl Log {
     pub fn last(&self, last: usize) -> Vec<Arc<Entry>> {
         self.0.newest(last).cloned().collect()
     }
-
-    /// How many entries were dropped.
-    pub fn dropped(&self) -> u64 {
-        self.0.dropped()
-    }
 }
 
 /// A component that failed, or whose call has not returned.
@@ -284,12 +279,12 @@ pub struct StatusView {
     pub coordinator: Vec<String>,
     /// The same of every coordinator, by name; the one above is the first.
     pub coordinators: BTreeMap<String, Vec<String>>,
-    /// The system as the configurator knows it.
-    pub system: Snapshot,
+    /// The system as the configurator knows it; none, as of the next two: it has not answered, and nobody knows.
+    pub system: Option<Snapshot>,
     /// Frames in force, newest last.
-    pub stack: Vec<FrameView>,
+    pub stack: Option<Vec<FrameView>>,
     /// What is left of an application that is neither done nor undone; empty unless it is broken.
-    pub residual: Vec<Difference>,
+    pub residual: Option<Vec<Difference>>,
     /// What is wrong.
     pub faults: Vec<Fault>,
     /// Requests that are not answered yet.

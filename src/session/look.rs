@@ -39,7 +39,8 @@ impl Session {
     /// How everything stands, with what monitors have to say within that (real) time.
     pub fn look(&self, within: Duration) -> LookView {
         let status = self.status();
-        let evaluating = status.system.components.iter().filter(|(_, it)| it.ty.as_str() == MONITORS_TYPE);
+        let components = status.system.iter().flat_map(|system| &system.components);
+        let evaluating = components.filter(|(_, it)| it.ty.as_str() == MONITORS_TYPE);
         let mut monitors: Vec<Monitored> = Vec::new();
         let mut inputs: Vec<Input> = Vec::new();
         // Of which monitor, and whether it says how far it is.

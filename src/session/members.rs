@@ -1,6 +1,6 @@
 //! One property or port of a running deployment: what it is worth, and an operator's change of it.
 
-use super::Session;
+use super::{Session, Unanswered};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Part, PortSignal};
@@ -133,7 +133,7 @@ impl Session {
             return Err(no(format!("`{member}` is being set already"), "wait for the answer to that"));
         }
         if !self.configurator().define(configuration, listed, self.clock().now() + limits::VIEW) {
-            return Err(no("the configurator does not answer", "something may keep it busy: `davit status` shows it"));
+            return Err(no(Unanswered.to_string(), "something may keep it busy: `davit status` shows it"));
         }
         set.insert(id);
         Ok(self.request_on(line, Ask::Apply(id), "operator", force))
@@ -150,7 +150,9 @@ impl Session {
         let (of, member) = name
             .split_once('.')
             .ok_or_else(|| no(format!("`{name}` names no property or port"), "it is written `Component.member`"))?;
-        let system = self.system();
+        let system = self
+            .system()
+            .map_err(|unanswered| no(unanswered.to_string(), "try again: `davit status` shows what is known"))?;
         let component = system.components.iter().find(|(known, _)| known.as_str() == of);
         let (component, ty) = component
             .and_then(|(known, it)| Some((*known, self.platform().catalogue().get(it.ty)?)))

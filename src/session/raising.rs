@@ -69,9 +69,18 @@ impl Session {
     /// What to know where no coordinator heard an event of safety since something safe is in force: that something else was
     /// applied over that. It is the coordinators that lead, so the event does nothing there.
     pub(super) fn applied_over_safe(&self, event: EventName) -> Option<String> {
-        let frames = self.frames();
-        let is_safety = self.deployment().safety.iter().any(|(own, _)| *own == event);
-        let safe = frames.iter().rposition(|frame| self.is_safe(frame.configuration)).filter(|_| is_safety)?;
+        if !self.deployment().safety.iter().any(|(own, _)| *own == event) {
+            return None;
+        }
+        let frames = match self.frames() {
+            Ok(frames) => frames,
+            Err(unanswered) => {
+                return Some(format!(
+                    "{unanswered}: whether something safe is in force, and what was applied over it, is not known"
+                ));
+            }
+        };
+        let safe = frames.iter().rposition(|frame| self.is_safe(frame.configuration))?;
         let over = &frames[safe + 1..];
         let names: Vec<String> = over.iter().map(|it| format!("`{}` by {}", it.configuration, it.by)).collect();
         let safe = frames[safe].configuration;

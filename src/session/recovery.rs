@@ -182,11 +182,8 @@ mod tests {
             ..Residual::of(Reason::Busy)
         };
         let view = View {
-            revision: 0,
             system: None,
             stack: Vec::new(),
-            busy: None,
-            waiting: 0,
             broken: None,
             residuals: vec![Arc::new(residual(&["a"])), Arc::new(residual(&["b"]))],
             partial: vec![Residual { left: vec![set(2.0)], ..Residual::of(Reason::Busy) }],

@@ -259,6 +259,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
         Progress::Survived(text) => {
             hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
         }
+        Progress::Stuck(why) => hub.note(Happening::Forced { note: why.clone() }),
         Progress::Lost { configuration, reason } => {
             let event = Verdict::Lost.event(Ask::Apply(*configuration));
             let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();

@@ -8,7 +8,7 @@ use super::raising::Offered;
 use super::routes::Acted;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
-use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, recovery};
+use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, Unanswered, recovery};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, RequestId};
@@ -129,7 +129,7 @@ impl Service for SessionService {
         refused_while_stopping(&session, method, params)?;
         match method {
             "status" => Ok(view(&session.status())),
-            "stack" => Ok(view(&session.status().stack)),
+            "stack" => session.status().stack.map(|stack| view(&stack)).ok_or_else(|| unanswered(Unanswered)),
             "log" => Ok(view(&session.hub().log(optional(params, "last")?.unwrap_or(usize::MAX)))),
             "event" => event(&session, params, gone),
             "apply" => {
@@ -210,6 +210,11 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
             deployment.shutdown.event
         ) }),
     })
+}
+
+fn unanswered(why: Unanswered) -> RpcError {
+    let help = "something may be under way that holds it up: `davit status` shows what is known";
+    RpcError { data: json!({ "help": help }), ..RpcError::new(TIMED_OUT, why.to_string()) }
 }
 
 fn no_member(why: NoMember) -> RpcError {

@@ -1,10 +1,10 @@
 //! Stopping, stage by stage (design §6): what [`stages`](super::stages) decides is carried out.
 
 use super::halt::StandsStill;
-use super::life::{Ended, survived};
+use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
 use super::stages::{Came, Next, Stage, first, next};
-use super::{Command, Session};
+use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::limits;
 use crate::model::{ConfigId, EventName, Origin, Step};
@@ -12,6 +12,21 @@ use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+
+/// Whether what is left is held by a safe configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Held {
+    No,
+    Yes,
+    /// The configurator has not answered: people decide, as if it were.
+    NotKnown,
+}
+
+impl Held {
+    fn of(held: bool) -> Self {
+        if held { Self::Yes } else { Self::No }
+    }
+}
 
 /// What stopping has come to so far.
 struct Told {
@@ -55,7 +70,7 @@ impl Session {
             let (came, held) = began
                 .and_then(|()| {
                     survived(|| match stage {
-                        Stage::Led => (self.lead_down(&told), false),
+                        Stage::Led => (self.lead_down(&told), Held::No),
                         Stage::TakenBack => self.take_all_back(&mut told),
                         Stage::Forced => self.force_all(&mut told),
                     })
@@ -63,9 +78,9 @@ impl Session {
                 .unwrap_or_else(|panic| {
                     let why = format!("davit itself has panicked: {panic}");
                     told.notes.push(why.clone());
-                    (Came::Left(why), false)
+                    (Came::Left(why), Held::No)
                 });
-            let came_to = next(stage, &came, held && self.attended.load(Ordering::Relaxed));
+            let came_to = next(stage, &came, held != Held::No && self.attended.load(Ordering::Relaxed));
             why = match came {
                 Came::Left(why) => Some(why),
                 Came::Hurried => Some("as asked for".to_owned()),
@@ -75,8 +90,12 @@ impl Session {
                 Next::Over => break,
                 Next::Stage(next) => stage = next,
                 Next::Held => {
-                    let note = "a safe configuration is in force: what is left stays as it is until a second signal or `--force`";
-                    hub.note(Happening::Forced { note: note.to_owned() });
+                    let what = match held {
+                        Held::NotKnown => "whether a safe configuration is in force is not known",
+                        _ => "a safe configuration is in force",
+                    };
+                    let note = format!("{what}: what is left stays as it is until a second signal or `--force`");
+                    hub.note(Happening::Forced { note });
                     hub.halt().hold(true);
                     self.wait_for_force();
                     hub.halt().hold(false);
@@ -138,9 +157,10 @@ impl Session {
         let came = loop {
             if self.is_down() {
                 // As the platform shows it: it may have said that something is gone.
-                break match self.left_over().is_empty() {
-                    true => Came::Empty,
-                    false => Came::Left(format!("`{goal}` was reached with components left")),
+                break match &self.left_over()[..] {
+                    [] => Came::Empty,
+                    [only] if only == UNSEEN => Came::Left(format!("`{goal}` was reached, and {UNSEEN}")),
+                    _ => Came::Left(format!("`{goal}` was reached with components left")),
                 };
             }
             if self.is_hurried() {
@@ -155,15 +175,21 @@ impl Session {
             // Stopped in an emergency since: only its coordinator knows the way from there, and somebody decides when. Then its
             // time begins anew.
             let (now, still) = (self.clock().now(), self.stands_still());
-            if std::mem::replace(&mut stood, still.is_some()) && !stood {
+            // While nobody knows it is as it was.
+            let stands = still.as_ref().map_or(stood, Option::is_some);
+            if std::mem::replace(&mut stood, stands) && !stood {
                 deadline = now + take_down.within;
             }
             if now >= deadline {
-                let Some(still) = still else {
-                    break Came::Left(format!("not `{goal}` after {} s", take_down.within.as_secs_f64()));
+                let late = || format!("not `{goal}` after {} s", take_down.within.as_secs_f64());
+                let note = match still {
+                    Ok(Some(still)) => still.to_string(),
+                    Ok(None) => break Came::Left(late()),
+                    Err(unanswered) if !stood => break Came::Left(format!("{}: {unanswered}", late())),
+                    Err(unanswered) => unanswered.to_string(),
                 };
                 if !std::mem::replace(&mut said, true) {
-                    hub.note(Happening::Forced { note: still.to_string() });
+                    hub.note(Happening::Forced { note });
                 }
                 deadline = now + take_down.within;
             }
@@ -175,11 +201,11 @@ impl Session {
     }
 
     /// The second stage, and whether what is left is held by a safe configuration.
-    fn take_all_back(&self, told: &mut Told) -> (Came, bool) {
+    fn take_all_back(&self, told: &mut Told) -> (Came, Held) {
         let deadline = self.clock().now() + self.deployment().shutdown.within;
         let Some(down) = self.stage_of(self.configurator().take_back(deadline), deadline) else {
-            told.notes.push("the configurator did not answer".to_owned());
-            return (Came::Left("the configurator did not answer".to_owned()), false);
+            told.notes.push(Unanswered.to_string());
+            return (Came::Left(Unanswered.to_string()), self.is_held());
         };
         let popped = down.popped.iter().map(|id| format!("`{id}` undone"));
         let mut notes: Vec<String> = popped.collect();
@@ -189,7 +215,7 @@ impl Session {
         notes.extend(down.kept.iter().map(|id| format!("`{id}` not undone")));
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
-        let held = down.still;
+        let held = Held::of(down.still);
         if self.is_hurried() {
             return (Came::Hurried, held);
         }
@@ -203,6 +229,7 @@ impl Session {
         }
         let left = super::life::leftovers(&down.left, &[]);
         let what = match left.len() {
+            0 if down.quarantined.is_empty() => UNSEEN.to_owned(),
             0 => "a call has not returned".to_owned(),
             1 => format!("{} is left", left[0]),
             more => format!("{more} things are left"),
@@ -211,7 +238,7 @@ impl Session {
     }
 
     /// The third stage.
-    fn force_all(&self, told: &mut Told) -> (Came, bool) {
+    fn force_all(&self, told: &mut Told) -> (Came, Held) {
         // What brings it to rest takes nothing of the time in which everything is removed.
         let rest = |(id, _): &(ConfigId, Origin)| self.deployment().configuration(*id).and_then(|c| c.timeout);
         let step = self.deployment().limits.step_timeout;
@@ -219,8 +246,8 @@ impl Session {
         let within = self.deployment().shutdown.within + rest;
         let deadline = self.clock().now() + within;
         let Some(mut down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
-            told.notes.push("the configurator did not answer".to_owned());
-            return (Came::Left("the configurator did not answer".to_owned()), false);
+            told.notes.push(Unanswered.to_string());
+            return (Came::Left(Unanswered.to_string()), Held::No);
         };
         // Nobody is there who could ask once more.
         if down.still && !self.attended.load(Ordering::Relaxed) {
@@ -235,8 +262,8 @@ impl Session {
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
         match down.is_clean() {
-            true => (Came::Empty, false),
-            false => (Came::Left("something is left".to_owned()), down.still),
+            true => (Came::Empty, Held::No),
+            false => (Came::Left("something is left".to_owned()), Held::of(down.still)),
         }
     }
 
@@ -257,17 +284,41 @@ impl Session {
     }
 
     /// Whether a safe configuration is in force that came since then, and somebody is there to decide how to go on.
-    pub(super) fn waits_for_people(&self, began: Time) -> bool {
-        let attended = self.attended.load(Ordering::Relaxed);
-        attended && self.frames().iter().any(|frame| frame.at >= began && self.is_safe(frame.configuration))
+    pub(super) fn waits_for_people(&self, began: Time) -> Result<bool, Unanswered> {
+        if !self.attended.load(Ordering::Relaxed) || !self.has_safe() {
+            return Ok(false);
+        }
+        Ok(self.frames()?.iter().any(|frame| frame.at >= began && self.is_safe(frame.configuration)))
+    }
+
+    /// Whether something safe could be in force at all.
+    fn has_safe(&self) -> bool {
+        self.deployment().configurations.iter().any(|c| c.safe)
+    }
+
+    /// Whether what is left is held by a safe configuration, where the configurator has not said so.
+    fn is_held(&self) -> Held {
+        match self.frames() {
+            _ if !self.has_safe() => Held::No,
+            Ok(frames) => Held::of(frames.iter().any(|frame| self.is_safe(frame.configuration))),
+            Err(Unanswered) => Held::NotKnown,
+        }
     }
 
     /// The first stage stands still where a safe configuration is in force that was asked for since stopping began, and somebody
     /// is there to decide how to go on.
-    pub(super) fn stands_still(&self) -> Option<StandsStill> {
-        let frames = if self.attended.load(Ordering::Relaxed) { self.frames() } else { Vec::new() };
+    fn stands_still(&self) -> Result<Option<StandsStill>, Unanswered> {
+        if !self.has_safe() {
+            return Ok(None);
+        }
+        Ok(self.held_by(&self.frames()?))
+    }
+
+    /// The same with these frames in force.
+    pub(super) fn held_by(&self, frames: &[FrameView]) -> Option<StandsStill> {
+        let people = self.attended.load(Ordering::Relaxed) && self.hub().halt().is_led();
         let holds = |frame: &&FrameView| frame.since_stopping && self.is_safe(frame.configuration);
-        let frame = frames.iter().find(holds).filter(|_| self.hub().halt().is_led())?;
+        let frame = frames.iter().find(holds).filter(|_| people)?;
         let force = "`davit shutdown --force` takes everything away by force";
         let shutdown = self.deployment().shutdown.event;
         let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| self.hears(*event));

@@ -3,7 +3,7 @@
 use super::Command;
 use super::halt::StoppingView;
 use super::hub::Hub;
-use super::life::{Ended, leftovers};
+use super::life::{Ended, UNSEEN, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
 use super::parts::{Part, between};
 use super::recovery::Difference;
@@ -39,6 +39,11 @@ pub struct Setup {
     /// Its time.
     pub clock: Clock,
 }
+
+/// The configurator has not answered in time: nobody knows how system and stack stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the configurator has not answered in time")]
+pub struct Unanswered;
 
 /// One deployment alive.
 ///
@@ -240,8 +245,8 @@ impl Session {
     }
 
     /// The frames in force, oldest first.
-    pub(super) fn frames(&self) -> Vec<crate::configurator::FrameView> {
-        self.view(false).map(|view| view.stack.clone()).unwrap_or_default()
+    pub(super) fn frames(&self) -> Result<Vec<crate::configurator::FrameView>, Unanswered> {
+        Ok(self.view(false)?.map_or_else(Vec::new, |view| view.stack.clone()))
     }
 
     /// Whether nothing is asked for, and no coordinator has anything to react to.
@@ -266,23 +271,30 @@ impl Session {
         self.hub.wake();
     }
 
-    fn view(&self, system: bool) -> Option<Arc<View>> {
-        self.configurator.view(system, self.clock.now() + limits::VIEW)
+    /// How things stand; none once it is down: nothing is there, and nobody who would answer.
+    fn view(&self, system: bool) -> Result<Option<Arc<View>>, Unanswered> {
+        match self.configurator.view(system, self.clock.now() + limits::VIEW) {
+            None if self.hub.phase() != Phase::Down => Err(Unanswered),
+            view => Ok(view),
+        }
     }
 
-    /// The system as the configurator knows it; empty when the configurator has ended.
-    pub fn system(&self) -> Snapshot {
-        self.view(true).and_then(|view| view.system.as_deref().cloned()).unwrap_or_default()
+    /// The system as the configurator knows it.
+    ///
+    /// # Errors
+    /// It has not answered in time.
+    pub fn system(&self) -> Result<Snapshot, Unanswered> {
+        Ok(self.view(true)?.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default())
     }
 
     /// How everything stands.
     pub fn status(&self) -> StatusView {
-        let view = self.view(true);
-        let stack = view.iter().flat_map(|v| &v.stack).map(FrameView::of).collect();
-        let broken = view.as_ref().and_then(|v| v.broken.as_deref());
-        let residual = view.as_deref().map(Difference::of_view).unwrap_or_default();
+        let known = self.view(true).ok();
+        let view = known.as_ref().map(Option::as_deref);
+        let frames = view.map(|view| view.map_or(&[][..], |view| &view.stack));
+        let broken = view.flatten().is_some_and(|view| view.broken.is_some());
         let phase = match self.hub.phase() {
-            Phase::Up | Phase::Deploying if broken.is_some() => Phase::Broken,
+            Phase::Up | Phase::Deploying if broken => Phase::Broken,
             phase => phase,
         };
         StatusView {
@@ -290,16 +302,16 @@ impl Session {
             phase,
             coordinator: self.parts[0].coordinator.active(),
             coordinators: self.active(),
-            system: view.and_then(|v| v.system.as_deref().cloned()).unwrap_or_default(),
-            stack,
-            residual,
+            system: view.map(|view| view.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default()),
+            stack: frames.map(|frames| frames.iter().map(FrameView::of).collect()),
+            residual: view.map(|view| view.map_or_else(Vec::new, Difference::of_view)),
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
             stopping: self
                 .hub
                 .halt()
                 .view(self.hub.outstanding())
-                .map(|view| StoppingView { stands_still: self.stands_still(), ..view }),
+                .map(|view| StoppingView { stands_still: frames.and_then(|frames| self.held_by(frames)), ..view }),
             slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
@@ -340,8 +352,9 @@ impl Session {
 
     /// Follows the configurator into *broken* and back.
     pub(super) fn refresh_phase(&self) {
-        let broken = self.view(false).is_some_and(|view| view.broken.is_some());
-        match (self.hub.phase(), broken) {
+        // Not known: as it was.
+        let Ok(view) = self.view(false) else { return };
+        match (self.hub.phase(), view.is_some_and(|view| view.broken.is_some())) {
             (Phase::Up, true) => self.hub.set_phase(Phase::Broken),
             (Phase::Broken, false) => self.hub.set_phase(Phase::Up),
             _ => {}
@@ -387,12 +400,14 @@ impl Session {
         self.parts.iter().for_each(|part| part.coordinator.detach());
     }
 
-    /// What is left, as the platform sees it; as the configurator knows it where the platform does not answer.
+    /// What is left, as the platform sees it. Where it does not answer: as the configurator knows it, and that more may be.
     pub(super) fn left_over(&self) -> Vec<String> {
         let deadline = self.clock.now() + limits::VIEW;
-        let system = self.platform.observe(deadline).unwrap_or_else(|_| self.system());
+        let seen = self.platform.observe(deadline).ok();
+        let unseen = seen.is_none().then(|| UNSEEN.to_owned());
+        let system = seen.or_else(|| self.system().ok()).unwrap_or_default();
         let quarantined: Vec<String> = self.platform.quarantined().iter().map(ToString::to_string).collect();
-        leftovers(&system, &quarantined)
+        leftovers(&system, &quarantined).into_iter().chain(unseen).collect()
     }
 
     pub(super) fn stop_threads(&self) {

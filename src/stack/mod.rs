@@ -7,7 +7,7 @@
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
 //!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
-//! * `share`: what keeps a frame from being undone. `squash`: the bound. `net`: fewer steps to the same system.
+//! * `share`: what keeps a frame from being undone. `squash`: the bound. `stands`: when what a configuration stands for is watched no more. `net`: fewer steps to the same system.
 
 pub mod answer;
 mod batch;
@@ -23,6 +23,7 @@ pub mod request;
 mod settle;
 mod share;
 mod squash;
+mod stands;
 #[cfg(test)]
 mod tests;
 mod work;
@@ -38,6 +39,7 @@ pub use prepared::{Resolved, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
+pub use stands::{is_stood_down, running_for};
 pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, Seen, World};
 

@@ -65,6 +65,34 @@ fn what_is_lost_is_heard_wherever_it_may_be_in_force() {
     assert!(heard.of("coord::lost_unheard").is_empty(), "{:#}", heard.0);
 }
 
+/// What somebody has stopped since is watched no more, as long as it is in force: there is nothing to hear of it.
+#[test]
+fn what_was_stopped_since_is_not_lost() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" }, holds = in_state(\"a\", \"running\") },
+        rest = Configuration { post_conf_state = { \"a:stopped\" } },
+        tune = Configuration { property_set(\"a.gain\", 2.0) },";
+    let said = |other: &str| {
+        let heard: String = ["up", "building", "leaving", "failed"]
+            .iter()
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"failed\", events = {{ \"base.lost\" }} }},"))
+            .collect();
+        let more = format!(
+            "resting = state {{ entry = \"{other}\" }}, rested = state {{}},
+             trans {{ src = \"up\", tgt = \"resting\", events = {{ \"e_rest\" }} }},
+             trans {{ src = \"resting\", tgt = \"rested\", events = {{ \"{other}.ok\" }} }},
+             trans {{ src = \"resting\", tgt = \"failed\", events = {{ \"{other}.failed\", \"{other}.broken\" }} }},
+             trans {{ src = \"resting\", tgt = \"leaving\", events = {{ \"e_shutdown\", \"base.lost\" }}, effect = \"{other}.undo\" }},
+             trans {{ src = \"rested\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"{other}.undo\" }},"
+        );
+        Small::new(configurations, &format!("{STATES}{more}{heard}"), "").check()
+    };
+    let rests = said("rest");
+    assert!(rests.of("coord::lost_unheard").is_empty(), "{:#}", rests.0);
+    let tunes = said("tune");
+    let found = tunes.of("coord::lost_unheard");
+    assert!(found.len() == 1 && found[0].to_string().contains("root.rested"), "{:#}", tunes.0);
+}
+
 /// A platform that is found to differ is a loss too: where it is listened to, it is followed.
 #[test]
 fn what_is_found_to_differ_is_followed_where_it_is_heard() {

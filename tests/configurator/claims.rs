@@ -102,7 +102,7 @@ fn what_is_carried_out_at_the_same_time_ends_as_one_after_the_other() {
         together.platform.set_delays(Delays { of: slow, ..Delays::default() });
         for one in &all {
             together.wait(one.after as f64 / 1000.0);
-            if together.view().busy.is_some() {
+            if together.submitted.lock().unwrap().len() > together.answers.lock().unwrap().len() {
                 overlapped.fetch_add(1, Ordering::Relaxed);
             }
             together.submit_as(&one.words.join(" "), requester(one.by)).unwrap();

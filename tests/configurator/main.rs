@@ -11,6 +11,7 @@ mod repair;
 mod rig;
 mod safe;
 mod safe_ends;
+mod stuck;
 mod survival;
 mod table;
 mod teardown;

@@ -201,6 +201,23 @@ fn what_a_safe_configuration_wants_of_what_is_broken_stays_while_it_is_in_force(
     bench.rig.in_step();
 }
 
+/// While it is looked it is not whole yet, and who asks is told so.
+#[test]
+fn what_is_being_repaired_is_broken_until_it_is_not() {
+    let bench = Bench::new();
+    bench.tamper(&[set("A.k", 5.0)]);
+    let told = Arc::new(Mutex::new(None));
+    let (handle, clock, seen) = (bench.rig.handle.clone(), bench.rig.clock.clone(), told.clone());
+    *bench.meanwhile.lock().unwrap() = Some(Box::new(move || {
+        let view = handle.view(false, clock.now() + Duration::from_secs(5)).expect("a view");
+        *seen.lock().unwrap() = Some((view.broken.is_some(), view.residuals.len()));
+    }));
+    assert_eq!(bench.recover(), Ok(()));
+    assert_eq!(*told.lock().unwrap(), Some((true, 1)));
+    assert!(bench.rig.view().broken.is_none());
+    bench.rig.in_step();
+}
+
 /// What it demands of a run state, too: then who recovers is told, and what is undone goes straight to where that leads.
 #[test]
 fn what_a_safe_configuration_demands_of_what_is_broken_is_not_mended() {

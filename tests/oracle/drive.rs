@@ -291,8 +291,8 @@ impl Case<'_> {
         };
         Shown {
             leaves: self.names.iter().map(leaf).collect(),
-            system: status.system,
-            frames: status.stack.iter().map(|f| (f.configuration.clone(), f.by.clone(), f.parts)).collect(),
+            system: status.system.expect("the configurator answers"),
+            frames: status.stack.iter().flatten().map(|f| (f.configuration.clone(), f.by.clone(), f.parts)).collect(),
             open: status.outstanding,
         }
     }

@@ -79,7 +79,7 @@ fn when_the_undo_fails_what_went_with_it_is_as_before() {
     let seen = Arc::new(Mutex::new(None));
     let told = seen.clone();
     small.after(3.0, move |session| {
-        *told.lock().unwrap() = Some((Small::in_force(session), format!("{:?}", session.system().components)));
+        *told.lock().unwrap() = Some((Small::in_force(session), format!("{:?}", session.system().unwrap().components)));
     });
     let (ended, _) = small.stop();
     let (frames, system) = seen.lock().unwrap().take().unwrap();
@@ -100,7 +100,7 @@ fn what_went_with_an_undo_that_broke_is_gone_and_the_rest_of_the_undo_is_left() 
     let seen = Arc::new(Mutex::new(None));
     let told = seen.clone();
     small.after(3.0, move |session| {
-        *told.lock().unwrap() = Some((Small::in_force(session), format!("{:?}", session.system().components)));
+        *told.lock().unwrap() = Some((Small::in_force(session), format!("{:?}", session.system().unwrap().components)));
     });
     let (ended, _) = small.stop();
     let (frames, system) = seen.lock().unwrap().take().unwrap();

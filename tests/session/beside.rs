@@ -101,7 +101,7 @@ impl Run {
 
     /// `CONFIGURATION by REQUESTER`, in no order.
     fn frames(&self) -> BTreeSet<String> {
-        let stack = self.session.status().stack;
+        let stack = self.session.status().stack.unwrap();
         assert!(stack.iter().all(|frame| frame.parts == 1));
         let set: BTreeSet<String> = stack.iter().map(|f| format!("{} by {}", f.configuration, f.by)).collect();
         assert_eq!(set.len(), stack.len(), "no frame twice");
@@ -181,7 +181,10 @@ fn a_conflict_is_refused_and_names_the_others_frame() {
             "{refused:?}"
         );
         assert!(run.frames().contains("gripper_high by gripper"));
-        assert!(run.session.system().components.keys().any(|name| name.as_str() == "armDrive"), "nothing is broken");
+        assert!(
+            run.session.system().unwrap().components.keys().any(|name| name.as_str() == "armDrive"),
+            "nothing is broken"
+        );
     });
 }
 

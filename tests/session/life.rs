@@ -52,7 +52,7 @@ fn up_and_down(file: &str) -> Vec<String> {
     let heard = record(&session);
     session.bring_up().unwrap();
     assert_eq!(session.status().phase, Phase::Up);
-    assert!(!session.system().is_empty());
+    assert!(!session.system().unwrap().is_empty());
     let ended = session.take_down(false);
     assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");
     assert!(session.platform().observe(clock.now() + Duration::from_secs(1)).unwrap().is_empty());
@@ -290,8 +290,8 @@ fn an_operator_pushes_and_undoes() {
     let _me = clock.enter();
     let session = app::start(&checked("deployments/youbot_arm.yaml"), &clock).unwrap();
     session.bring_up().unwrap();
-    let before = session.system();
-    let frames = session.status().stack.len();
+    let before = session.system().unwrap();
+    let frames = session.status().stack.unwrap().len();
     let soft = session.configurations().into_iter().find(|c| c.as_str() == "profile_soft").unwrap();
     let wait = |request| {
         let deadline = clock.now() + Duration::from_secs(1);
@@ -301,10 +301,10 @@ fn an_operator_pushes_and_undoes() {
         session.hub().answer(request).unwrap()
     };
     assert_eq!(wait(session.request(davit::model::Ask::Apply(soft), "operator", true)).answer, "profile_soft.ok");
-    assert_ne!(session.system(), before);
+    assert_ne!(session.system().unwrap(), before);
     assert_eq!(wait(session.request(davit::model::Ask::Undo, "operator", false)).answer, "undo.done");
-    assert_eq!(session.system(), before);
-    assert_eq!(session.status().stack.len(), frames);
+    assert_eq!(session.system().unwrap(), before);
+    assert_eq!(session.status().stack.unwrap().len(), frames);
     assert!(session.take_down(false).is_clean());
     clock.shutdown();
 }
@@ -343,7 +343,7 @@ fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
     let service = SessionService::new(Arc::downgrade(&session));
     service.call(1, "apply", &json!({"configuration": "run", "force": true})).unwrap();
     clock.sleep(Duration::from_secs(1));
-    let frames = session.status().stack.len();
+    let frames = session.status().stack.unwrap().len();
     for (method, params, near) in [
         ("apply", json!({"configuration": "run", "wiat": true}), "did you mean `wait`?"),
         ("undo", json!({"configuraton": "run"}), "did you mean `configuration`?"),
@@ -356,8 +356,8 @@ fn a_parameter_that_a_method_does_not_have_is_refused_and_nothing_is_done() {
         assert!(error.data["help"].as_str().unwrap_or_default().contains(near), "{method}: {error:?}");
     }
     clock.sleep(Duration::from_secs(1));
-    assert_eq!(session.status().stack.len(), frames);
+    assert_eq!(session.status().stack.unwrap().len(), frames);
     service.call(1, "undo", &json!({"configuration": "run", "force": null})).unwrap();
     clock.sleep(Duration::from_secs(1));
-    assert_eq!(session.status().stack.len(), frames - 1);
+    assert_eq!(session.status().stack.unwrap().len(), frames - 1);
 }

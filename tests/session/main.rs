@@ -14,3 +14,4 @@ mod socket;
 mod stands;
 mod stopping;
 mod tap;
+mod unanswered;

@@ -88,6 +88,11 @@ pub struct Small {
 impl Small {
     /// Raising and lowering take 2 s each.
     pub fn new(leading: &str, faults: Vec<FaultRule>) -> Self {
+        Self::on(leading, faults, |platform| Arc::new(platform))
+    }
+
+    /// The same with something between it and its platform.
+    pub fn on(leading: &str, faults: Vec<FaultRule>, wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let coordinator = coordinator(leading);
         for (name, text) in
@@ -106,7 +111,7 @@ impl Small {
         let options = Options { faults: Faults::new(faults), delays, blocking: true, ..Options::default() };
         let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
         platform.record();
-        let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
+        let session = app::start_on(&checked, wrap(platform.clone()), &clock);
         let heard = Arc::new(Mutex::new(Vec::new()));
         let log = heard.clone();
         session.hub().observe(Arc::new(move |_, what| {
@@ -185,6 +190,7 @@ impl Small {
         session
             .status()
             .stack
+            .unwrap()
             .iter()
             .map(|frame| format!("{}{}", frame.configuration, ["", " partial"][usize::from(frame.partial)]))
             .collect()
@@ -303,7 +309,7 @@ fn what_is_held_waits_for_force_and_is_not_moved() {
     small.after(100.0, |session| {
         let view = session.status().stopping.expect("it is being stopped");
         assert!(view.held && view.stage == Stage::TakenBack, "{view:?}");
-        assert_eq!(session.system().components.values().next().unwrap().state, RunState::Running);
+        assert_eq!(session.system().unwrap().components.values().next().unwrap().state, RunState::Running);
         force(session);
     });
     let (ended, took) = small.stop();

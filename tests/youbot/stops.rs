@@ -211,7 +211,7 @@ fn the_drives_hold_until_whoever_stopped_it_last_lets_go() {
         }
         let holds = |live: &Live| {
             let in_force =
-                live.session.status().stack.iter().filter(|f| f.configuration.as_str() == "safe_hold").count();
+                live.session.status().stack.unwrap().iter().filter(|f| f.configuration.as_str() == "safe_hold").count();
             (in_force, live.rows().iter().all(|row| row.mode != 6))
         };
         live.rows();

@@ -5,8 +5,13 @@ use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
 use mlua::{Lua, Value as LuaValue};
 
+/// The system, as far as anybody knows it.
+pub(super) fn system(host: &Shared) -> mlua::Result<Snapshot> {
+    session(host)?.system().map_err(|unanswered| error(unanswered.to_string()))
+}
+
 pub(super) fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<RunState>> {
-    let system = session(host)?.system();
+    let system = system(host)?;
     let state = ComponentName::new(name).ok().and_then(|n| system.components.get(&n)).map(|c| c.state);
     Ok(state)
 }
@@ -15,7 +20,7 @@ pub(super) fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Res
     match component_state(host, name)? {
         Some(state) if state.as_str() == wanted => Ok(()),
         Some(state) => Err(error(format!("`{name}` is {state}, not {wanted}"))),
-        None => Err(no_component(name, &session(host)?.system())),
+        None => Err(no_component(name, &system(host)?)),
     }
 }
 
@@ -35,7 +40,7 @@ fn no_component(name: &str, system: &Snapshot) -> mlua::Error {
 
 pub(super) fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
     let name = member(text)?;
-    let system = session(host)?.system();
+    let system = system(host)?;
     let component = component(&system, name.component)?;
     match component.properties.get(&name.member) {
         Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
@@ -54,7 +59,7 @@ pub(super) fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<Lua
 /// The value written on an in-port by a configuration; nil when never written.
 pub(super) fn port(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
     let name = member(text)?;
-    let system = session(host)?.system();
+    let system = system(host)?;
     if let Some(value) = system.ports.get(&name) {
         return values::to_lua(lua, &serde_json::to_value(value).expect("plain data"));
     }
