@@ -26,12 +26,12 @@ struct Told {
 impl Session {
     /// Takes the deployment down in its stages: the coordinator leads down; what is in force is taken back; force.
     /// With `force` the last of them at once. Where a safe configuration holds what is left, it waits for somebody to ask for
-    /// force, unless the session is [unattended](Self::unattended).
+    /// force; where the session is [unattended](Self::unattended), that is its end, and what is left stays.
     pub fn take_down(&self, force: bool) -> Ended {
         self.stop(force, false)
     }
 
-    /// Nobody is there who could ask for force: nothing waits for that.
+    /// Nobody is there who could ask for force, and nothing waits for that: what a safe configuration holds stays as it is.
     pub fn unattended(&self) {
         self.attended.store(false, Ordering::Relaxed);
     }
@@ -65,7 +65,7 @@ impl Session {
                     told.notes.push(why.clone());
                     (Came::Left(why), false)
                 });
-            let came_to = next(stage, &came, held && self.attended.load(Ordering::Relaxed));
+            let came_to = next(stage, &came, held);
             why = match came {
                 Came::Left(why) => Some(why),
                 Came::Hurried => Some("as asked for".to_owned()),
@@ -74,6 +74,14 @@ impl Session {
             match came_to {
                 Next::Over => break,
                 Next::Stage(next) => stage = next,
+                Next::Held if !self.attended.load(Ordering::Relaxed) => {
+                    let note = format!(
+                        "{}, and nobody is there to ask for force: what is left stays as it is",
+                        self.held_by()
+                    );
+                    self.note_all(vec![note], &mut told);
+                    break;
+                }
                 Next::Held => {
                     let note = "a safe configuration is in force: what is left stays as it is until a second signal or `--force`";
                     hub.note(Happening::Forced { note: note.to_owned() });
@@ -115,6 +123,12 @@ impl Session {
     /// Force is asked for, now or before.
     fn is_hurried(&self) -> bool {
         std::iter::from_fn(|| self.pending_command()).any(|Command::Shutdown { force }| force)
+    }
+
+    /// The safe configuration in force, in words.
+    fn held_by(&self) -> String {
+        let safe = self.frames().into_iter().map(|frame| frame.configuration).find(|id| self.is_safe(*id));
+        safe.map_or_else(|| "a safe configuration is in force".to_owned(), |id| format!("`{id}` is in force"))
     }
 
     fn wait_for_force(&self) {
@@ -218,15 +232,10 @@ impl Session {
         let rest: Duration = self.deployment().shutdown.rest.iter().map(|of| rest(of).unwrap_or(step).max(step)).sum();
         let within = self.deployment().shutdown.within + rest;
         let deadline = self.clock().now() + within;
-        let Some(mut down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
+        let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             told.notes.push("the configurator did not answer".to_owned());
             return (Came::Left("the configurator did not answer".to_owned()), false);
         };
-        // Nobody is there who could ask once more.
-        if down.still && !self.attended.load(Ordering::Relaxed) {
-            let deadline = self.clock().now() + within;
-            down = self.stage_of(self.configurator().force_down(deadline), deadline).unwrap_or(down);
-        }
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
         let applied = applied.chain(down.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
         let done = |id: &ConfigId| if down.partly.contains(id) { "applied as far as it went" } else { "applied" };

@@ -283,6 +283,9 @@ impl Session {
         let residual = view.as_deref().map(Difference::of_view).unwrap_or_default();
         let phase = match self.hub.phase() {
             Phase::Up | Phase::Deploying if broken.is_some() => Phase::Broken,
+            // Its coordinator leads down, whoever raised the event: nobody stops it for that.
+            Phase::Up if self.configurator().is_leaving() => Phase::ShuttingDown,
+            Phase::Up if self.is_down() => Phase::Down,
             phase => phase,
         };
         StatusView {
