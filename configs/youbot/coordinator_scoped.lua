@@ -9,7 +9,8 @@
 local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e_EC_TIMEOUT", "e_ENCODER_ERR",
                 "e_overspeed", "e_base_overspeed" }
 
--- What is told where the drives take torques and part of what commands or watches them has died.
+-- What is told where the drives take torques and part of what commands or watches them has died. Wherever they may, it stops the
+-- robot as well, but for where the very next thing asked of them is to hold by themselves; what lasts is told again.
 local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost" }
 
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
@@ -272,9 +273,14 @@ return state {
     trans { src = "initial", tgt = "parked" },
   },
 
-  -- The arm goes down before anything that holds it is stopped.
+  -- The arm goes down before anything that holds it is stopped. Once the drives hold by themselves nothing is lost with what commands
+  -- or watches them; nor is it on the way to that from a stop, or whatever has died would never let it go down.
   shutting_down = state {
-    quieting     = state { entry = "base_stop" },
+    quieting     = state { entry = "base_stop",
+      operated = state {},
+      released = state {},
+      trans { src = "initial", tgt = "operated" },
+    },
     holding      = state { entry = "hold" },
     parking      = state { entry = "park" },
     stopping     = state { entry = "stop_control" },
@@ -342,14 +348,16 @@ return state {
                      "five_DOF.undo.failed", "five_DOF.undo.broken" } },
   trans { src = "fault.resuming",           tgt = "operational",   events = { "resume.ok" } },
   trans { src = "fault.resuming",           tgt = "shutting_down", events = { "e_shutdown" } },
-  trans { src = "fault.releasing.leaving",  tgt = "shutting_down", events = { "safe_hold.undone" } },
+  trans { src = "fault.releasing.leaving",  tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
+  trans { src = "shutting_down.quieting.operated", tgt = "lowering", events = LOSSES },
   trans { src = "shutting_down.holding",      tgt = "lowering", events = STOPS },
   trans { src = "shutting_down.parking",      tgt = "lowering", events = STOPS },
   trans { src = "stranded.before_parking",    tgt = "lowering", events = STOPS },
+  trans { src = "stranded.before_parking",    tgt = "lowering", events = LOSSES },
   trans { src = "lowering.releasing.on",      tgt = "stranded.before_parking", events = { "safe_hold.undone" } },
-  trans { src = "lowering.releasing.leaving", tgt = "shutting_down",           events = { "safe_hold.undone" } },
+  trans { src = "lowering.releasing.leaving", tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
 
   trans { src = "shutting_down.stopping",     tgt = "resting.parked",  events = STOPS },
   trans { src = "shutting_down.powering_off", tgt = "resting.parked",  events = STOPS },
@@ -376,6 +384,9 @@ return state {
   trans { src = "deploy_failed",            tgt = "halted", events = STOPS },
   trans { src = "cancelling",               tgt = "halted", events = STOPS },
   trans { src = "cancel_failed",            tgt = "halted", events = STOPS },
+  trans { src = "deploying.taking_over",    tgt = "halted", events = LOSSES },
+  trans { src = "deploy_failed",            tgt = "halted", events = LOSSES },
+  trans { src = "cancel_failed",            tgt = "halted", events = LOSSES },
   trans { src = "halted.releasing.on",      tgt = "deploy_failed", events = { "safe_hold.undone" } },
   trans { src = "halted.releasing.leaving", tgt = "cancelling",    events = { "safe_hold.undone" } },
 

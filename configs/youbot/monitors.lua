@@ -78,9 +78,10 @@ Monitors {
   controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard",
     when = silent("Cart_Impedance.active", DEAD),
     event = "e_controller_lost", repeat_every = AGAIN },
-  control_lost = monitor { description = "another part of the control loop, which writes in every update, is not heard",
-    when = any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
-                 silent("Base_Ctrl.cmd_twist", DEAD) },
+  control_lost = monitor { description = "another part of the control loop, which writes in every update, is not heard by drives that take torques",
+    when = all { equals("youbot.control_mode", 6),
+                 any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
+                       silent("Base_Ctrl.cmd_twist", DEAD) } },
     event = "e_control_lost", repeat_every = AGAIN },
   -- Where the drives are meant to hold by themselves nobody listens.
   drives_let_go = monitor { description = "the drives do not take torques any more",

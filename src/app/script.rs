@@ -342,7 +342,7 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
         session.hub().attach(observer.clone());
     }
     interrupt(host).up(&session);
-    // There is no robot to be held, and nobody who is waited for.
+    // There is nobody who is waited for.
     if clock.is_simulated() {
         session.unattended();
     }

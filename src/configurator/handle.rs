@@ -205,6 +205,11 @@ impl ConfiguratorHandle {
         self.inner.post.leaving(leaving);
     }
 
+    /// Whether the event that ends the deployment was raised, and it is neither down nor brought up since.
+    pub fn is_leaving(&self) -> bool {
+        self.inner.post.is_leaving()
+    }
+
     /// The second stage of stopping: what is under way is given up, and frames are popped, newest first, as far as that goes.
     /// The answer comes out of the receiver.
     pub fn take_back(&self, deadline: Time) -> Receiver<TakenDown> {

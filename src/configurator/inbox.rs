@@ -185,6 +185,11 @@ impl Post {
         self.counts.leaving.store(leaving, Ordering::Release);
     }
 
+    /// Whether it is led down.
+    pub fn is_leaving(&self) -> bool {
+        self.counts.leaving.load(Ordering::Acquire)
+    }
+
     fn tell_leaving(&self) {
         let Counts { leaving, told, .. } = &*self.counts;
         let now = leaving.load(Ordering::Acquire);

@@ -56,8 +56,7 @@ pub fn first(force: bool, leads: bool) -> Stage {
     }
 }
 
-/// What follows a stage that ended so. `held`: a safe configuration is in force that nobody has let go, and somebody is
-/// there to decide about it.
+/// What follows a stage that ended so. `held`: a safe configuration is in force that nobody has let go.
 pub fn next(stage: Stage, came: &Came, held: bool) -> Next {
     match (stage, came) {
         (_, Came::Empty) => Next::Over,

@@ -41,12 +41,12 @@ struct Told {
 impl Session {
     /// Takes the deployment down in its stages: the coordinator leads down; what is in force is taken back; force.
     /// With `force` the last of them at once. Where a safe configuration holds what is left, it waits for somebody to ask for
-    /// force, unless the session is [unattended](Self::unattended).
+    /// force; where the session is [unattended](Self::unattended), that is its end, and what is left stays.
     pub fn take_down(&self, force: bool) -> Ended {
         self.stop(force, false)
     }
 
-    /// Nobody is there who could ask for force: nothing waits for that.
+    /// Nobody is there who could ask for force, and nothing waits for that: what a safe configuration holds stays as it is.
     pub fn unattended(&self) {
         self.attended.store(false, Ordering::Relaxed);
     }
@@ -80,7 +80,7 @@ impl Session {
                     told.notes.push(why.clone());
                     (Came::Left(why), Held::No)
                 });
-            let came_to = next(stage, &came, held != Held::No && self.attended.load(Ordering::Relaxed));
+            let came_to = next(stage, &came, held != Held::No);
             why = match came {
                 Came::Left(why) => Some(why),
                 Came::Hurried => Some("as asked for".to_owned()),
@@ -89,11 +89,14 @@ impl Session {
             match came_to {
                 Next::Over => break,
                 Next::Stage(next) => stage = next,
+                Next::Held if !self.attended.load(Ordering::Relaxed) => {
+                    let what = self.what_holds(held);
+                    let note = format!("{what}, and nobody is there to ask for force: what is left stays as it is");
+                    self.note_all(vec![note], &mut told);
+                    break;
+                }
                 Next::Held => {
-                    let what = match held {
-                        Held::NotKnown => "whether a safe configuration is in force is not known",
-                        _ => "a safe configuration is in force",
-                    };
+                    let what = self.what_holds(held);
                     let note = format!("{what}: what is left stays as it is until a second signal or `--force`");
                     hub.note(Happening::Forced { note });
                     hub.halt().hold(true);
@@ -134,6 +137,17 @@ impl Session {
     /// Force is asked for, now or before.
     fn is_hurried(&self) -> bool {
         std::iter::from_fn(|| self.pending_command()).any(|Command::Shutdown { force }| force)
+    }
+
+    /// Which safe configuration is in force, in words.
+    fn what_holds(&self, held: Held) -> String {
+        let frames = self.frames().unwrap_or_default();
+        let safe = frames.into_iter().map(|frame| frame.configuration).find(|id| self.is_safe(*id));
+        match (held, safe) {
+            (_, Some(id)) => format!("`{id}` is in force"),
+            (Held::NotKnown, None) => "whether a safe configuration is in force is not known".to_owned(),
+            (_, None) => "a safe configuration is in force".to_owned(),
+        }
     }
 
     fn wait_for_force(&self) {
@@ -245,15 +259,10 @@ impl Session {
         let rest: Duration = self.deployment().shutdown.rest.iter().map(|of| rest(of).unwrap_or(step).max(step)).sum();
         let within = self.deployment().shutdown.within + rest;
         let deadline = self.clock().now() + within;
-        let Some(mut down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
+        let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             told.notes.push(Unanswered.to_string());
             return (Came::Left(Unanswered.to_string()), Held::No);
         };
-        // Nobody is there who could ask once more.
-        if down.still && !self.attended.load(Ordering::Relaxed) {
-            let deadline = self.clock().now() + within;
-            down = self.stage_of(self.configurator().force_down(deadline), deadline).unwrap_or(down);
-        }
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
         let applied = applied.chain(down.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
         let done = |id: &ConfigId| if down.partly.contains(id) { "applied as far as it went" } else { "applied" };

@@ -295,6 +295,9 @@ impl Session {
         let broken = view.flatten().is_some_and(|view| view.broken.is_some());
         let phase = match self.hub.phase() {
             Phase::Up | Phase::Deploying if broken => Phase::Broken,
+            // Its coordinator leads down, whoever raised the event: nobody stops it for that.
+            Phase::Up if self.configurator().is_leaving() => Phase::ShuttingDown,
+            Phase::Up if self.is_down() => Phase::Down,
             phase => phase,
         };
         StatusView {

@@ -3,7 +3,7 @@
 //! What a safe configuration has called stays while it is in force, whoever else called the same: nothing takes it back.
 
 use super::{Frame, FrameId, Inverse};
-use crate::model::{Call, ComponentName, Finding, MemberRef, Step, codes};
+use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, MemberRef, Step, codes};
 use crate::plan::SavedValue;
 use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot, Touch};
 use crate::plan::undo::{Item, absolute, restoring};
@@ -24,6 +24,11 @@ impl HandOver {
     /// Values that these frames take over, with nothing undone for it.
     pub(super) fn to(takers: Vec<(FrameId, Slot, Saved)>) -> Self {
         Self { takers, ..Self::default() }
+    }
+
+    /// Nothing is sent for these either.
+    pub(super) fn keep(&mut self, slots: impl IntoIterator<Item = Slot>) {
+        self.slots.extend(slots);
     }
 
     /// The frames that take something over.
@@ -102,6 +107,17 @@ fn untouched(frame: &Frame, stay: &FxHashSet<Slot>) -> FxHashSet<Slot> {
     }
     also.iter().for_each(|slot| _ = only.remove(slot));
     only
+}
+
+/// The slots of a frame's calls that a safe configuration which replaces it makes as well: they would be taken back first, and what
+/// it makes safe be let go for a moment. Its own frame takes them back.
+pub(super) fn called_again<'f>(by: &'f Configuration, frame: &'f Frame) -> impl Iterator<Item = Slot> + 'f {
+    let calls_too = |operation: &MemberRef| {
+        by.changes.iter().any(
+            |change| matches!(&change.kind, ChangeKind::OperationCall { call, .. } if call.operation == *operation),
+        )
+    };
+    calls(frame).filter(move |operation| by.safe && calls_too(operation)).map(Slot::Operation)
 }
 
 /// Whether the frame at `at` may be popped.

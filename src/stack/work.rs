@@ -212,7 +212,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             Op::UndoTop => match self.frames.len().checked_sub(1) {
                 Some(top) => {
                     frame = Some(self.frames[top].clone());
-                    self.pop(top, &mut edits)?;
+                    self.pop(top, None, &mut edits)?;
                 }
                 None => {
                     return Err(Refusal::one(if self.stack.committed.is_empty() {
@@ -224,7 +224,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             },
             Op::UndoTo(left) => {
                 while self.frames.len() > *left {
-                    self.pop(self.frames.len() - 1, &mut edits)?;
+                    self.pop(self.frames.len() - 1, None, &mut edits)?;
                 }
             }
         }
@@ -261,13 +261,15 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             return Err(Refusal::one(finding.help("`davit stack` shows the frames")));
         };
         let frame = self.frames[at].clone();
-        self.pop(at, edits)?;
+        self.pop(at, None, edits)?;
         Ok(frame)
     }
 
-    fn pop(&mut self, at: usize, edits: &mut Edits) -> Result<(), Refusal> {
-        let hand = share::examine(&self.frames, at).map_err(|finding| Refusal::one(*finding))?;
+    /// `by`: the configuration that replaces it.
+    fn pop(&mut self, at: usize, by: Option<&Configuration>, edits: &mut Edits) -> Result<(), Refusal> {
+        let mut hand = share::examine(&self.frames, at).map_err(|finding| Refusal::one(*finding))?;
         let frame = self.frames[at].clone();
+        hand.keep(by.into_iter().flat_map(|by| share::called_again(by, &frame)));
         // What a safe configuration interrupted may have taken a component away from under it.
         self.script.leaves_out_gone = frame.safe;
         let taken_back = self.take_back(&frame, &hand);
@@ -376,7 +378,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                 return Err(refused(vec![cause], old.as_str()));
             }
             self.replaced = true;
-            return self.pop(at, edits).map_err(|refusal| refused(refusal.findings, old.as_str()));
+            return self.pop(at, Some(configuration), edits).map_err(|refusal| refused(refusal.findings, old.as_str()));
         }
         let buried = self.frames.iter().flat_map(|f| &f.parts).find(|p| p.group == Some(group));
         if let Some(part) = buried {

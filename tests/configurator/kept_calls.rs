@@ -192,3 +192,37 @@ fn a_squashed_frame_keeps_and_leaves_calls_as_its_parts() {
     rig.in_step();
     rig.each_answered_once();
 }
+
+/// A safe configuration that replaces its group's frame does not let go first of what it has called too: for a moment nothing would
+/// brake.
+#[test]
+fn replaced_by_a_safe_one_a_call_of_both_is_not_taken_back_before() {
+    let mut all = configurations();
+    for configuration in &mut all {
+        if ["hold", "still", "ease"].contains(&configuration.id.as_str()) {
+            configuration.group = Some(ident("stopped"));
+        }
+    }
+    let rig = Rig::new(all);
+    assert_eq!(rig.ask("make"), ["make.ok"]);
+    let before = rig.see();
+    rig.platform.record();
+    for (next, calls) in [
+        ("ease", [OPEN].as_slice()),
+        ("hold", &[OPEN]),
+        ("still", &[OPEN]),
+        ("still", &[OPEN]),
+        // What is not safe lets go of what it replaces, as ever.
+        ("ease", &[CLOSE, OPEN]),
+        ("hold", &[OPEN]),
+    ] {
+        assert_eq!(rig.ask(next), [format!("{next}.ok")]);
+        assert_eq!(called(&rig), calls, "{next}");
+    }
+    assert_eq!(rig.frames().len(), 2);
+    assert_eq!(rig.ask("hold.undo"), ["hold.undone"]);
+    assert_eq!(called(&rig), [CLOSE], "once, by the last one");
+    assert_eq!(rig.see(), before);
+    rig.in_step();
+    rig.each_answered_once();
+}

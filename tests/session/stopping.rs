@@ -8,7 +8,7 @@ use davit::platform::Platform;
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
 use davit::session::service::SessionService;
 use davit::session::socket::Service;
-use davit::session::{Command, Ended, Happening, Session, Stage, rpc};
+use davit::session::{Command, Ended, Happening, Phase, Session, Stage, rpc};
 use davit::time::{Clock, Guard};
 use serde_json::{Value as Json, json};
 use std::sync::{Arc, Mutex};
@@ -320,15 +320,20 @@ fn what_is_held_waits_for_force_and_is_not_moved() {
     small.is_empty();
 }
 
-/// Nobody is there to let go.
+/// Nobody is there to let go: what the safe configuration holds is not taken away, and nothing is commanded any more.
 #[test]
-fn what_nobody_attends_is_not_waited_for() {
+fn what_nobody_attends_is_not_waited_for_and_stays() {
     let small = Small::up("deaf");
     small.session.raise(event("e_estop"), "test");
     small.clock.sleep(Duration::from_secs(1));
     small.session.unattended();
+    small.steps();
     let (ended, took) = small.stop();
-    assert!(took < 8.0 && ended.stage == Stage::Forced && ended.is_clean(), "{took} {ended:?}");
+    assert!(took < 8.0 && ended.stage == Stage::TakenBack && !ended.is_clean(), "{took} {ended:?}");
+    let says = "`calm` is in force, and nobody is there to ask for force: what is left stays as it is";
+    assert!(ended.forced.iter().any(|note| note == says), "{ended:?}");
+    assert_eq!(small.steps(), Vec::<String>::new(), "nothing but what `calm` holds was there to be taken back");
+    assert_eq!(small.session.system().components.len(), 2);
 }
 
 /// An emergency while it is led down: its coordinator is not left out while what is safe is in force; shut down again, it is
@@ -363,6 +368,28 @@ fn after_an_emergency_on_the_way_down_the_time_begins_anew() {
         let (ended, took) = small.stop();
         assert!(ended.is_orderly() && (again + 4.5..again + 5.0).contains(&took), "{again}: {took} {ended:?}");
     }
+}
+
+/// The event that ends the deployment leads down whoever raises it, and that is what is seen, also where an emergency keeps it.
+#[test]
+fn an_event_that_leads_down_is_seen_as_that() {
+    let small = Small::up("easing");
+    let (seen, raise) = (|| small.session.status().phase, |name| small.session.raise(event(name), "test"));
+    let wait = |seconds| small.clock.sleep(Duration::from_secs(seconds));
+    assert_eq!(seen(), Phase::Up);
+    for name in ["e_stop", "e_estop"] {
+        raise(name);
+        wait(1);
+        assert_eq!(seen(), Phase::ShuttingDown, "after {name}");
+    }
+    assert!(small.heard("calm.ok"));
+    raise("e_stop");
+    wait(10);
+    assert_eq!(seen(), Phase::Down, "{:?}", small.heard.lock().unwrap());
+    small.is_empty();
+    raise("e_start");
+    wait(10);
+    assert_eq!(seen(), Phase::Up, "it is brought up anew");
 }
 
 /// An emergency while it comes up: late as it is then, nothing is lowered before somebody asks.

@@ -2,7 +2,7 @@
 
 use davit::lang::{LoadOptions, load};
 use davit::libraries::{builtin, monitors};
-use davit::model::{Catalogue, ConfigId, Deployment};
+use davit::model::{Catalogue, ConfigId, Deployment, EventName};
 use davit::plan::{Context, plan};
 use davit::system::System;
 use davit::system::step::apply;
@@ -136,25 +136,104 @@ fn every_state_hears_every_stop() {
     ];
     for name in DEPLOYMENTS {
         let (deployment, _) = deployment(name);
-        let model = &deployment.first_coordinator().chart;
-        let (chart, findings) = davit::statechart::compile(model);
-        let chart = chart.unwrap_or_else(|| panic!("{findings:?}"));
-        let parents: Vec<_> = chart.nodes().filter_map(|node| chart.parent(node)).collect();
-        let leaves = || chart.nodes().filter(|node| chart.is_state(*node) && !parents.contains(node));
-        let hears = |leaf, event| {
-            std::iter::successors(Some(leaf), |node| chart.parent(*node))
-                .any(|node| chart.outgoing(node).any(|edge| chart.may_trigger(edge, chart.event(event))))
-        };
-        let mut unheard = Vec::new();
-        for leaf in leaves() {
-            let place = chart.fqn(leaf).to_string();
-            let missed = deployment.safety.iter().filter(|(event, _)| !hears(leaf, *event));
-            unheard.extend(missed.map(|(event, _)| (place.clone(), *event)));
-        }
-        assert!(leaves().count() > 60 && !deployment.safety.is_empty());
-        unheard.retain(|(place, _)| !deaf.iter().any(|end| place.ends_with(end)));
+        assert!(!deployment.safety.is_empty());
+        let stops = deployment.safety.iter().map(|(event, _)| event.as_str());
+        let unheard = unheard(&deployment, stops, &deaf);
         assert!(unheard.is_empty(), "{name}: {unheard:?}");
     }
+}
+
+/// What has died is heard wherever the drives may take torques, which is everywhere but in the states below.
+#[test]
+fn every_state_with_torques_hears_every_loss() {
+    let losses = ["e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost"];
+    let deaf = [
+        // They are off, or hold by themselves.
+        "root.idle",
+        "deploying.creating_core",
+        "deploying.creating_link",
+        "deploying.creating_monitors",
+        "deploying.wiring",
+        "deploying.configuring",
+        "deploying.powering",
+        "deploying.calibrating",
+        "deploying.unfolding",
+        "deploying.starting",
+        "cancelling.stopping",
+        "cancelling.folding",
+        "cancelling.uncalibrating",
+        "cancelling.powering_down",
+        "cancelling.unconfiguring",
+        "cancelling.unwiring",
+        "cancelling.removing_monitors",
+        "cancelling.removing_link",
+        "cancelling.removing_core",
+        "shutting_down.parking",
+        "shutting_down.stopping",
+        "shutting_down.powering_off",
+        "shutting_down.cleaning",
+        "shutting_down.unwiring.",
+        "shutting_down.destroying.",
+        "root.resting.",
+        "stranded.parked",
+        "stranded.stopped",
+        "stranded.cleaned",
+        "stranded.unwired",
+        // They are told to brake, or brake.
+        ".braking.staying",
+        ".braking.leaving",
+        ".losing.on",
+        ".losing.staying",
+        ".losing.leaving",
+        ".waiting",
+        ".again",
+        ".ending.on",
+        ".ending.stopped",
+        "fault.clearing",
+        "fault.repairing",
+        // What is asked for now, or as soon as they are released, is that they hold or brake.
+        "cancelling.handing_back",
+        "quieting.released",
+        "shutting_down.holding",
+        ".releasing.leaving",
+        ".releasing.stopped",
+        ".releasing.stopped_leaving",
+        // Where they are released to, it is heard when it is told again; what is told once has them hold.
+        "halted.releasing.on",
+        "lowering.releasing.on",
+    ];
+    for name in DEPLOYMENTS {
+        let (deployment, _) = deployment(name);
+        let unheard = unheard(&deployment, losses, &deaf);
+        assert!(unheard.is_empty(), "{name}: {unheard:?}");
+    }
+}
+
+/// The leaf states that do not hear one of these events, but for those whose names end so, or contain a part between dots.
+fn unheard<'e>(
+    deployment: &Deployment,
+    events: impl IntoIterator<Item = &'e str>,
+    deaf: &[&str],
+) -> Vec<(String, &'e str)> {
+    let (chart, findings) = davit::statechart::compile(&deployment.first_coordinator().chart);
+    let chart = chart.unwrap_or_else(|| panic!("{findings:?}"));
+    let parents: Vec<_> = chart.nodes().filter_map(|node| chart.parent(node)).collect();
+    let leaves = || chart.nodes().filter(|node| chart.is_state(*node) && !parents.contains(node));
+    assert!(leaves().count() > 60);
+    let hears = |leaf, event| {
+        std::iter::successors(Some(leaf), |node| chart.parent(*node))
+            .any(|node| chart.outgoing(node).any(|edge| chart.may_trigger(edge, chart.event(event))))
+    };
+    let mut unheard = Vec::new();
+    for event in events {
+        let name = EventName::new(event).unwrap();
+        let missed = leaves().filter(|leaf| !hears(*leaf, name)).map(|leaf| (chart.fqn(leaf).to_string(), event));
+        unheard.extend(missed);
+    }
+    unheard.retain(|(place, _)| {
+        !deaf.iter().any(|end| place.ends_with(end) || (end.ends_with('.') && place.contains(end)))
+    });
+    unheard
 }
 
 /// The hypothesis of the paper: one coordinator, unchanged, over two platforms.

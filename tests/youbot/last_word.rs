@@ -114,3 +114,38 @@ fn a_stop_is_the_last_word() {
 fn a_stop_is_the_last_word_scoped() {
     last_words("youbot_arm_scoped");
 }
+
+/// Released on the way down, the drives take torques again, and nobody watches: it is stopped, however often it is released. The
+/// order to go down is followed all the same.
+fn unwatched_on_the_way_down(name: &str) {
+    let live = Live::with_hand(name, HAND);
+    live.bring_up();
+    live.until_state("copying", 5.0);
+    when_in(&live, "quieting.operated", "e_estop");
+    live.raise("e_shutdown");
+    stays(&live, "lowering.waiting", "a stop at the beginning of the way down");
+    live.raise("e_reset");
+    live.run(0.2);
+    assert!(live.place().ends_with("stranded.before_parking"), "{}", live.place());
+    assert_eq!(live.rows().last().unwrap().mode, 6, "they took torques, and are released");
+
+    let t = live.now();
+    monitors(&live, Transition::Stop);
+    stays(&live, "lowering.waiting", "nobody watches where it waits to go down");
+    let told = live.first("e_watch_lost", t).expect("it is told");
+    assert!(live.first("safe_hold.ok", t).is_some_and(|at| at - told < 0.01), "{}", live.story(t));
+    live.raise("e_reset");
+    live.run(1.0);
+    stays(&live, "lowering.waiting", "released once more");
+    live.raise("e_shutdown");
+    live.until_state("idle", 20.0);
+    assert_eq!(live.first("e_arm_dropped", 0.0), None);
+    live.clock.shutdown();
+}
+
+#[test]
+fn unwatched_it_is_stopped_on_the_way_down_too() {
+    for name in ["youbot_arm", "youbot_arm_scoped"] {
+        unwatched_on_the_way_down(name);
+    }
+}

@@ -7,7 +7,7 @@ use davit::libraries;
 use davit::libraries::youbot::components::samples::{JointState, Odometry, ToolPose, seconds_since};
 use davit::libraries::youbot::kinematics::Tool;
 use davit::libraries::youbot::rigid_body::{ArmModel, J5};
-use davit::model::{ComponentName, EventName, Ident, MemberRef, Step, Value};
+use davit::model::{Call, ComponentName, EventName, Ident, MemberRef, Step, Value};
 use davit::platform::Outcome;
 use davit::runtime::{Builder, Component, Context, In, Library, Prop};
 use davit::session::{Happening, Session};
@@ -184,6 +184,21 @@ impl Live {
         })
     }
 
+    /// The same, with other friction and other masses in its joints, as multiples of the nominal ones.
+    pub fn with_joints(name: &str, script: &str, friction: f64, mass: f64) -> Self {
+        let joints = format!(
+            "\nproperty_set(\"youbot.friction_scale\", {friction:?}), property_set(\"youbot.mass_scale\", {mass:?}),"
+        );
+        Self::with(name, |text| {
+            assert_eq!(text.matches(SHIPPED_HAND).count(), 1);
+            behind(
+                &text.replace(SHIPPED_HAND, script),
+                "this robot's own numbers, then everything configured\",",
+                &joints,
+            )
+        })
+    }
+
     /// Brought up.
     pub fn up(name: &str) -> Self {
         let live = Self::new(name);
@@ -266,11 +281,11 @@ impl Live {
         assert!(matches!(outcome, Outcome::Done(_)), "{step}: {outcome:?}");
     }
 
-    /// A fault of the driver. What it is told is taken back before anybody compares.
+    /// A fault of the driver.
     pub fn driver_fault(&self, fault: &str) {
-        self.set("youbot", "comm_fault", fault);
-        self.run(0.002);
-        self.set("youbot", "comm_fault", "none");
+        let operation =
+            MemberRef { component: ComponentName::new("youbot").unwrap(), member: Ident::new("inject_fault").unwrap() };
+        self.step(&Step::Operation(Call { operation, args: vec![fault.into()] }));
     }
 
     /// What the probe has seen since it was read last.

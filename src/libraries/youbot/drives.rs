@@ -1,7 +1,7 @@
 //! The youBot's drives as its driver sees them: control modes, limits, watchdogs, calibration, folding, braking.
 
 use super::base::Twist2;
-use super::handover::{Handover, slowed, within_speed};
+use super::handover::{Handover, ramped, slowed, within_speed};
 use super::parameters::{JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::{ArmPlant, BasePlant, joint_ranges};
 use super::rigid_body::{J5, radians};
@@ -49,7 +49,7 @@ pub enum Happening {
     SoftLimitExit,
     /// No torque command for too long: the drives hold the arm by themselves.
     CommandWatchdog,
-    /// No twist command for too long: the base stands.
+    /// No twist command for too long while torques are taken: the base stands.
     BaseWatchdog,
     /// A calibration ended.
     Calibrated,
@@ -126,6 +126,8 @@ pub struct Drives {
     /// Torques applied in the last update, in N m.
     pub torque: J5,
     handover: Handover,
+    /// Joint speeds in the last update, in rad/s.
+    last_speed: J5,
     /// Whether outward torque is reduced near the limits.
     pub limit_safety: bool,
     mode: Mode,
@@ -151,6 +153,7 @@ impl Drives {
             parameters: DriveParameters::default(),
             torque: J5::zeros(),
             handover: Handover::default(),
+            last_speed: J5::zeros(),
             limit_safety: true,
             mode: Mode::MotorStop,
             resumes: false,
@@ -313,11 +316,11 @@ impl Drives {
         let command = match twist {
             // The base is heard while torques are: whoever stops the arm stops the base.
             Some((twist, age)) if age <= self.parameters.base_timeout => {
-                self.base_watched = true;
-                if self.mode == Mode::Torque { twist } else { Twist2::default() }
+                self.base_watched = self.mode == Mode::Torque;
+                if self.base_watched { twist } else { Twist2::default() }
             }
             _ => {
-                if std::mem::take(&mut self.base_watched) {
+                if std::mem::take(&mut self.base_watched) && self.mode == Mode::Torque {
                     report(Happening::BaseWatchdog);
                 }
                 Twist2::default()
@@ -334,15 +337,17 @@ impl Drives {
         };
         torque = self.handover.over(&torque, &self.torque, dt);
         if self.mode == Mode::Torque {
-            torque = within_speed(&torque, &self.arm.qd, &self.parameters.tau_max);
+            let gained = (self.arm.qd - self.last_speed) / dt;
+            torque = within_speed(&torque, &self.arm.qd, &gained, &self.parameters.tau_max);
         }
         for i in 0..JOINTS {
             torque[i] = torque[i].clamp(-self.parameters.tau_max[i], self.parameters.tau_max[i]);
         }
-        self.torque = torque;
+        self.last_speed = self.arm.qd;
+        self.torque = ramped(&self.torque, &torque, dt);
         // Windings are shorted when no torque is left.
         let braked = self.mode == Mode::MotorStop && self.torque == J5::zeros();
-        advance(&mut self.arm, &mut self.base, &torque, command, push, braked, dt);
+        advance(&mut self.arm, &mut self.base, &self.torque, command, push, braked, dt);
         self.watch_limits(report);
     }
 

@@ -6,15 +6,26 @@ use super::rigid_body::J5;
 
 /// How fast the torque that a switch leaves behind fades, in N m/s: 0.2 N m in an update of 1 ms.
 pub const TORQUE_SLEW: f64 = 200.0;
+/// How fast any torque of the drives changes, whatever asks for it, in N m/s: less than half a newton metre in an update of 1 ms.
+const TORQUE_RATE: f64 = 450.0;
 /// Deceleration of a quick stop, in rad/s²: from the drives' highest speed in a sixth of a second. With the speed gain of the
 /// position controllers it asks for at most 0.24 N m more in each millisecond.
 pub const QUICK_STOP: f64 = 10.0;
 /// Speed from which torque that drives a joint on is taken away, in rad/s; at [`SPEED_LIMIT`] all of `tau_max` brakes.
 const SPEED_GUARD: f64 = 1.4;
 
+/// How far ahead it is looked whether a joint gets too fast, in s.
+const FORESIGHT: f64 = 0.005;
+
 /// `value` nearer to zero by at most `most` in each element.
 pub fn towards_zero(value: &J5, most: f64) -> J5 {
     value.map(|v| v - v.clamp(-most, most))
+}
+
+/// From the torque `before` towards `wanted`, no faster than [`TORQUE_RATE`].
+pub fn ramped(before: &J5, wanted: &J5, dt: f64) -> J5 {
+    let most = TORQUE_RATE * dt;
+    before + (wanted - before).map(|step| step.clamp(-most, most))
 }
 
 /// The speed of a quick stop, `dt` seconds after it was `speed`.
@@ -45,12 +56,14 @@ impl Handover {
     }
 }
 
-/// `torque` with what would drive a joint above [`SPEED_LIMIT`] taken away, and braking there with all of `most`. A push that
-/// is stronger than the drives still can.
-pub fn within_speed(torque: &J5, speed: &J5, most: &J5) -> J5 {
+/// `torque` with what would drive a joint above [`SPEED_LIMIT`] taken away, and braking there with all of `most`. Torque comes by
+/// a ramp: what counts is the speed that it will have [`FORESIGHT`] later, if it goes on `gaining` (rad/s²). A push that is
+/// stronger than the drives still can.
+pub fn within_speed(torque: &J5, speed: &J5, gaining: &J5, most: &J5) -> J5 {
     let mut out = *torque;
     for i in 0..JOINTS {
-        let beyond = ((speed[i].abs() - SPEED_GUARD) / (SPEED_LIMIT - SPEED_GUARD)).clamp(0.0, 1.0);
+        let gained = (speed[i].signum() * gaining[i]).max(0.0) * FORESIGHT;
+        let beyond = ((speed[i].abs() + gained - SPEED_GUARD) / (SPEED_LIMIT - SPEED_GUARD)).clamp(0.0, 1.0);
         out[i] += (-speed[i].signum() * most[i] - out[i]) * beyond;
     }
     out
@@ -90,8 +103,22 @@ mod tests {
     fn only_what_is_too_fast_is_held_back() {
         let most = J5::repeat(10.0);
         let torque = J5::repeat(10.0);
-        assert_eq!(within_speed(&torque, &J5::repeat(1.39), &most), torque);
-        assert_eq!(within_speed(&torque, &J5::repeat(SPEED_LIMIT), &most), -torque);
-        assert_eq!(within_speed(&torque, &J5::repeat(-2.0), &most), torque, "it brakes already");
+        assert_eq!(within_speed(&torque, &J5::repeat(1.39), &J5::zeros(), &most), torque);
+        assert_eq!(within_speed(&torque, &J5::repeat(SPEED_LIMIT), &J5::zeros(), &most), -torque);
+        assert_eq!(within_speed(&torque, &J5::repeat(-2.0), &J5::zeros(), &most), torque, "it brakes already");
+        let soon = within_speed(&torque, &J5::repeat(1.39), &J5::repeat(30.0), &most);
+        assert!(soon.amax() < 10.0, "it will be too fast: {soon}");
+        assert_eq!(within_speed(&torque, &J5::repeat(1.39), &J5::repeat(-30.0), &most), torque, "it is slowed already");
+    }
+
+    #[test]
+    fn no_torque_comes_or_goes_at_once() {
+        let (mut torque, wanted) = (J5::zeros(), J5::from([10.0, -13.0, 0.3, 0.0, 1.0]));
+        for _ in 0..30 {
+            let next = ramped(&torque, &wanted, DT);
+            assert!((next - torque).amax() < 0.5, "{torque} {next}");
+            torque = next;
+        }
+        assert_eq!(torque, wanted);
     }
 }

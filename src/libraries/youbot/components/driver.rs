@@ -128,6 +128,14 @@ impl Component for Driver {
             .undone_by("unfold")
             .moves()
             .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
+        b.doc(
+            "Has a fault happen once, by its name in comm_fault: as the world does it, with nothing written that would be a difference.",
+        )
+        .no_effect()
+        .operation("inject_fault", |c, _, (fault,): (String,)| match c.fail(&fault) {
+            true => Answer::Done(()),
+            false => Answer::failed(format!("no fault `{fault}`")),
+        });
         b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
             c.motors.error_flags = 0;
             Answer::Done(())
@@ -266,7 +274,10 @@ impl Component for Driver {
             scale_end: self.scale_end.get(),
         };
         self.drives.arm.friction_scale = self.friction_scale.get();
-        self.inject();
+        if self.comm_fault.changed() {
+            let wanted = self.comm_fault.get_ref().clone();
+            self.fail(&wanted);
+        }
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
         // Nobody pushes on after the hand is gone.
@@ -330,19 +341,15 @@ impl Driver {
         }
     }
 
-    /// Faults that the property asks for.
-    fn inject(&mut self) {
-        if !self.comm_fault.changed() {
-            return;
-        }
-        let wanted = self.comm_fault.get_ref();
-        if let Some(i) = FAULTS.iter().position(|(name, ..)| name == wanted) {
-            self.motors.error_flags |= FAULTS[i].2;
-            self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
-            // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
-            self.drives.hold();
-            self.events.raise(self.names.faults[i]);
-        }
+    /// A fault of that name happens; false: there is none.
+    fn fail(&mut self, wanted: &str) -> bool {
+        let Some(i) = FAULTS.iter().position(|(name, ..)| *name == wanted) else { return false };
+        self.motors.error_flags |= FAULTS[i].2;
+        self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
+        // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
+        self.drives.hold();
+        self.events.raise(self.names.faults[i]);
+        true
     }
 
     fn publish(&mut self, cx: &Context) {
