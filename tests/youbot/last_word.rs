@@ -138,7 +138,7 @@ fn unwatched_on_the_way_down(name: &str) {
     live.run(1.0);
     stays(&live, "lowering.waiting", "released once more");
     live.raise("e_shutdown");
-    live.until_state("idle", 20.0);
+    live.until("parked", 10.0, |live| live.first("park.ok", t).is_some());
     assert_eq!(live.first("e_arm_dropped", 0.0), None);
     live.clock.shutdown();
 }
