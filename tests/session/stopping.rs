@@ -333,7 +333,7 @@ fn what_nobody_attends_is_not_waited_for_and_stays() {
     let says = "`calm` is in force, and nobody is there to ask for force: what is left stays as it is";
     assert!(ended.forced.iter().any(|note| note == says), "{ended:?}");
     assert_eq!(small.steps(), Vec::<String>::new(), "nothing but what `calm` holds was there to be taken back");
-    assert_eq!(small.session.system().components.len(), 2);
+    assert_eq!(small.session.system().unwrap().components.len(), 2);
 }
 
 /// An emergency while it is led down: its coordinator is not left out while what is safe is in force; shut down again, it is
