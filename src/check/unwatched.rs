@@ -13,7 +13,7 @@ use crate::model::{
     RunState, Target, ValueType,
 };
 use crate::statechart::Chart;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Components that may die unnoticed.
 pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) -> Findings {
@@ -22,11 +22,13 @@ pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) ->
     }
     let look = Look { deployment, universe, charts };
     let (read, reach) = (look.read_by_holds(), look.reaching_an_actuator());
-    let watched = look.read_by_monitors();
-    let mut names: Vec<ComponentName> = universe.components().filter(|name| look.is_started(*name)).collect();
+    let (watched, reported, started) = (look.read_by_monitors(), look.reported(), look.started());
+    let missed = |name: &ComponentName| {
+        started(*name) && look.sends(*name) && !watched.contains(name) && !reported.contains(name)
+    };
+    let mut names: Vec<ComponentName> = universe.components().filter(missed).collect();
     names.sort_unstable_by_key(ComponentName::as_str);
-    let missed = names.into_iter().filter(|name| look.sends(*name) && !watched.contains(name));
-    let missed = missed.filter(|name| !look.reports(*name) && !look.is_fault_heard(*name));
+    let missed = names.into_iter().filter(|name| !look.is_fault_heard(*name));
     missed
         .filter_map(|name| {
             let why = if let Some((_, at)) = read.iter().find(|(read, _)| *read == name) {
@@ -70,18 +72,19 @@ impl Look<'_> {
         self.types(name).any(what)
     }
 
-    /// Whether some configuration brings it to running.
-    fn is_started(&self, name: ComponentName) -> bool {
-        self.deployment.configurations.iter().any(|configuration| {
-            configuration.pre.iter().chain(configuration.post.iter()).any(|entry| {
-                let of_all = || configuration.id.prefix() == name.prefix();
-                RunState::from(entry.state) == RunState::Running
-                    && match entry.target {
-                        Target::Component(component) => component == name,
-                        Target::Default => of_all(),
-                    }
-            })
-        })
+    /// Whether some configuration brings a component to running.
+    fn started(&self) -> impl Fn(ComponentName) -> bool {
+        let (mut named, mut all) = (FxHashSet::default(), FxHashSet::default());
+        for configuration in &self.deployment.configurations {
+            let entries = configuration.pre.iter().chain(configuration.post.iter());
+            for entry in entries.filter(|entry| RunState::from(entry.state) == RunState::Running) {
+                match entry.target {
+                    Target::Component(component) => _ = named.insert(component),
+                    Target::Default => _ = all.insert(configuration.id.prefix()),
+                }
+            }
+        }
+        move |name| named.contains(&name) || all.contains(name.prefix())
     }
 
     fn sends(&self, name: ComponentName) -> bool {
@@ -97,12 +100,13 @@ impl Look<'_> {
         self.charts.iter().any(|chart| chart.events().contains(&event))
     }
 
-    /// Whether somebody receives its data who can raise events.
-    fn reports(&self, name: ComponentName) -> bool {
+    /// Components whose data somebody receives who can raise events.
+    fn reported(&self) -> FxHashSet<ComponentName> {
         let tells = |ty: &ComponentType| {
             ty.ports.values().any(|port| port.direction == Direction::Out && port.ty == ValueType::Event)
         };
-        self.connections().any(|(from, to)| from.component == name && self.is(to.component, tells))
+        let heard = self.connections().filter(|(_, to)| self.is(to.component, tells));
+        heard.map(|(from, _)| from.component).collect()
     }
 
     fn connections(&self) -> impl Iterator<Item = (MemberRef, MemberRef)> {
@@ -113,17 +117,16 @@ impl Look<'_> {
     }
 
     fn reaching_an_actuator(&self) -> FxHashSet<ComponentName> {
-        let mut reach: FxHashSet<ComponentName> =
-            self.universe.components().filter(|name| self.is(*name, |ty| ty.actuator)).collect();
-        loop {
-            let further = self.connections().filter(|(_, to)| reach.contains(&to.component));
-            let further: Vec<ComponentName> =
-                further.map(|(from, _)| from.component).filter(|from| !reach.contains(from)).collect();
-            if further.is_empty() {
-                return reach;
-            }
-            reach.extend(further);
+        let mut senders: FxHashMap<ComponentName, Vec<ComponentName>> = FxHashMap::default();
+        self.connections().for_each(|(from, to)| senders.entry(to.component).or_default().push(from.component));
+        let is_actuator = |name: &ComponentName| self.is(*name, |ty| ty.actuator);
+        let mut further: Vec<ComponentName> = self.universe.components().filter(is_actuator).collect();
+        let mut reach: FxHashSet<ComponentName> = further.iter().copied().collect();
+        while let Some(name) = further.pop() {
+            let new = senders.get(&name).into_iter().flatten().filter(|from| reach.insert(**from));
+            further.extend(new);
         }
+        reach
     }
 
     /// Components that what configurations stand for looks at, and where that is said.
