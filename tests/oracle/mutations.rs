@@ -221,7 +221,7 @@ fn passes(at: &Path, [oracle, check]: &[PathBuf; 2], by: &Noticed, number: usize
         .current_dir(at)
         .env("CARGO_MANIFEST_DIR", at)
         .env("DAVIT_MUTANT", number.to_string())
-        .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "6000".to_owned()))
+        .env("DAVIT_ORACLE_CASES", std::env::var("DAVIT_MUTATION_CASES").unwrap_or_else(|_| "12000".to_owned()))
         .env("DAVIT_ORACLE_ENOUGH", "1")
         .stdout(Stdio::null())
         .stderr(Stdio::null())
