@@ -230,7 +230,7 @@ fn each_promise_has_its_tests() {
             let source: String =
                 places.iter().filter_map(|place| std::fs::read_to_string(root().join(place)).ok()).collect();
             let found =
-                source.find(&format!("fn {name}()")).and_then(|at| source[..at].rfind("#[test]").map(|test| at - test));
+                source.find(&format!("fn {name}(")).and_then(|at| source[..at].rfind("#[test]").map(|test| at - test));
             assert!(found.is_some_and(|distance| distance < 200), "there is no test `{test}` ({places:?})");
             named += 1;
         }
