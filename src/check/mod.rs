@@ -26,6 +26,7 @@ mod held;
 mod judge;
 mod lasts;
 mod late;
+mod lets_go;
 mod loss;
 mod members;
 mod monitors;

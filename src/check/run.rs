@@ -9,8 +9,8 @@ use super::report::{Checked, Explored, Report};
 use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
-    beside, configurations as single, coordinator, declared, monitors as watched, purity, safety, settings, simulated,
-    types, unheard, universe, unwatched, ways,
+    beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety, settings,
+    simulated, types, unheard, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -36,6 +36,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
     findings.extend(watched::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
     findings.extend(declared::check(deployment, &universe));
+    findings.extend(lets_go::check(deployment, &universe));
     let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;

@@ -68,6 +68,7 @@ pub const READ: &[(&str, &[Code])] = &[
             TYPE_WITHOUT_CODE,
             TYPE_SETTLED_ELSEWHERE,
             CONF_HOLDS_UNSEEN,
+            CONF_SAFE_LETS_GO,
             DEPLOY_SAFETY_ANSWER,
             DEPLOY_UNKNOWN_CONFIGURATION,
             DEPLOY_UNKNOWN_STATE,

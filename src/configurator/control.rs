@@ -155,18 +155,17 @@ pub enum Recovery {
     Accept,
 }
 
-/// A command, with where its answer goes.
+/// What somebody tells it, with where its answer goes.
 pub(super) enum Command {
+    AtOnce(AtOnce),
+    InTurn(InTurn),
+}
+
+/// Done where it is taken in.
+pub(super) enum AtOnce {
     View {
         system: bool,
         reply: Sender<Arc<View>>,
-    },
-    Drift {
-        reply: Sender<Drift>,
-    },
-    Recover {
-        direction: Recovery,
-        reply: Sender<Result<(), Arc<Residual>>>,
     },
     /// A configuration that an operator makes up, in the place of the one of that name; `listed`: it may be applied without force.
     Define {
@@ -178,39 +177,45 @@ pub(super) enum Command {
     Stopping,
     /// The event that ends the deployment came, or the one that begins it.
     Leaving(bool),
-    TakeBack {
-        deadline: Time,
-        reply: Sender<TakenDown>,
-    },
-    Force {
-        deadline: Time,
-        reply: Sender<TakenDown>,
-    },
     /// Somebody wants force: looked for by what takes its time.
     Hurry,
     /// A coordinator has come to its *down* state.
     Down(Requester),
+}
+
+/// Waits until what is being done has an end, or gives way.
+pub(super) enum InTurn {
+    Drift { reply: Sender<Drift> },
+    Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
+    TakeBack { deadline: Time, reply: Sender<TakenDown> },
+    Force { deadline: Time, reply: Sender<TakenDown> },
     DiscardStack,
     Stop,
 }
 
-impl Command {
+impl From<AtOnce> for Command {
+    fn from(command: AtOnce) -> Self {
+        Self::AtOnce(command)
+    }
+}
+
+impl From<InTurn> for Command {
+    fn from(command: InTurn) -> Self {
+        Self::InTurn(command)
+    }
+}
+
+impl AtOnce {
     /// Whether somebody only wants to know something, or to change what can be asked for again: there may be many of these.
     pub fn only_asks(&self) -> bool {
-        matches!(self, Self::View { .. } | Self::Drift { .. } | Self::Recover { .. } | Self::Define { .. })
+        matches!(self, Self::View { .. } | Self::Define { .. })
     }
+}
 
-    /// Whether it is done where it is taken in; others wait for their turn.
-    pub fn is_immediate(&self) -> bool {
-        !matches!(
-            self,
-            Self::Drift { .. }
-                | Self::Recover { .. }
-                | Self::TakeBack { .. }
-                | Self::Force { .. }
-                | Self::DiscardStack
-                | Self::Stop
-        )
+impl InTurn {
+    /// As [`AtOnce::only_asks`].
+    pub fn only_asks(&self) -> bool {
+        matches!(self, Self::Drift { .. } | Self::Recover { .. })
     }
 
     /// Whether what is under way gives way to it.

@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{Began, Command, Moment, View};
+use super::control::{AtOnce, Began, Command, InTurn, Moment, View};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -71,7 +71,7 @@ pub(super) struct Engine {
     pub steps: u64,
     pub safety: Safety,
     /// Commands that wait.
-    pub commands: VecDeque<Command>,
+    pub commands: VecDeque<InTurn>,
     pub suspects: Suspects,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
@@ -152,8 +152,8 @@ impl Engine {
     fn work(&mut self) {
         while !self.stopping {
             if let Some(command) = self.commands.pop_front() {
-                self.counts.command_taken(&command);
-                self.command(command);
+                self.counts.command_taken(command.only_asks());
+                self.in_turn(command);
                 continue;
             }
             let mut did = self.serve_safe();
@@ -251,31 +251,33 @@ impl Engine {
                 self.counts.report_taken();
                 self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());
             }
-            Mail::Command(command) => {
-                // What waits for its turn keeps its place until then.
-                if command.is_immediate() {
-                    self.counts.command_taken(&command);
-                }
-                match command {
-                    // How things stand can be told at any time.
-                    Command::View { system, reply } => {
-                        let _ = reply.try_send(self.view(system));
-                    }
-                    Command::Define { configuration, listed, reply } => {
-                        self.given.define(*configuration, listed, &mut self.switches);
-                        let _ = reply.try_send(());
-                    }
-                    Command::Stopping => self.stopping_begins(),
-                    Command::Leaving(leaving) => self.leaves(leaving),
-                    Command::Hurry => {}
-                    // Stands in its coordinator's queue like a request.
-                    Command::Down(requester) => {
-                        let ask = Ask::Undo;
-                        let request = Request { why: Why::Down, ..Request::new(RequestId(0), ask, requester) };
-                        let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
-                    }
-                    other => self.commands.push_back(other),
-                }
+            Mail::Command(Command::AtOnce(command)) => {
+                self.counts.command_taken(command.only_asks());
+                self.at_once(command);
+            }
+            // What waits for its turn keeps its place until then.
+            Mail::Command(Command::InTurn(command)) => self.commands.push_back(command),
+        }
+    }
+
+    fn at_once(&mut self, command: AtOnce) {
+        match command {
+            // How things stand can be told at any time.
+            AtOnce::View { system, reply } => {
+                let _ = reply.try_send(self.view(system));
+            }
+            AtOnce::Define { configuration, listed, reply } => {
+                self.given.define(*configuration, listed, &mut self.switches);
+                let _ = reply.try_send(());
+            }
+            AtOnce::Stopping => self.stopping_begins(),
+            AtOnce::Leaving(leaving) => self.leaves(leaving),
+            // To have it come is all: who waits looks whether force is wanted.
+            AtOnce::Hurry => {}
+            // Stands in its coordinator's queue like a request.
+            AtOnce::Down(requester) => {
+                let request = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) };
+                let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
             }
         }
     }
@@ -333,7 +335,7 @@ impl Engine {
 
     /// Whether something waits that everything else gives way to.
     pub fn urgent(&self) -> bool {
-        self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(Command::is_urgent)
+        self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(InTurn::is_urgent)
     }
 
     pub fn note_quarantine(&mut self) {

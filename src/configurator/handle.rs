@@ -1,7 +1,7 @@
 //! Starting a configurator, and what others hold of it while its thread runs.
 
 use super::conditions::Conditions;
-use super::control::{Command, Drift, Recovery, TakenDown, View};
+use super::control::{AtOnce, Command, Drift, InTurn, Recovery, TakenDown, View};
 use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
@@ -117,7 +117,7 @@ struct Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        self.post.command(Command::Stop);
+        self.post.command(InTurn::Stop);
     }
 }
 
@@ -174,29 +174,29 @@ impl ConfiguratorHandle {
 
     /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.
     pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<View>> {
-        self.ask(deadline, |reply| Command::View { system, reply })
+        self.ask(deadline, |reply| AtOnce::View { system, reply })
     }
 
     /// The difference between the picture and the platform.
     pub fn drift(&self, deadline: Time) -> Option<Drift> {
-        self.ask(deadline, |reply| Command::Drift { reply })
+        self.ask(deadline, |reply| InTurn::Drift { reply })
     }
 
     /// Recovers a broken system; the error is what remains. None: no answer by `deadline`.
     pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
-        self.ask(deadline, |reply| Command::Recover { direction, reply })
+        self.ask(deadline, |reply| InTurn::Recover { direction, reply })
     }
 
     /// Takes in a configuration that an operator makes up, in the place of the one of that name, which must not be asked for
     /// meanwhile. `listed`: it may be applied without force. Answers whether it was taken in by `deadline`.
     pub fn define(&self, configuration: Configuration, listed: bool, deadline: Time) -> bool {
         let configuration = Box::new(configuration);
-        self.ask(deadline, |reply| Command::Define { configuration, listed, reply }).is_some()
+        self.ask(deadline, |reply| AtOnce::Define { configuration, listed, reply }).is_some()
     }
 
     /// Stopping begins: what is in force now is known apart from what comes since, and operators' requests are refused.
     pub fn stopping(&self) {
-        self.inner.post.command(Command::Stopping);
+        self.inner.post.command(AtOnce::Stopping);
     }
 
     /// The event that ends the deployment was raised: until it is down, or (`false`) the one that begins it is raised, an undo
@@ -214,14 +214,14 @@ impl ConfiguratorHandle {
     /// The answer comes out of the receiver.
     pub fn take_back(&self, deadline: Time) -> Receiver<TakenDown> {
         let (reply, answer) = self.inner.clock.channel(1);
-        self.inner.post.command(Command::TakeBack { deadline, reply });
+        self.inner.post.command(InTurn::TakeBack { deadline, reply });
         answer
     }
 
     /// The third stage: applies the `safe` configurations and what brings the system to rest, then removes everything.
     pub fn force_down(&self, deadline: Time) -> Receiver<TakenDown> {
         let (reply, answer) = self.inner.clock.channel(1);
-        self.inner.post.command(Command::Force { deadline, reply });
+        self.inner.post.command(InTurn::Force { deadline, reply });
         answer
     }
 
@@ -233,23 +233,23 @@ impl ConfiguratorHandle {
     /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
     /// are down and nothing is there any more, what was in force is forgotten.
     pub fn down(&self, coordinator: Requester) {
-        self.inner.post.command(Command::Down(coordinator));
+        self.inner.post.command(AtOnce::Down(coordinator));
     }
 
     /// Forgets the stack: the *down* state was reached with an empty system.
     pub fn discard_stack(&self) {
-        self.inner.post.command(Command::DiscardStack);
+        self.inner.post.command(InTurn::DiscardStack);
     }
 
     /// Ends the configurator: what is under way is broken off, what waits is answered *failed*. Waits until it has
     /// ended, at most until `deadline`; answers whether it has.
     pub fn stop(&self, deadline: Time) -> bool {
-        self.inner.post.command(Command::Stop);
+        self.inner.post.command(InTurn::Stop);
         let thread = crate::time::lock(&self.inner.thread).take();
         thread.is_none_or(|thread| thread.join(deadline).is_ok())
     }
 
-    fn ask<T>(&self, deadline: Time, command: impl FnOnce(crate::time::Sender<T>) -> Command) -> Option<T> {
+    fn ask<T, C: Into<Command>>(&self, deadline: Time, command: impl FnOnce(crate::time::Sender<T>) -> C) -> Option<T> {
         let (reply, answer) = self.inner.clock.channel(1);
         if !self.inner.post.command(command(reply)) {
             return None;

@@ -3,7 +3,7 @@
 //! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
 //! gets in when the queue of requests is full, and the reply of a worker always does.
 
-use super::control::Command;
+use super::control::{AtOnce, Command};
 use super::request::{Batch, Request};
 use crate::limits;
 use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
@@ -93,13 +93,13 @@ impl Counts {
     }
 
     /// A command was taken up: its room is free again.
-    pub fn command_taken(&self, command: &Command) {
-        self.room_of(command).0.fetch_sub(1, Ordering::AcqRel);
+    pub fn command_taken(&self, asks: bool) {
+        self.room_of(asks).0.fetch_sub(1, Ordering::AcqRel);
     }
 
     /// Where a command is counted, and how many there may be: whoever only asks takes no place from what must not be lost.
-    fn room_of(&self, command: &Command) -> (&AtomicUsize, usize) {
-        match command.only_asks() {
+    fn room_of(&self, asks: bool) -> (&AtomicUsize, usize) {
+        match asks {
             true => (&self.commands, limits::CONFIGURATOR_COMMANDS),
             false => (&self.control, limits::CONFIGURATOR_CONTROL),
         }
@@ -168,15 +168,20 @@ impl Post {
     }
 
     /// Puts a command in; answers whether there was room.
-    pub fn command(&self, command: Command) -> bool {
-        let (count, bound) = self.counts.room_of(&command);
+    pub fn command(&self, command: impl Into<Command>) -> bool {
+        let command = command.into();
+        let asks = match &command {
+            Command::AtOnce(command) => command.only_asks(),
+            Command::InTurn(command) => command.only_asks(),
+        };
+        let (count, bound) = self.counts.room_of(asks);
         reserve(count, 1, bound) && self.sender.try_send(Mail::Command(command)).is_ok()
     }
 
     /// Says that force is wanted. That is known also when there is no room to wake whoever waits: then there is much to take in.
     pub fn hurry(&self) {
         self.counts.hurried.store(true, Ordering::Release);
-        self.command(Command::Hurry);
+        self.command(AtOnce::Hurry);
     }
 
     /// Says that the deployment is led down from now on, or that it is brought up. It is for the requests that come after this,
@@ -196,7 +201,7 @@ impl Post {
         if told.load(Ordering::Acquire) == now || told.swap(now, Ordering::AcqRel) == now {
             return;
         }
-        if !self.command(Command::Leaving(now)) {
+        if !self.command(AtOnce::Leaving(now)) {
             told.store(!now, Ordering::Release);
         }
     }
@@ -233,10 +238,10 @@ mod tests {
     #[test]
     fn asking_takes_no_room_from_what_must_not_be_lost() {
         let (post, inbox) = new(&Clock::simulated());
-        let drift = || Command::Drift { reply: Clock::simulated().channel(1).0 };
+        let drift = || InTurn::Drift { reply: Clock::simulated().channel(1).0 };
         let asked = (0..1_000).filter(|_| post.command(drift())).count();
         assert_eq!(asked, limits::CONFIGURATOR_COMMANDS);
-        let told = (0..1_000).filter(|_| post.command(Command::Stopping)).count();
+        let told = (0..1_000).filter(|_| post.command(AtOnce::Stopping)).count();
         assert_eq!(told, limits::CONFIGURATOR_CONTROL);
         let Ok(Mail::Command(command)) = inbox.try_recv() else { panic!("a command") };
         assert!(!post.command(drift()), "it was taken in, and waits");

@@ -1,6 +1,6 @@
 //! The third stage of stopping: by force, to nothing (design §6).
 
-use super::control::{Command, TakenDown};
+use super::control::{InTurn, TakenDown};
 use super::engine::{Engine, Force};
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
@@ -15,34 +15,30 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Engine {
-    pub(super) fn command(&mut self, command: Command) {
+    pub(super) fn in_turn(&mut self, command: InTurn) {
         match command {
-            Command::View { system, reply } => {
-                let _ = reply.try_send(self.view(system));
-            }
-            Command::Drift { reply } => {
+            InTurn::Drift { reply } => {
                 let drift = self.drift();
                 let _ = reply.try_send(drift);
             }
-            Command::Recover { direction, reply } => {
+            InTurn::Recover { direction, reply } => {
                 let outcome = self.recover(direction);
                 let _ = reply.try_send(outcome);
             }
-            Command::TakeBack { deadline, reply } => {
+            InTurn::TakeBack { deadline, reply } => {
                 let down = self.take_all_back(deadline);
                 let _ = reply.try_send(down);
             }
-            Command::Force { deadline, reply } => {
+            InTurn::Force { deadline, reply } => {
                 let down = self.force(deadline);
                 let _ = reply.try_send(down);
             }
-            Command::Define { .. } | Command::Down(_) | Command::Stopping | Command::Leaving(_) | Command::Hurry => {}
-            Command::DiscardStack => {
+            InTurn::DiscardStack => {
                 self.world.stack.discard();
                 self.confirmations.clear();
                 self.changed();
             }
-            Command::Stop => self.stopping = true,
+            InTurn::Stop => self.stopping = true,
         }
     }
 
@@ -243,7 +239,7 @@ impl Engine {
         if let Some(seen) = self.look()
             && let Err(unknown) = self.adopt(&seen)
         {
-            down.troubles.push(Reason::Panic(unknown.to_string()));
+            down.troubles.push(Reason::UnknownType(unknown));
         }
         self.note_quarantine();
         let nothing = System::new(self.world.system.catalogue().clone());

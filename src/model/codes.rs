@@ -256,6 +256,11 @@ codes! {
     CONF_ON_FAILURE_SAFE = "conf::on_failure_safe", "`on_failure` stands beside `safe`",
         "Of a safe configuration every step is tried, past failures, and none is taken back: that is what makes it safe to \
          ask for at any time. `on_failure` says something else of failures. Leave it out.";
+    CONF_SAFE_LETS_GO = "conf::safe_lets_go", "a safe configuration lets go of what another one has made safe",
+        "Two safe configurations are alternatives (`group`), so that applying the second one undoes the first one's frame: what \
+         that has called, and what an operation takes back, is taken back before the second one acts. For that moment nothing is \
+         safe: where the first one brakes and the second one holds, the brakes open first. What both call is not taken back in \
+         between. Let the second one call it too, or leave the group out: frames of safe configurations may be in force together.";
     UNKNOWN_COMPONENT = "conf::unknown_component", "there is no such component",
         "The configuration names a component that does not exist where it is applied: it was never created, was destroyed, or its name is misspelt. Nothing can be done to it. Create it earlier (or in the same configuration), or correct the name.";
     UNKNOWN_TYPE = "conf::unknown_type", "there is no such component type",

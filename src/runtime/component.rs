@@ -206,6 +206,7 @@ pub struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
+    #[inline]
     pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>, dt: f64, first: bool) -> Self {
         Self { clock, beat, dt, first, fault: None, call: None, progress: None }
     }

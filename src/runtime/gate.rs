@@ -138,6 +138,7 @@ impl<T> Gate<T> {
         .map(drop)
     }
 
+    #[inline]
     fn change(&self, f: impl Fn(u32) -> Result<u32, Closed>) -> Result<u32, Closed> {
         let mut word = self.look();
         loop {
@@ -255,6 +256,7 @@ impl<'a, G: Gated> Inside<'a, G> {
     }
 
     /// Leaves, in another state if one is given.
+    #[inline]
     pub(crate) fn leave(mut self, state: Option<RunState>) -> Left {
         self.over = true;
         let before = self

@@ -1,6 +1,7 @@
 //! Calling a component's own code so that its panic stays its own.
 
 use crate::time::clock::panic_text;
+use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
@@ -33,14 +34,18 @@ pub(crate) fn install() {
 ///
 /// # Errors
 /// The text of its panic, with its place.
+#[inline]
 pub(crate) fn call<R>(f: impl FnOnce() -> R) -> Result<R, String> {
     let before = CALLED.replace(true);
     let result = catch_unwind(AssertUnwindSafe(f));
     CALLED.set(before);
-    result.map_err(|payload| {
-        let text = format!("{}{}", panic_text(&*payload), PLACE.with_borrow_mut(std::mem::take));
-        // What it unwound with is a component's too, and may panic when it is dropped.
-        let _ = catch_unwind(AssertUnwindSafe(|| drop(payload)));
-        text
-    })
+    result.map_err(told)
+}
+
+#[cold]
+fn told(payload: Box<dyn Any + Send>) -> String {
+    let text = format!("{}{}", panic_text(&*payload), PLACE.with_borrow_mut(std::mem::take));
+    // What it unwound with is a component's too, and may panic when it is dropped.
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(payload)));
+    text
 }

@@ -3,7 +3,7 @@
 use super::request::Request;
 use crate::model::codes;
 use crate::model::{Cause, ComponentName, ConfigId, EventName, Finding, Findings, Step, Verdict};
-use crate::system::{System, step};
+use crate::system::{System, UnknownType, step};
 use crate::time::Time;
 use std::fmt;
 use std::sync::Arc;
@@ -95,6 +95,8 @@ pub enum Reason {
     NotConfirmed(EventName, Duration),
     /// The configurator itself failed.
     Panic(String),
+    /// The platform shows a component that nothing here can have made.
+    UnknownType(UnknownType),
     /// No frame to undo.
     NothingToUndo,
     /// It was undone, and these frames of operators with it, which stood in its way.
@@ -253,6 +255,8 @@ impl Reason {
             }
             Self::Panic(_) => Finding::error(codes::CONFIGURATOR_PANIC, self.to_string())
                 .help("this is a defect of the configurator itself; compare model and platform with `davit drift`"),
+            Self::UnknownType(_) => Finding::error(codes::UNKNOWN_TYPE, self.to_string())
+                .help("whoever made it on the platform removes it; it is left as it is"),
             Self::Refused(_) | Self::Broken(_) | Self::StillBroken(_) => {
                 Finding::error(codes::STEP_FAILED, self.to_string())
             }
@@ -295,6 +299,7 @@ impl fmt::Display for Reason {
                 write!(f, "the confirming event `{event}` did not come within {} s", within.as_secs_f64())
             }
             Self::Panic(text) => write!(f, "the configurator itself failed: {text}"),
+            Self::UnknownType(unknown) => write!(f, "what the platform shows was not taken in: {unknown}"),
             Self::NothingToUndo => f.write_str("there is no frame to undo"),
             Self::TookAlong(ids) => {
                 let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();

@@ -112,7 +112,7 @@ impl Transaction {
     /// The way back from where the forward list stands: for all that was done of parts from `part` on and was not taken back,
     /// latest first; then what is missing of the parts before.
     pub(super) fn way_back(&self, part: usize, live: &System) -> WayBack {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let mut way = WayBack::default();
         let held = self.holds(part);
         if self.taken_down || held && part == 0 && !self.interrupted {
@@ -212,7 +212,7 @@ impl Transaction {
 
     /// Calls of which nobody knows whether they happened, and that a compensation takes back.
     pub(super) fn perhaps_done(&self) -> Vec<u32> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let compensated = |i: &u32| {
             let planned = &forward.list[*i as usize];
             matches!((&planned.step, &planned.undo), (Step::Operation(_), Undo::One(Step::Operation(_))))
@@ -239,7 +239,7 @@ impl Transaction {
     }
 
     fn forward_step(&self, i: u32) -> &PlannedStep {
-        &self.forward.as_ref().expect("something was carried out").list[i as usize]
+        &self.forward.list[i as usize]
     }
 
     /// Whether the way back of a forward step may move.
@@ -259,7 +259,7 @@ impl Transaction {
 
     /// The same beside what these safe configurations have touched.
     fn late_beside(&self, i: u32, touched: &Touched) -> Option<(&Undo, u64)> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let late = forward.late.iter().find(|late| late.step == i)?;
         let known = touched.knew(&forward.list[i as usize].step, late.revision);
         (!known).then_some((&late.undo, late.revision))
@@ -302,7 +302,7 @@ impl Transaction {
 
     /// What takes a step of the forward list back, to where the parts before `part` have led.
     pub(super) fn undo_of(&self, i: u32, part: usize) -> &Undo {
-        let forward = &self.forward.as_ref().expect("something was carried out").list[i as usize];
+        let forward = &self.forward.list[i as usize];
         // The net was planned on the system before all of them.
         let Some(place) = self.planned.place(i as usize).filter(|_| part > 0 && !self.planned.whole.is_empty()) else {
             return &forward.undo;
@@ -353,7 +353,7 @@ impl Transaction {
     /// The system that the parts before `part` lead to, as the model knows it before anything is taken back; with what was
     /// done of `part` and later ones, where that is held.
     pub(super) fn led_to(&self, part: usize, live: &System) -> System {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let mut system = self.before_all(live);
         let before = |place: &u32| self.planned.part_of(Some(*place)) < part;
         for (_, planned) in (0u32..).zip(self.whole()).take_while(|(place, _)| before(place)) {
@@ -369,7 +369,7 @@ impl Transaction {
 
     /// The system before all parts, as the model knows it before anything is taken back.
     pub(super) fn before_all(&self, live: &System) -> System {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let mut system = live.clone();
         for (component, state) in forward.faulted.iter().rev() {
             if system.component(*component).is_some_and(|node| node.state == RunState::Faulted) {
@@ -387,14 +387,14 @@ impl Transaction {
 
     /// Steps of the forward list that were done and taken back.
     pub(super) fn taken_back_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &Undo)> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let back = forward.done.iter().filter(|i| self.taken_back.contains(*i));
         back.map(|i| (&forward.list[*i as usize], &forward.list[*i as usize].undo))
     }
 
     /// Whether it has done anything that was not taken back, brought a component into a fault, or found one otherwise.
     pub fn did_anything(&self) -> bool {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let faulted = forward.faulted.iter().chain(&self.faulted).next().is_some();
         self.origin.is_some() || self.mending.broke() || faulted || self.done_so_far().next().is_some()
     }
@@ -410,7 +410,7 @@ impl Transaction {
             }
             return;
         }
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         self.put_back(picture, &theirs);
         let mut heed = Heed::new(&theirs, self.done_so_far().map(|(planned, _)| &planned.step));
         for i in forward.done.iter().rev().filter(|i| !self.taken_back.contains(i)) {
@@ -463,7 +463,7 @@ impl Transaction {
     /// what these need; then whatever else differs.
     fn finish_before(&self, part: usize, live: &System, way: &mut WayBack) {
         let Some(between) = &self.between else { return };
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
         done.extend(self.finished.iter().copied());
         let before = |place: &u32| self.planned.part_of(Some(*place)) < part;

@@ -76,7 +76,7 @@ pub struct BrokenPart {
 impl Transaction {
     /// Everything was tried: it is done, or, best effort, what could not be done is named.
     pub(super) fn end_forward(&mut self, live: &System, can: &Can<'_>) {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         if forward.failures.is_empty() && forward.unsettled.is_empty() && self.fallen.is_none() {
             let parts = self.planned.parts.iter().map(|_| PartEnd::Done).collect();
             return self.over(parts);
@@ -101,7 +101,7 @@ impl Transaction {
     /// The components it is about: also those of what takes its steps back, which may be a call of another, and of what was
     /// left out of the net and may have to be finished.
     pub(super) fn own(&self) -> Vec<ComponentName> {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let all = forward.list.iter().chain(&self.planned.whole);
         let steps = all.flat_map(|planned| std::iter::once(&planned.step).chain(planned.undo.steps()));
         let mut own: Vec<ComponentName> = steps.flat_map(touch::components).collect();
@@ -117,7 +117,7 @@ impl Transaction {
 
     /// What failed so far, and what nobody knows of.
     pub fn failures(&self) -> Vec<Reason> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let unknown = |i: &u32| Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout };
         forward.failures.iter().map(|(_, reason)| reason.clone()).chain(forward.unsettled.iter().map(unknown)).collect()
     }
@@ -129,7 +129,7 @@ impl Transaction {
 
     /// Why it did not simply succeed.
     fn reason(&self) -> Reason {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let part = self.failed_part();
         let first = forward.failures.iter().find(|(i, _)| self.part_of(*i) == part).or(forward.failures.first());
         match (first, forward.unsettled.first(), &self.stopped_by) {
@@ -147,7 +147,7 @@ impl Transaction {
 
     /// Steps of the forward list that were done, belong to `part` or a later one, and were not taken back.
     pub(super) fn remaining(&self, part: usize) -> Vec<u32> {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let left = |i: &u32| {
             let needs = !matches!(self.undo_of(*i, part), Undo::Nothing);
             needs && !self.taken_back.contains(i) && self.part_of(*i) >= part
@@ -200,7 +200,7 @@ impl Transaction {
     /// configurations have led elsewhere.
     fn take_back(&self, remaining: &[u32], part: usize, system: &mut System) -> bool {
         let mut all = true;
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let mut heed = Heed::new(&self.touched, remaining.iter().map(|i| &forward.list[*i as usize].step));
         for i in remaining.iter().rev() {
             let goes_back = self.goes_back(*i, part, &self.touched, &mut heed);
@@ -243,7 +243,7 @@ impl Transaction {
         live: &System,
         can: &Can<'_>,
     ) {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let open = forward.unsettled.iter().filter(|i| !self.taken_back.contains(i));
         let mut unsettled: Vec<Step> = open.map(|i| forward.list[*i as usize].step.clone()).collect();
         unsettled.append(&mut self.unsettled);
@@ -258,7 +258,7 @@ impl Transaction {
         }
         // Where the way back to before is not known to be gone, what remains is told as a difference.
         let remaining = if whole { Vec::new() } else { self.remaining(part) };
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let residual = Residual {
             left: (remaining.iter().filter(|i| !self.is_partly_back(**i)))
                 .map(|i| forward.list[*i as usize].step.clone())
@@ -280,7 +280,7 @@ impl Transaction {
         let clean = residual.is_settled() && remaining.is_empty();
         let missing = self.missing(part, live);
         // Interrupted, each part is to blame for what is left of it.
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let differs: FxHashSet<ComponentName> = residual.components().collect();
         let about = |i: &u32| touch::components(&forward.list[*i as usize].step).iter().any(|c| differs.contains(c));
         // Where what remains is told as a difference, it is of whoever has touched that.
@@ -346,7 +346,7 @@ impl Transaction {
     /// there.
     fn missing(&self, part: usize, live: &System) -> FxHashSet<usize> {
         let Some(between) = &self.between else { return FxHashSet::default() };
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let mut done: FxHashSet<u32> = forward.done.iter().filter_map(|i| self.planned.place(*i as usize)).collect();
         done.extend(self.finished.iter().copied());
         let before = || (0..).zip(self.whole()).take_while(|(place, _)| self.planned.part_of(Some(*place)) < part);
@@ -367,7 +367,7 @@ impl Transaction {
 
     /// What takes back what is left of a part, as far as safe configurations have left it to that.
     fn items_left(&self, part: usize, live: &System) -> Vec<Item> {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let left: Vec<u32> = (self.remaining(part).into_iter())
             .chain(self.perhaps.iter().copied())
             .filter(|i| self.part_of(*i) == part)
@@ -416,7 +416,7 @@ impl Transaction {
     /// What is still to be undone of a frame; so is what safe configurations have done again, for whom it never was, and a
     /// call that was given up: taking back half of it is not taking it back.
     fn items_open(&self, own: Range<u32>) -> Vec<Item> {
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let theirs = |i: &u32| self.interrupted && self.touched.has(&forward.list[*i as usize].step);
         let done: FxHashSet<u32> = (forward.done.iter())
             .filter(|i| !self.taken_back.contains(*i) && !theirs(i) && !self.told.contains(i))

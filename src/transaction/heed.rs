@@ -2,7 +2,6 @@
 //! never overwritten, and what is brought back comes back as they want it.
 
 use super::Transaction;
-use super::run::Run;
 use super::touched::Touched;
 use crate::model::{ComponentName, RunState, Step, Transition, Wanted};
 use crate::plan::PlannedStep;
@@ -23,33 +22,33 @@ impl Transaction {
 
     /// Tells of each step of a best effort that was done when that was.
     pub fn note_done(&self, touched: &mut Touched) {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         forward.noted.iter().for_each(|(i, revision)| touched.did(&forward.list[*i as usize].step, *revision));
     }
 
     /// The steps of a best effort that were not done, or of which nobody knows.
     pub fn missed(&self) -> impl Iterator<Item = &Step> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let failed = forward.failures.iter().map(|(i, _)| i).chain(&forward.unsettled);
         failed.map(|i| &forward.list[*i as usize].step)
     }
 
     /// The steps of a best effort that were not done, for all that is known.
     pub fn failed_steps(&self) -> impl Iterator<Item = &PlannedStep> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         forward.failures.iter().map(|(i, _)| &forward.list[*i as usize])
     }
 
     /// The steps of a best effort that are not over.
     pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
-        self.forward.iter().flat_map(Run::open).map(|planned| &planned.step)
+        self.forward.open().map(|planned| &planned.step)
     }
 
     /// A later safe configuration does these steps: what writes the same and has not begun is not issued any more. Answers
     /// whether there was such.
     pub fn yield_to<'s>(&mut self, later: impl Iterator<Item = &'s Step>) -> bool {
         let slots: FxHashSet<Slot> = later.map(slot).collect();
-        self.forward.as_mut().is_some_and(|run| run.leave_out(|step| slots.contains(&slot(step))))
+        self.forward.leave_out(|step| slots.contains(&slot(step)))
     }
 }
 

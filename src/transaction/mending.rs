@@ -44,7 +44,7 @@ impl Transaction {
         for step in self.mending.otherwise.iter().filter(|step| broke && !heeding.has(step)) {
             let _ = step::apply(step, system);
         }
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         // The last fault of a component first: between two of them the way back may have brought it somewhere else.
         for (component, state) in forward.faulted.iter().chain(&self.faulted).rev() {
             let on_its_way = broke && heeding.wants(*component).is_none();
@@ -81,8 +81,7 @@ impl Transaction {
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
-                let done =
-                    self.forward.iter().flat_map(|run| run.done.iter().map(|i| slot(&run.list[*i as usize].step)));
+                let done = self.forward.done.iter().map(|i| slot(&self.forward.list[*i as usize].step));
                 let done: FxHashSet<Slot> = done.collect();
                 let otherwise = self.own_difference(live, &known);
                 if !self.mending.broke() {

@@ -79,7 +79,7 @@ pub struct Transaction {
     planned: Planned,
     spec: Spec,
     phase: Phase,
-    forward: Option<Run>,
+    forward: Run,
     /// The way back in hand, or what is mended.
     back: Option<(Run, WayBack)>,
     /// How often the way back was begun.
@@ -140,7 +140,7 @@ impl Transaction {
             asked_back: spec.asked_back,
             spec,
             phase: Phase::Forward,
-            forward: Some(forward),
+            forward,
             back: None,
             attempts: 0,
             taken_back: FxHashSet::default(),
@@ -174,7 +174,7 @@ impl Transaction {
 
     /// Goes on where the first `done` steps were done already (the model has them) and the next has ended so.
     pub fn resume(&mut self, done: u32, outcome: Outcome, live: &mut System) {
-        let forward = self.forward.as_mut().expect("it has not begun");
+        let forward = &mut self.forward;
         (0..done).for_each(|i| forward.was_done(i));
         if (done as usize) < forward.list.len() {
             forward.is_out(done, live);
@@ -194,21 +194,17 @@ impl Transaction {
 
     /// All steps, one operation after the other.
     fn whole(&self) -> &[PlannedStep] {
-        if self.planned.whole.is_empty() {
-            self.forward.as_ref().map_or(&[], |run| &run.list)
-        } else {
-            &self.planned.whole
-        }
+        if self.planned.whole.is_empty() { &self.forward.list } else { &self.planned.whole }
     }
 
     fn in_hand(&self) -> &Run {
-        self.back.as_ref().map(|(run, _)| run).or(self.forward.as_ref()).expect("a list is in hand")
+        self.back.as_ref().map_or(&self.forward, |(run, _)| run)
     }
 
     fn in_hand_mut(&mut self) -> &mut Run {
         match &mut self.back {
             Some((run, _)) => run,
-            None => self.forward.as_mut().expect("a list is in hand"),
+            None => &mut self.forward,
         }
     }
 
@@ -239,7 +235,7 @@ impl Transaction {
     /// Steps of the forward list that were done so far, in order, with what takes each back: what a safe configuration that
     /// comes now is planned around.
     pub fn done_so_far(&self) -> impl Iterator<Item = (&PlannedStep, &crate::system::Undo)> {
-        let forward = self.forward.as_ref().expect("something was carried out");
+        let forward = &self.forward;
         let open = forward.done.iter().copied().filter(|i| !self.taken_back.contains(i));
         open.map(|i| (&forward.list[i as usize], self.undo_of(i, 0)))
     }
@@ -404,7 +400,7 @@ impl Transaction {
     fn carried_out(&mut self) {
         match self.phase {
             Phase::Forward => {
-                let forward = self.forward.as_ref().expect("it was carried out");
+                let forward = &self.forward;
                 let safe = self.spec.best_effort && self.planned.parts.iter().any(|part| part.pushes.is_some());
                 if forward.is_over() && safe && !forward.failures.is_empty() && !self.taken_down {
                     self.phase = Phase::Reviewing;
@@ -447,7 +443,7 @@ impl Transaction {
                 self.mending.otherwise.clear();
                 self.taken_back.extend(self.remaining(part));
                 self.faulted.clear();
-                self.forward.iter_mut().for_each(|forward| forward.faulted.clear());
+                self.forward.faulted.clear();
             }
             Some(_) => self.mending.broke_off = true,
             None => {}
@@ -484,7 +480,7 @@ impl Transaction {
         if self.interrupted || self.taken_down {
             return 0;
         }
-        let forward = self.forward.as_ref().expect("it was carried out");
+        let forward = &self.forward;
         let failures = forward.failures.iter().map(|(i, _)| *i).chain(forward.unsettled.iter().copied());
         // One that was given up is not to blame for one before it that failed.
         failures.map(|i| self.part_of(i)).chain(self.fallen).chain(self.given_up.iter().copied()).min().unwrap_or(0)

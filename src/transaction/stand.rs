@@ -13,7 +13,7 @@ impl Transaction {
             Step::Destroy { .. } => true,
             _ => false,
         };
-        let forward = self.forward.as_ref().map_or(&[][..], |run| &run.list);
+        let forward = &self.forward.list;
         !components.is_empty()
             && forward.iter().any(|planned| stops(&planned.step) && components.contains(&planned.step.component()))
     }
@@ -26,7 +26,7 @@ impl Transaction {
             return None;
         }
         // A best effort of which a step failed is not what was asked for anyway.
-        let whole = self.forward.as_ref().is_some_and(|run| run.failures.is_empty() && run.unsettled.is_empty());
+        let whole = self.forward.failures.is_empty() && self.forward.unsettled.is_empty();
         let parts = (0..self.planned.parts.len()).filter(|part| whole && self.planned.parts[*part].holds);
         let told = |part: usize| self.asked.iter().find(|asked| asked.question == Question::Stands { part });
         let (mut open, mut waits) = (None, false);

@@ -442,3 +442,25 @@ fn what_commands_an_actuator_and_dies_is_noticed() {
         .replace("connect(\"b.out\", \"arm.push\"),", "");
     assert_eq!(unwatched(&holds, "", ""), ["aside"]);
 }
+
+#[test]
+fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
+    let told = |halt: &str| {
+        let configurations = format!(
+            "base = Configuration {{ create(\"a\", \"Drive\") }},
+             stop = Configuration {{ safe = true, group = \"stopped\", operation_call(\"a.open\") }},
+             halt = Configuration {{ {halt} property_set(\"a.gain\", 0.0) }},"
+        );
+        let said = Small::new(&configurations, STATES, "").check();
+        let found = said.of("conf::safe_lets_go");
+        assert!(found.iter().all(|finding| finding["severity"] == "warning"), "{:#}", said.0);
+        found.iter().map(|finding| finding["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let told_of = told("safe = true, group = \"stopped\",");
+    assert_eq!(told_of.len(), 1, "{told_of:?}");
+    assert!(told_of[0].starts_with("`halt` replaces `stop`") && told_of[0].contains("`a.close`"), "{told_of:?}");
+    // It calls it too; they are no alternatives; it is no safe one: somebody wants it to go on.
+    assert_eq!(told("safe = true, group = \"stopped\", operation_call(\"a.open\"),"), [""; 0]);
+    assert_eq!(told("safe = true,"), [""; 0]);
+    assert_eq!(told("group = \"stopped\","), [""; 0]);
+}

@@ -336,3 +336,20 @@ fn an_emergency_that_changes_nothing_says_what_was_applied_over_what_is_safe() {
     let again = demo.run(&["event", "e_estop"]);
     assert!(again.code == 1 && again.err.is_empty(), "{}{}", again.out, again.err);
 }
+
+/// At the end of a script in simulated time nobody is there to be asked: what something safe holds stays, is named, and the exit
+/// status says so. Without an emergency force removes everything.
+#[test]
+fn the_end_of_a_script_leaves_what_is_safe_and_says_so() {
+    let ends = |script: &str| {
+        let demo = with_an_emergency("e_estop");
+        demo.write("story.lua", script);
+        let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+        assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
+        ran.out + &ran.err
+    };
+    let held = ends("deploy('deployment.yaml') raise('e_estop') wait_state('root.safe', 5)");
+    let removed = ends("deploy('deployment.yaml')");
+    assert!(held.contains("what is left stays as it is") && held.contains("left  a (running)"), "{held}");
+    assert!(removed.contains("`base` undone") && !removed.contains("left  "), "{removed}");
+}

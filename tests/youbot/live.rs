@@ -15,6 +15,7 @@ use davit::time::{Clock, Guard, Time};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -119,32 +120,28 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     change(behind(&text, "post_conf_state = { \"youbot:running\"", ", \"Probe:running\""))
 }
 
-/// What happened, with its time in s: events as they are called, states as `in NAME`.
-type Happened = Arc<Mutex<Vec<(f64, String)>>>;
-
-pub struct Live {
-    pub clock: Clock,
-    pub session: Arc<Session>,
-    happened: Happened,
+/// A file with the probe in it, read and checked once for all that want the same, one after the other: to check it takes
+/// longer than to bring it up.
+struct Loaded {
+    /// The file's name and its configurations before they got the probe's number.
+    key: (String, String),
     id: i64,
-    // Dropped last: leaving the clock.
-    _guard: Guard,
+    checked: Arc<app::Checked>,
 }
 
-impl Live {
-    /// Nothing brought up yet; `name` is a file under deployments/.
-    pub fn new(name: &str) -> Self {
-        Self::with(name, |text| text)
-    }
+/// What nobody uses at the moment.
+static LOADED: Mutex<Vec<Loaded>> = Mutex::new(Vec::new());
 
-    /// The same, with the text of its configurations changed.
-    pub fn with(name: &str, change: impl Fn(String) -> String) -> Self {
-        static NEXT: Mutex<i64> = Mutex::new(0);
-        let id = {
-            let mut next = NEXT.lock().unwrap();
-            *next += 1;
-            *next
-        };
+impl Loaded {
+    fn of(name: &str, change: &impl Fn(String) -> String) -> Self {
+        static NEXT: AtomicI64 = AtomicI64::new(1);
+        let key = (name.to_owned(), probed(0, change));
+        let free = |all: &mut Vec<Self>| all.iter().position(|one| one.key == key).map(|at| all.swap_remove(at));
+        if let Some(one) = free(&mut LOADED.lock().unwrap()) {
+            ROWS.lock().unwrap().remove(&one.id);
+            return one;
+        }
+        let id = NEXT.fetch_add(1, Ordering::Relaxed);
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let folder = tempfile::tempdir().unwrap();
         let shipped = std::fs::read_to_string(root.join("deployments").join(format!("{name}.yaml"))).unwrap();
@@ -157,9 +154,44 @@ impl Live {
         let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries)
             .and_then(app::check)
             .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+        Self { key, id, checked: Arc::new(checked) }
+    }
+}
+
+impl Drop for Loaded {
+    fn drop(&mut self) {
+        // A test that fails may leave its probe running.
+        if !std::thread::panicking() {
+            LOADED.lock().unwrap().push(Self { key: self.key.clone(), id: self.id, checked: self.checked.clone() });
+        }
+    }
+}
+
+/// What happened, with its time in s: events as they are called, states as `in NAME`.
+type Happened = Arc<Mutex<Vec<(f64, String)>>>;
+
+pub struct Live {
+    pub clock: Clock,
+    pub session: Arc<Session>,
+    happened: Happened,
+    id: i64,
+    // Dropped behind all that uses it: leaving the clock, then what was loaded.
+    _guard: Guard,
+    _loaded: Loaded,
+}
+
+impl Live {
+    /// Nothing brought up yet; `name` is a file under deployments/.
+    pub fn new(name: &str) -> Self {
+        Self::with(name, |text| text)
+    }
+
+    /// The same, with the text of its configurations changed.
+    pub fn with(name: &str, change: impl Fn(String) -> String) -> Self {
+        let loaded = Loaded::of(name, &change);
         let clock = Clock::simulated();
         let guard = clock.enter();
-        let session = app::start(&checked, &clock).unwrap();
+        let session = app::start(&loaded.checked, &clock).unwrap();
         let happened = Happened::default();
         let log = happened.clone();
         session.hub().observe(Arc::new(move |at, what| {
@@ -173,7 +205,7 @@ impl Live {
             };
             log.lock().unwrap().push((at.as_secs_f64(), what));
         }));
-        Self { clock, session, happened, id, _guard: guard }
+        Self { clock, session, happened, id: loaded.id, _guard: guard, _loaded: loaded }
     }
 
     /// The same, with another hand on the tool than the shipped one.

@@ -1,13 +1,19 @@
 //! How the shipped deployments are stopped, whatever asks for it and whenever: the arm is never dropped.
 
-use crate::live::Live;
+use crate::live::{Live, Row};
+use davit::cli::exit::Exit;
+use davit::libraries::youbot::drives::Drives;
+use davit::libraries::youbot::parameters::GRIPPER;
+use davit::libraries::youbot::plant::ArmPlant;
+use davit::libraries::youbot::rigid_body::{ArmModel, J5};
 use davit::session::{Command, Ended, Session, Stage};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A hand that brings the arms together and sways, sooner than the shipped one.
 const HAND: &str = "free 0.5; align 1.5; sway 600 0.06 0 0 0.15";
 
-/// What asks for the end. A signal and `davit shutdown` leave the same command; twice is by force.
+/// What asks for the end. Every signal and `davit shutdown` leave the same command; twice is by force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stop {
     Once,
@@ -15,18 +21,30 @@ enum Stop {
     Twice(f64),
     /// An emergency, and the end half a second later.
     AfterEstop,
+    /// Force, on the way down that was asked for at [`ORDERED`].
+    ForceOnTheWay,
+    /// An emergency there, and half a second later it is asked for again.
+    EstopOnTheWay,
 }
+
+/// When those that are stopped on the way down were asked to go down: in operation, in s.
+const ORDERED: f64 = 9.0;
 
 /// What came of it.
 struct Came {
     at: f64,
     place: String,
     ended: Ended,
+    /// From the instant on, in s; negative where it had ended before.
     took: f64,
     /// Whether the drives went off while they held the arm up.
     dropped: bool,
     /// How fast the tool was when they did, in m/s.
     fastest: f64,
+    /// The tool's speed 0.3 s later and from then on, in m/s: of an emergency as long as nobody has asked for more.
+    speed: f64,
+    /// How far the tool came down in m: in an emergency while it was stopped, and when the drives went off.
+    drop: f64,
 }
 
 fn somebody(live: &Live, at: f64, what: impl FnOnce(&Session) + Send + 'static) {
@@ -47,17 +65,22 @@ fn stopped(name: &str, at: f64, stop: Stop) -> Came {
     let live = Live::with_hand(name, HAND);
     let place = Arc::new(std::sync::Mutex::new(String::new()));
     let seen = place.clone();
+    let estop = matches!(stop, Stop::AfterEstop | Stop::EstopOnTheWay);
     somebody(&live, at, move |session| {
         *seen.lock().unwrap() = session.hub().active().last().cloned().unwrap_or_default();
-        match stop {
-            Stop::AfterEstop => session.raise(davit::model::EventName::new("e_estop").unwrap(), "test"),
-            _ => ask(session, false),
+        match estop {
+            true => session.raise(davit::model::EventName::new("e_estop").unwrap(), "test"),
+            false => ask(session, stop == Stop::ForceOnTheWay),
         }
     });
-    match stop {
-        Stop::Once => {}
-        Stop::Twice(later) => somebody(&live, at + later, |session| ask(session, true)),
-        Stop::AfterEstop => somebody(&live, at + 0.5, |session| ask(session, false)),
+    if let Stop::Twice(later) = stop {
+        somebody(&live, at + later, |session| ask(session, true));
+    }
+    if estop {
+        somebody(&live, at + AGAIN, |session| ask(session, false));
+    }
+    if matches!(stop, Stop::ForceOnTheWay | Stop::EstopOnTheWay) {
+        somebody(&live, ORDERED, |session| ask(session, false));
     }
     let began = live.now();
     let ended = match live.session.bring_up() {
@@ -69,29 +92,45 @@ fn stopped(name: &str, at: f64, stop: Stop) -> Came {
     };
     let took = live.now() - began - at;
     let rows = live.rows();
-    // How fast the tool still was when the drives went off.
-    let fastest = rows.last().map_or(0.0, |row| row.speed.norm());
+    let last = rows.last();
+    let stands = rows.iter().filter(|row| estop && row.t >= began + at && row.t < began + at + AGAIN);
+    let before = stands.clone().next().map_or(0.0, |row| row.tool.z);
+    let sank = stands.map(|row| before - row.tool.z).fold(0.0, f64::max);
+    let later = rows.iter().filter(|row| row.t >= began + at + 0.3 && (!estop || row.t < began + at + AGAIN));
     let came = Came {
         at,
         place: place.lock().unwrap().clone(),
         ended,
         took,
         dropped: live.first("e_arm_dropped", 0.0).is_some(),
-        fastest,
+        fastest: last.map_or(0.0, |row| row.speed.norm()),
+        speed: later.map(|row| row.speed.norm()).fold(0.0, f64::max),
+        drop: last.map_or(0.0, falls).max(sank),
     };
     println!("{name} {stop:?} {}", line(&came));
     live.clock.shutdown();
     came
 }
 
+/// Until an emergency is followed by an order, in s.
+const AGAIN: f64 = 0.5;
+
+/// How far the tool comes down, in m, where the drives go off as that row shows the arm.
+fn falls(row: &Row) -> f64 {
+    let model = ArmModel::youbot(GRIPPER.mass, 1.0);
+    Drives::new(ArmPlant::new(model, J5::from(row.joints.pos))).switch_off()
+}
+
 fn line(came: &Came) -> String {
     format!(
-        "{:6.2} s  {:<40} {:?} in {:.2} s, {:.3} m/s{}{}",
+        "{:6.2} s  {:<40} {:?} in {:.2} s, {:.3} m/s, then {:.3} m/s, {:.1} mm{}{}",
         came.at,
         came.place,
         came.ended.stage,
         came.took,
+        came.speed,
         came.fastest,
+        came.drop * 1e3,
         if came.dropped { ", DROPPED" } else { "" },
         if came.ended.is_clean() { "" } else { ", LEFT" },
     )
@@ -163,26 +202,50 @@ fn an_emergency_while_it_parks_waits_for_people() {
     live.clock.shutdown();
 }
 
-/// The table of docs/youbot.md: `DAVIT_STOPS_EVERY=3 cargo test --test youbot -- --ignored --nocapture --exact stops::table`.
+/// The table of docs/youbot.md: `DAVIT_STOPS_EVERY=0.25 cargo test --release --test youbot -- --ignored --nocapture --exact stops::table`.
 #[test]
 #[ignore = "prints the table of docs/youbot.md"]
 fn table() {
-    let mut rows = String::new();
-    let mut wrong = Vec::new();
-    for at in instants(step(3.0), 12.0) {
-        let ways = [Stop::Once, Stop::AfterEstop, Stop::Twice(0.0), Stop::Twice(1.0)];
-        let all: Vec<Came> = ways.iter().map(|way| stopped("youbot_arm", at, *way)).collect();
-        let cell = |came: &Came| {
-            let how = if came.ended.is_orderly() { "" } else { " (by force)" };
-            format!("{:.1} s{how}{}", came.took, if came.dropped { " **dropped**" } else { "" })
-        };
-        wrong.extend(all.iter().filter(|came| came.dropped || !came.ended.is_clean()).map(line));
-        let place = all[0].place.trim_start_matches("root.");
-        let cells: Vec<String> = all.iter().map(cell).collect();
-        rows += &format!("| {at:.2} s | `{place}` | {} |\n", cells.join(" | "));
+    const WAYS: [(Stop, &str); 5] = [
+        (Stop::AfterEstop, "`e_estop`"),
+        (Stop::Once, "a signal"),
+        (Stop::Twice(0.0), "force"),
+        (Stop::EstopOnTheWay, "`e_estop`"),
+        (Stop::ForceOnTheWay, "force"),
+    ];
+    let (step, mut rows, mut wrong) = (step(3.0), String::new(), Vec::new());
+    for name in ["youbot_arm", "youbot_arm_scoped"] {
+        for (stop, asked) in WAYS {
+            let on_the_way = matches!(stop, Stop::EstopOnTheWay | Stop::ForceOnTheWay);
+            let until = if on_the_way { ORDERED + 10.0 } else { 12.0 };
+            let all = instants(step, until).filter(|at| !on_the_way || *at > ORDERED);
+            let all: Vec<Came> = all.map(|at| stopped(name, at, stop)).take_while(|came| came.took > -0.001).collect();
+            let bad = |came: &&Came| came.dropped || came.drop > 0.02 || !came.ended.is_clean();
+            wrong.extend(all.iter().filter(bad).map(|came| format!("{name} {stop:?} {}", line(came))));
+            let phase = |came: &Came| match () {
+                () if on_the_way => "the way down",
+                () if came.place.contains("deploying") || came.place.is_empty() => "the bring-up",
+                () => "operation",
+            };
+            for phases in all.chunk_by(|a, b| phase(a) == phase(b)) {
+                let most = |of: fn(&Came) -> f64| phases.iter().map(of).fold(0.0, f64::max);
+                let exits: BTreeSet<u8> =
+                    phases.iter().map(|came| Exit::of_stop(&came.ended, Exit::Done).code()).collect();
+                rows += &format!(
+                    "| `{name}` | {} | {asked} | {} | {:.3} | {:.1} | {} | {:.1} s | {} |\n",
+                    phase(&phases[0]),
+                    phases.len(),
+                    most(|came| came.speed),
+                    most(|came| came.drop * 1e3),
+                    phases.iter().filter(|came| came.dropped).count(),
+                    most(|came| came.took),
+                    exits.iter().map(u8::to_string).collect::<Vec<_>>().join(", "),
+                );
+            }
+        }
     }
-    println!("| asked after | in | a signal | 0.5 s after `e_estop` | two signals at once | the second 1 s later |");
-    println!("|---|---|---|---|---|---|\n{rows}");
+    println!("| deployment | in | asked | times | m/s | mm | dropped | within | exit status |");
+    println!("|---|---|---|---|---|---|---|---|---|\n{rows}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
