@@ -39,8 +39,6 @@ struct Came {
     took: f64,
     /// Whether the drives went off while they held the arm up.
     dropped: bool,
-    /// How fast the tool was when they did, in m/s.
-    fastest: f64,
     /// The tool's speed 0.3 s later and from then on, in m/s: of an emergency as long as nobody has asked for more.
     speed: f64,
     /// How far the tool came down in m: in an emergency while it was stopped, and when the drives went off.
@@ -103,7 +101,6 @@ fn stopped(name: &str, at: f64, stop: Stop) -> Came {
         ended,
         took,
         dropped: live.first("e_arm_dropped", 0.0).is_some(),
-        fastest: last.map_or(0.0, |row| row.speed.norm()),
         speed: later.map(|row| row.speed.norm()).fold(0.0, f64::max),
         drop: last.map_or(0.0, falls).max(sank),
     };
@@ -123,13 +120,12 @@ fn falls(row: &Row) -> f64 {
 
 fn line(came: &Came) -> String {
     format!(
-        "{:6.2} s  {:<40} {:?} in {:.2} s, {:.3} m/s, then {:.3} m/s, {:.1} mm{}{}",
+        "{:6.2} s  {:<40} {:?} in {:.2} s, {:.3} m/s, {:.1} mm{}{}",
         came.at,
         came.place,
         came.ended.stage,
         came.took,
         came.speed,
-        came.fastest,
         came.drop * 1e3,
         if came.dropped { ", DROPPED" } else { "" },
         if came.ended.is_clean() { "" } else { ", LEFT" },
@@ -160,7 +156,7 @@ fn wrong(stop: Stop, came: &Came) -> Option<String> {
         Stop::Twice(later) => (Some(later), false),
     };
     match forced {
-        _ if came.dropped || came.drop > 0.02 || came.fastest > 0.02 => told("it falls"),
+        _ if came.dropped || came.drop > 0.02 => told("it falls"),
         _ if estop && came.speed > 0.02 => told("it moves 0.3 s after an emergency"),
         None if !came.ended.is_orderly() => told("it is not led down"),
         Some(_) if !came.ended.is_clean() => told("something is left"),
