@@ -6,7 +6,7 @@ use crate::system::{System, View};
 use rustc_hash::{FxHashMap, FxHasher};
 use smallvec::SmallVec;
 use std::hash::{Hash, Hasher};
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// The number of what a frame contains, whatever its own number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -18,8 +18,8 @@ pub struct FrameBook {
     frames: Vec<Arc<Frame>>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     shares: FxHashMap<(u32, u32), bool>,
-    /// By address; the frames are kept alive here.
-    known: FxHashMap<usize, (FrameNumber, Arc<Frame>)>,
+    /// By address, which is not used again as long as it is known here. What a frame contains goes with the last world that has it.
+    known: FxHashMap<usize, (FrameNumber, Weak<Frame>)>,
 }
 
 impl FrameBook {
@@ -41,7 +41,7 @@ impl FrameBook {
                 next
             }
         };
-        self.known.insert(address, (FrameNumber(number), frame.clone()));
+        self.known.insert(address, (FrameNumber(number), Arc::downgrade(frame)));
         FrameNumber(number)
     }
 
