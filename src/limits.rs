@@ -17,6 +17,9 @@ pub const STACK: usize = 64;
 /// it is applied, of which few occur in turn.
 pub const PREPARED: usize = 4;
 
+/// Signals that follow each other so closely have one cause.
+pub const SIGNAL_REPEATS: Duration = Duration::from_millis(100);
+
 /// How long one step may take where the deployment does not say: longer than any software-only change, short enough that
 /// an operator does not think the program hangs.
 pub const STEP_TIMEOUT: Duration = Duration::from_secs(1);

@@ -1,7 +1,9 @@
-//! Ctrl-C, and being asked to end (SIGTERM, SIGHUP, SIGQUIT).
+//! Ctrl-C, and being asked to end (SIGTERM, SIGHUP, SIGQUIT, SIGXCPU).
 
 use super::exit::Exit;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use crate::limits;
+use crate::time::{Clock, Time};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU};
 use signal_hook::iterator::{Handle, Signals};
 use std::thread::JoinHandle;
 
@@ -17,6 +19,10 @@ impl Watch {
     /// asked of the components, and what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is
     /// no signal.
     ///
+    /// One cause may bring several: a shell tells its jobs that the terminal is gone, and then the kernel does; a key that is held
+    /// down repeats. So signals count once that follow each other within [`limits::SIGNAL_REPEATS`], and a terminal that is gone,
+    /// or a time limit, asks for no more than the first one has.
+    ///
     /// # Errors
     /// When the operating system does not let signals be watched.
     pub fn start(
@@ -24,12 +30,16 @@ impl Watch {
         stop: impl Fn(bool) + Send + 'static,
         leave: impl FnOnce() + Send + 'static,
     ) -> std::io::Result<Self> {
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT])?;
+        ignore_what_would_stop_it();
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU])?;
         let handle = signals.handle();
         let thread = std::thread::Builder::new().name("davit-signals".to_owned()).spawn(move || {
-            let mut seen = 0;
+            let (clock, mut seen, mut last) = (Clock::real(), 0, None::<Time>);
             for signal in signals.forever() {
-                if signal == SIGHUP && detached {
+                let now = clock.now();
+                let same = last.replace(now).is_some_and(|last| now.since(last) < limits::SIGNAL_REPEATS);
+                let nobody_asks = matches!(signal, SIGHUP | SIGXCPU);
+                if signal == SIGHUP && detached || seen > 0 && (same || nobody_asks) {
                     continue;
                 }
                 seen += 1;
@@ -47,6 +57,15 @@ impl Watch {
     /// Goes on until the process ends, whatever it still has to say.
     pub fn until_the_end(self) {
         std::mem::forget(self);
+    }
+}
+
+/// A terminal that takes no output from the background (`stty tostop`), and a file that may get no larger, would stop or end the
+/// process, coordinator and all. Ignored, the one lets the write through, and the other is a disk that is full.
+fn ignore_what_would_stop_it() {
+    for signal in [libc::SIGTTOU, libc::SIGXFSZ] {
+        // SAFETY: ignoring a signal runs no code of ours, and `signal` is given a number and a disposition that exist.
+        unsafe { libc::signal(signal, libc::SIG_IGN) };
     }
 }
 

@@ -353,3 +353,28 @@ fn the_end_of_a_script_leaves_what_is_safe_and_says_so() {
     assert!(held.contains("what is left stays as it is") && held.contains("left  a (running)"), "{held}");
     assert!(removed.contains("`base` undone") && !removed.contains("left  "), "{removed}");
 }
+
+/// A terminal that is closed tells so several times, and asks for no force; what would only stop or end the process does nothing.
+#[test]
+fn a_terminal_that_closes_is_one_signal() {
+    let demo = Demo::new();
+    waiting(&demo);
+    demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
+    let deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    for nothing in [libc::SIGTTOU, libc::SIGXFSZ] {
+        deployed.signal(nothing);
+    }
+    assert_eq!(demo.run(&["status", "--json"]).json()["phase"], "up");
+    for _ in 0..2 {
+        deployed.signal(libc::SIGHUP);
+    }
+    demo.until_phase("shutting_down");
+    for _ in 0..3 {
+        deployed.signal(libc::SIGHUP);
+        let status = demo.run(&["status"]);
+        assert!(status.out.contains("stopping     by its coordinator"), "{}", status.out);
+    }
+    assert_eq!(demo.run(&["shutdown", "--force"]).code, 4);
+    assert_eq!(deployed.end().code(), Some(4));
+}
