@@ -81,6 +81,11 @@ pub enum ScriptFailure {
     },
 }
 
+/// What `deploy` raises.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} is refused")]
+struct IsRefused(String);
+
 struct Host {
     options: Options,
     folder: PathBuf,
@@ -134,17 +139,20 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
     if let Some(session) = host.session.take() {
         host.ended = Some(session.take_down(false));
     }
-    let failure = match (host.refused.take(), failure) {
-        (Some((path, refused)), _) => Some(ScriptFailure::Refused { path, refused }),
-        (None, failure) => failure,
-    };
     ScriptEnd { failure, ended: host.ended }
 }
 
 fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure> {
-    let failed = |error: mlua::Error| ScriptFailure::Lua {
-        syntax: matches!(error, mlua::Error::SyntaxError { .. }),
-        message: message_within(&error, limits::SCRIPT_MEMORY),
+    // It fails by the refusal of a deployment only where it has let that through: one that it caught is its own affair.
+    let failed = |error: mlua::Error| match error.chain().any(|error| error.is::<IsRefused>()) {
+        true if host.borrow().refused.is_some() => {
+            let (path, refused) = host.borrow_mut().refused.take().expect("looked at just now");
+            ScriptFailure::Refused { path, refused }
+        }
+        _ => ScriptFailure::Lua {
+            syntax: matches!(error, mlua::Error::SyntaxError { .. }),
+            message: message_within(&error, limits::SCRIPT_MEMORY),
+        },
     };
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
@@ -330,7 +338,7 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     }
     let checked = checked.map_err(|refused| {
         host.borrow_mut().refused = Some((path, Box::new(refused)));
-        error(format!("{file} is refused"))
+        mlua::Error::external(IsRefused(file.to_owned()))
     })?;
     let clock = clock(host);
     host.borrow().faults.fit(&checked)?;

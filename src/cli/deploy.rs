@@ -18,6 +18,7 @@ use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
 use crate::session::{Command, Ended, NotUp, Session, Stage, Unanswered};
 use crate::time::{Clock, lock};
+use serde_json::json;
 use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex};
 
@@ -78,8 +79,14 @@ impl ClockKind {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         if self.detach {
-            return detach::run(context);
+            return detach::run(context).map_err(|failure| failure.as_json(self.json));
         }
+        self.deploy(context).map_err(|failure| failure.as_json(self.json))
+    }
+}
+
+impl Args {
+    fn deploy(&self, context: &Context) -> Answer {
         let checked = self.input.check(context)?;
         let clock = self.clock.make(self.pace);
         let progress = Progress::new(context.out, self.json, &clock).map_err(short)?;
@@ -88,9 +95,7 @@ impl Run for Args {
         last_words::unread(progress.end());
         Ok(exit)
     }
-}
 
-impl Args {
     fn foreground(
         &self,
         context: &Context,
@@ -262,6 +267,9 @@ fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in
     for reason in &not_up.reasons {
         progress.line(format!("  {reason}"));
     }
+    progress.json_line(&json!({
+        "what": "not_up", "why": not_up.why, "reasons": not_up.reasons, "interrupted": not_up.interrupted,
+    }));
     tell_ended(out, progress, name, &not_up.ended);
     // Who stopped it knows why it is not up; who waits for it in another terminal does not.
     let well = if not_up.interrupted && !in_background { Exit::Done } else { Exit::No };
@@ -272,6 +280,9 @@ fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
     for note in &ended.left {
         progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
     }
+    progress.json_line(&json!({
+        "what": "ended", "stage": ended.stage, "left": ended.left, "orderly": ended.is_orderly(),
+    }));
     let name = out.paint(Style::Bold, name);
     if ended.is_orderly() {
         progress.line(format!("{name} {}, nothing is left", out.paint(Style::Good, "down")));

@@ -15,6 +15,7 @@ use serde_json::{Value as Json, json};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,

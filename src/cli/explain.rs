@@ -55,7 +55,8 @@ impl Run for Args {
                     "{}; `davit explain` lists all codes",
                     did_you_mean(name, "codes", PAGES.iter().map(|p| p.code.0))
                 ),
-            ));
+            )
+            .as_json(self.json));
         };
         if self.json {
             out.json(&View::from(page));

@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Throw away what is kept of a deployment that does not run any more: its log, and that it died.
-    #[arg(long, value_name = "NAME", conflicts_with = "json")]
+    #[arg(long, value_name = "NAME", conflicts_with = "json", value_parser = super::remote::deployment_name)]
     forget: Option<String>,
     /// Print JSON.
     #[arg(long)]

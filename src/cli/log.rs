@@ -19,6 +19,7 @@ use serde_json::{Value as Json, json};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// Only so many of the newest entries.
     #[arg(long, value_name = "N")]

@@ -227,7 +227,7 @@ pub fn main(libraries: Libraries) -> ExitCode {
     }
     // Their help promises one object a line.
     let streams = match &cli.command {
-        Command::Sim(_) | Command::Monitor(_) => true,
+        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => true,
         Command::Watch(_) => true,
         Command::Log(log) => log.streams(),
         _ => false,

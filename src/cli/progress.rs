@@ -83,7 +83,14 @@ impl Progress {
         self.tap.keep_pace();
     }
 
-    /// From now on nothing is told but by [`Progress::line`] and what happens.
+    /// What the command itself has to say, for programs. Never waits.
+    pub fn json_line(&self, object: &serde_json::Value) {
+        if self.json {
+            self.tap.put_own(Told::Json(object.to_string()));
+        }
+    }
+
+    /// From now on nothing is told but by [`Progress::line`], [`Progress::json_line`] and what happens.
     pub fn finish(&self) {
         self.tap.put_own(Told::Finish);
     }

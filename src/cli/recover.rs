@@ -19,6 +19,7 @@ use serde_json::{Value as Json, json};
 #[command(override_usage = "davit recover [NAME] --back|--accept [--within SECONDS] [--json]")]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// Undo what remains: to the system before the interrupted application.
     #[arg(long, conflicts_with_all = ["accept", "forward"])]

@@ -4,6 +4,7 @@ use super::Failure;
 use super::exit::Exit;
 use super::kept;
 use crate::limits;
+use crate::model::Ident;
 use crate::model::codes::{
     CLI_NO_ANSWER, CLI_NOT_RUNNING, CLI_REFUSED, CLI_SEVERAL_RUNNING, CLI_SOCKET_GONE, CLI_UNTRUSTED, page,
 };
@@ -19,8 +20,16 @@ pub const ASK: Duration = Duration::from_secs(10);
 #[derive(Debug, clap::Args)]
 pub struct Which {
     /// The running deployment's name; not needed while only one runs.
-    #[arg(long = "on", value_name = "NAME")]
+    #[arg(long = "on", value_name = "NAME", value_parser = deployment_name)]
     pub name: Option<String>,
+}
+
+/// A deployment's name as it is typed: what is kept of it, and its socket, are files of that name.
+///
+/// # Errors
+/// It is not one: a path, say.
+pub fn deployment_name(text: &str) -> Result<String, String> {
+    Ident::new(text).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
 
 /// How long to wait for an answer.

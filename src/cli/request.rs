@@ -150,6 +150,7 @@ impl Run for UndoArgs {
 #[derive(Debug, clap::Args)]
 pub struct CommitArgs {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// Also while a coordinator's frame is in force. That frame stays, and can be undone as far as that then goes.
     #[arg(long)]

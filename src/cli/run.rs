@@ -46,6 +46,13 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
+        let json = self.json;
+        self.story(context).map_err(|failure| failure.as_json(json))
+    }
+}
+
+impl Args {
+    fn story(self, context: &Context) -> Answer {
         let clock = self.clock.make(0.0);
         let progress = Progress::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
         let say = {

@@ -21,6 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// Without its coordinator: what is safe, what brings it to rest, then everything is removed.
     #[arg(long)]

@@ -19,9 +19,10 @@ impl Watch {
     /// asked of the components, and what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is
     /// no signal.
     ///
-    /// One cause may bring several: a shell tells its jobs that the terminal is gone, and then the kernel does; a key that is held
-    /// down repeats. So signals count once that follow each other within [`limits::SIGNAL_REPEATS`], and a terminal that is gone,
-    /// or a time limit, asks for no more than the first one has.
+    /// One cause may bring several: a shell tells its jobs that the terminal is gone, and then the kernel does; `timeout` tells a
+    /// process and its group; a key that is held down repeats. So a terminal that is gone, or a time limit, asks for no more than the
+    /// first one has, and within [`limits::SIGNAL_REPEATS`] after another one neither does SIGTERM, nor does anything ask for the
+    /// end at once.
     ///
     /// # Errors
     /// When the operating system does not let signals be watched.
@@ -38,8 +39,12 @@ impl Watch {
             for signal in signals.forever() {
                 let now = clock.now();
                 let same = last.replace(now).is_some_and(|last| now.since(last) < limits::SIGNAL_REPEATS);
-                let nobody_asks = matches!(signal, SIGHUP | SIGXCPU);
-                if signal == SIGHUP && detached || seen > 0 && (same || nobody_asks) {
+                let asks_for_more = match signal {
+                    SIGHUP | SIGXCPU => false,
+                    SIGTERM => !same,
+                    _ => seen < 2 || !same,
+                };
+                if signal == SIGHUP && detached || seen > 0 && !asks_for_more {
                     continue;
                 }
                 seen += 1;

@@ -22,7 +22,7 @@ use serde_json::{Value as Json, json};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The deployments' names; not needed while only one runs.
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = super::remote::deployment_name)]
     names: Vec<String>,
     /// Print JSON.
     #[arg(long)]

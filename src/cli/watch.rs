@@ -34,6 +34,7 @@ const ANSWERS: Duration = Duration::from_secs(2);
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
+    #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// How often to look, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.5, value_parser = seconds)]

@@ -36,6 +36,12 @@ impl Params {
                 cx.report(finding.at(entry.origin).labelled(error.reason).help("write it like `gain: 0.5`"));
                 continue;
             }
+            if let Some(empty) = empty(&entry.value) {
+                let finding =
+                    Finding::error(codes::TEXT_BAD_PARAMETER, format!("the parameter `{}` has no value", entry.key));
+                let help = "write one, or leave the parameter out: in Lua an empty one is `nil`, and whatever takes it is gone";
+                cx.report(finding.at(empty).labelled("nothing stands here").help(help));
+            }
             let (name, value, origin) = (entry.key.into_owned(), entry.value, entry.origin);
             out.0.push(Param { name, value, used: false, set: false, origin });
         }
@@ -58,6 +64,10 @@ impl Params {
         let file = cx.sources.add_file(format!("--set {path}"), text, Language::Yaml);
         let whole = cx.sources.whole_file(file);
         let Some(value) = yaml::read(cx, Reading { file, whole }) else { return };
+        if empty(&value).is_some() {
+            cx.refuse(bad("it has no value"));
+            return;
+        }
         let at = self.0.iter().position(|p| p.name == parts[0]);
         let index = at.unwrap_or_else(|| {
             let value = Node::new(Kind::Map(Vec::new()), whole);
@@ -94,5 +104,15 @@ impl Params {
             };
             cx.report(finding.at(param.origin).help(help));
         }
+    }
+}
+
+/// Where a value has nothing in it.
+fn empty(value: &Node) -> Option<Origin> {
+    match &value.kind {
+        Kind::Null => Some(value.origin),
+        Kind::List(elements) => elements.iter().find_map(empty),
+        Kind::Map(entries) => entries.iter().find_map(|entry| empty(&entry.value)),
+        _ => None,
     }
 }

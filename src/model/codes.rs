@@ -107,7 +107,7 @@ codes! {
     TEXT_NOT_FINITE = "text::not_finite", "a number is NaN or infinite",
         "Values that are not finite numbers are refused wherever they enter: no limit, comparison or controller treats \
          them sensibly. Look at the calculation that led to it, such as a division by zero.";
-    TEXT_BAD_PARAMETER = "text::bad_parameter", "a parameter on the command line cannot be read",
+    TEXT_BAD_PARAMETER = "text::bad_parameter", "a parameter has no value, or cannot be read from the command line",
         "Parameters are given as `--set name=value` or `--set table.key=value`. The name is a name of Lua, the value is \
          read as YAML: `--set gain=0.5`, `--set mode=fast`, `--set weights=[1.0, 2.0]`.";
     TEXT_UNKNOWN_PARAMETER = "text::unknown_parameter", "nothing reads a parameter",

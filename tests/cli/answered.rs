@@ -77,6 +77,72 @@ fn what_is_refused_is_json_too_where_it_is_asked_for() {
     }
 }
 
+/// Also of what prints a line an event: its last line says why.
+#[test]
+fn what_comes_to_nothing_says_so_in_json() {
+    let demo = Demo::new();
+    demo.write("bad.lua", "this is no Lua");
+    demo.write("fails.lua", "error('mine')");
+    for (args, code, finding) in [
+        (&["deploy", "nope.yaml"][..], 2, "text::no_file"),
+        (&["deploy", "deployment.yaml", "--set", "nope=1"], 1, "text::unknown_parameter"),
+        (&["deploy", "deployment.yaml", "--detach", "--set", "nope=1"], 1, "text::unknown_parameter"),
+        (&["run", "nope.lua"], 2, "text::no_file"),
+        (&["run", "bad.lua"], 2, "script::syntax"),
+        (&["run", "fails.lua"], 1, "script::failed"),
+        (&["explain", "conf::nope"], 1, "cli::unknown_code"),
+    ] {
+        let ran = demo.run(&[args, &["--json"]].concat());
+        assert_eq!((ran.code, ran.err.as_str()), (code, ""), "{args:?} {}", ran.out);
+        let last = ran.out.lines().last().unwrap_or_default();
+        let told: serde_json::Value =
+            if args[0] == "explain" { ran.json() } else { serde_json::from_str(last).expect(last) };
+        assert_eq!(told["findings"][0]["code"], finding, "{args:?} {}", ran.out);
+    }
+    // What does not come up says why, and how it was stopped.
+    let faults = "faults:\n  - { step: \"start source\", how: fail }\n";
+    demo.write("deployment.yaml", &format!("{}{faults}", demo.read("deployment.yaml")));
+    let ran = demo.run(&["deploy", "deployment.yaml", "--json", "--clock", "simulated"]);
+    let told: Vec<serde_json::Value> = ran.out.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let of =
+        |what: &str| told.iter().find(|line| line["what"] == what).unwrap_or_else(|| panic!("{}{}", ran.out, ran.err));
+    assert!(of("not_up")["why"].as_str().is_some_and(|why| !why.is_empty()), "{}", ran.out);
+    assert_eq!(of("ended")["stage"], "led", "{}", ran.out);
+}
+
+/// Another failure of a script than that of the refusal which it has caught is told as what it is.
+#[test]
+fn a_refusal_that_a_script_catches_is_its_own_affair() {
+    let demo = Demo::new();
+    let caught = "local ok, why = pcall(deploy, 'nope.yaml') say(tostring(why)) ";
+    for (then, code, says) in [
+        ("say('end')", 0, ""),
+        ("assert(false, 'the gain is wrong')", 1, "the gain is wrong"),
+        ("deploy('deployment.yaml') error('mine')", 1, "mine"),
+        ("error(why)", 1, "nope.yaml is refused"),
+        ("deploy('neither.yaml')", 2, "neither.yaml"),
+    ] {
+        demo.write("story.lua", &format!("{caught}{then}"));
+        let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+        assert_eq!(ran.code, code, "{then}: {}{}", ran.out, ran.err);
+        assert!(ran.err.contains(says) && ran.out.contains("nope.yaml is refused"), "{then}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// An empty one would be `nil` in Lua, and what takes it would be gone without a word.
+#[test]
+fn a_parameter_without_a_value_is_refused() {
+    let demo = Demo::new();
+    let ran = demo.run(&["plan", "deployment.yaml", "--set", "gain="]);
+    assert!(ran.code == 2 && ran.err.contains("it has no value"), "{} {}", ran.code, ran.err);
+    let text = demo.read("deployment.yaml");
+    for with in ["with: { gain: }", "with: { gains: { k: [1.0, null] } }"] {
+        demo.write("deployment.yaml", &format!("{text}\n{with}\n"));
+        let ran = demo.run(&["check", "deployment.yaml"]);
+        assert!(ran.code != 0 && ran.err.contains("has no value"), "{with}: {}{}", ran.out, ran.err);
+    }
+}
+
 #[test]
 fn a_socket_with_too_long_a_path_says_so() {
     let demo = Demo::new();

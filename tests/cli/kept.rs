@@ -121,7 +121,7 @@ fn one_in_the_foreground_is_kept_too_also_when_a_third_signal_ends_it() {
     until("the second is heard", || {
         tried += 1;
         let status = demo.run(&["status", "--json"]).json();
-        (status["stopping"]["stage"] == "forced" || tried > 20).then_some(())
+        (status["stopping"]["stage"] == "forced" && tried > 10 || tried > 20).then_some(())
     });
     child.signal(libc::SIGINT);
     assert_eq!(child.end().code(), Some(4));

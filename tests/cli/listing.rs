@@ -76,3 +76,18 @@ fn what_runs_and_what_died_is_listed_until_it_is_forgotten() {
     assert_eq!(demo.run(&["shutdown"]).code, 0);
     assert_eq!(demo.run(&["list"]).out, "no deployment is running\n", "what ended in order is not listed");
 }
+
+/// What is kept of a deployment is a file of its name: a name that leads elsewhere is none.
+#[test]
+fn a_path_is_no_name() {
+    let demo = Demo::new();
+    demo.write("victim.life", "mine");
+    let elsewhere = demo.path("victim").display().to_string();
+    for name in ["../victim", elsewhere.as_str(), "../../victim", "a/b", ""] {
+        for args in [&["list", "--forget", name][..], &["status", name], &["log", name], &["shutdown", name]] {
+            let ran = demo.run(args);
+            assert_eq!(ran.code, 2, "{args:?} {}{}", ran.out, ran.err);
+        }
+    }
+    assert_eq!(demo.read("victim.life"), "mine");
+}

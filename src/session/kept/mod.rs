@@ -34,7 +34,9 @@ pub fn directory() -> Option<PathBuf> {
     Some(state.join("davit"))
 }
 
+/// None: there is no directory, or that is no name but leads elsewhere.
 fn file(name: &str, ending: &str) -> Option<PathBuf> {
+    crate::model::Ident::new(name).ok()?;
     Some(directory()?.join(format!("{name}.{ending}")))
 }
 
