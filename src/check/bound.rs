@@ -36,6 +36,8 @@ pub enum Bound {
     Stopping,
     /// A coordinator could not be entered.
     Entered,
+    /// Whether what a configuration stands for becomes true where others change what it looks at.
+    Stands,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
 }
@@ -81,6 +83,9 @@ impl Bound {
             Self::Stopping => {
                 "whether one event that ends the deployment leads all coordinators down was not followed".to_owned()
             }
+            Self::Stands => "whether what a configuration stands for (`holds`) becomes true was not followed where others may change the \
+                             run states that it looks at"
+                .to_owned(),
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {
                 "whether one comes up, or down, in time was not followed to the end: a time may add up to too much, and there are too many \

@@ -145,6 +145,9 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         }
         None => graph.cut(Bound::Entered, Failed::Nothing),
     }
+    if graph.product.unjudged {
+        graph.cut(Bound::Stands, Failed::Nothing);
+    }
     graph
 }
 

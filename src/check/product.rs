@@ -62,6 +62,8 @@ pub struct Product<'a> {
     pub follows_by_hand: bool,
     /// It is said already that the shutdown does not reach *down*.
     pub never_down: bool,
+    /// A configuration stands for run states that others may change: whether it becomes true is not judged.
+    pub(super) unjudged: bool,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
     /// How much more is followed.
@@ -105,9 +107,10 @@ impl<'a> Product<'a> {
             follows_by_hand: false,
             never_down: false,
             untimed: false,
+            unjudged: false,
             effort: Effort::default().into(),
         };
-        product.worlds.judged = super::stands::judged(deployment, charts);
+        (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
         product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(&views[*number], charts, *number);

@@ -21,11 +21,11 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Configurations of which it can be told: the platform shows what they look at, and nobody else can change that before
-/// their time is over.
-pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> FxHashSet<ConfigId> {
-    let mut all = FxHashSet::default();
+/// their time is over. And whether there are others that look at run states, of which it cannot.
+pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> (FxHashSet<ConfigId>, bool) {
+    let (mut all, mut left) = (FxHashSet::default(), false);
     if deployment.configurations.iter().all(|c| c.holds.is_none()) {
-        return all;
+        return (all, left);
     }
     let claims = Claims::new(deployment.configurations.iter());
     let names = deployment.coordinators.iter().map(|coordinator| requester(coordinator.name));
@@ -50,9 +50,19 @@ pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> FxHashSet<ConfigId>
         });
         if !free {
             all.insert(configuration.id);
+        } else {
+            left |= looks_at_states(holds) && by.iter().any(|(_, ids)| ids.contains(&configuration.id));
         }
     }
-    all
+    (all, left)
+}
+
+/// Whether anything of it rests on run states.
+fn looks_at_states(condition: &Condition) -> bool {
+    let mut found = false;
+    condition
+        .for_each(&mut |part| found |= matches!(part.kind, ConditionKind::InState { .. } | ConditionKind::Faulted(_)));
+    found
 }
 
 /// That what a configuration stands for is false where it has just been applied, and stays so until its time is over.

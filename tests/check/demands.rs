@@ -464,3 +464,27 @@ fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
     assert_eq!(told("safe = true,"), [""; 0]);
     assert_eq!(told("group = \"stopped\","), [""; 0]);
 }
+
+/// What others may change meanwhile is not judged, and that is said.
+#[test]
+fn what_a_configuration_stands_for_and_others_change_is_not_called_followed() {
+    let aux = STATES.replace("base", "lamp").replace("e_start", "e_lamp");
+    let said = |holds: &str| {
+        let configurations = format!(
+            "base = Configuration {{ create(\"a\", \"Drive\"){holds} }},
+             lamp = Configuration {{ create(\"b\", \"Drive\"), post_conf_state = {{ \"b:running\" }} }},"
+        );
+        let lost = ["building", "up", "failed", "leaving"]
+            .map(|state| format!("trans {{ src = \"{state}\", tgt = \"failed\", events = {{ \"base.lost\" }} }},"))
+            .concat();
+        let main = format!("{STATES}{}", if holds.is_empty() { "" } else { &lost });
+        let both = Small::several(&configurations, &[("main", &main), ("aux", &aux)], "");
+        both.demo.replace("small.yaml", "up: up", "up: [main:up, aux:idle]");
+        both.check().0
+    };
+    let plain = said("");
+    assert_eq!(plain["left"], serde_json::json!([]), "{plain:#}");
+    let judged = said(", holds = in_state(\"b\", \"running\")");
+    let left = judged["left"].as_array().unwrap();
+    assert!(left.iter().any(|left| left.as_str().unwrap().contains("`holds`")), "{judged:#}");
+}
