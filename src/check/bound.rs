@@ -34,6 +34,8 @@ pub enum Bound {
     Rounds,
     /// [`limits::CHECK_STOPPING`].
     Stopping,
+    /// A coordinator that is down goes on while others, followed apart, are not.
+    Apart,
     /// A coordinator could not be entered.
     Entered,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
@@ -80,6 +82,10 @@ impl Bound {
             }
             Self::Stopping => {
                 "whether one event that ends the deployment leads all coordinators down was not followed".to_owned()
+            }
+            Self::Apart => {
+                "what leads a coordinator on that is down already, while others that it has nothing to do with are not, was not followed"
+                    .to_owned()
             }
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {

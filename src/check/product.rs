@@ -17,14 +17,17 @@ use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, index};
+use super::timers::standing;
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::rc::Rc;
+use std::time::Duration;
 
 /// The moves of the product.
 pub struct Product<'a> {
@@ -62,6 +65,8 @@ pub struct Product<'a> {
     pub follows_by_hand: bool,
     /// It is said already that the shutdown does not reach *down*.
     pub never_down: bool,
+    /// Configurations that have to stand for a time before they are answered, and how long at least.
+    pub(super) standing: FxHashMap<ConfigId, Duration>,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
     /// How much more is followed.
@@ -104,6 +109,7 @@ impl<'a> Product<'a> {
             minds_stopping,
             follows_by_hand: false,
             never_down: false,
+            standing: standing(deployment),
             untimed: false,
             effort: Effort::default().into(),
         };
