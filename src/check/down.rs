@@ -136,10 +136,15 @@ impl Graph<'_, '_> {
         let mut before = reaches.to_vec();
         // Nothing comes of what is refused.
         let stops = |at: u32| self.states[at as usize].stopping;
-        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to).collect();
-        // What came just before is overtaken by the event that ends the deployment, and heard behind it.
-        let stale = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
-        let begun = (0u32..).zip(stale).filter(|(_, begun)| *begun).map(|(at, _)| at).collect();
+        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to);
+        let begun: Vec<u32> = begun.collect();
+        // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
+        // it is told as unheard.
+        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped);
+        let heard = heard.map(|edge| edge.to).collect();
+        let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
+        let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
+        let begun: Vec<u32> = stale.chain(begun).collect();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
