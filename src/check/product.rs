@@ -17,7 +17,6 @@ use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, index};
-use super::timers::standing;
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
@@ -109,7 +108,7 @@ impl<'a> Product<'a> {
             minds_stopping,
             follows_by_hand: false,
             never_down: false,
-            standing: standing(deployment),
+            standing: super::stands::standing(deployment),
             untimed: false,
             effort: Effort::default().into(),
         };

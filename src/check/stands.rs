@@ -16,7 +16,7 @@ use crate::stack::{Request, Requester};
 use crate::statechart::Chart;
 use crate::system::{System, View};
 use crate::time::Time;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
@@ -153,8 +153,14 @@ pub fn stands_after(deployment: &Deployment, configuration: &Configuration, syst
     comes_true(holds, system, configuration.timeout.unwrap_or(deployment.limits.step_timeout))
 }
 
+/// How long each configuration is not answered at least, since it has to stand so long.
+pub fn standing(deployment: &Deployment) -> FxHashMap<ConfigId, Duration> {
+    let all = deployment.configurations.iter().filter(|c| !c.safe);
+    all.map(|c| (c.id, least(deployment, c))).filter(|(_, lasts)| !lasts.is_zero()).collect()
+}
+
 /// How long it takes at least from its last step until a configuration stands, whatever is there.
-pub fn least(deployment: &Deployment, configuration: &Configuration) -> Duration {
+fn least(deployment: &Deployment, configuration: &Configuration) -> Duration {
     let Some(holds) = &configuration.holds else { return Duration::ZERO };
     let nothing = System::new(Arc::default());
     let patience = configuration.timeout.unwrap_or(deployment.limits.step_timeout);

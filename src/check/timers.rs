@@ -2,12 +2,10 @@
 
 use super::product::Product;
 use super::shows::goes;
-use super::stands::least;
 use super::state::{Move, Next, State};
-use crate::model::{Ask, ConfigId, Deployment, EventName, SimulatedReaction, StepPattern, Verdict};
+use crate::model::{Ask, ConfigId, EventName, SimulatedReaction, StepPattern, Verdict};
 use crate::stack::Request;
 use crate::statechart::{EventId, NodeId};
-use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::time::Duration;
 
@@ -52,12 +50,6 @@ pub(super) fn takes(timers: &[Timer], waits: &[Wait]) -> Duration {
 /// So much time has passed without any of it being over.
 pub(super) fn aged(waits: &[Wait], by: Duration) -> Waits {
     waits.iter().map(|wait| Wait { left: wait.left.saturating_sub(by), ..*wait }).collect()
-}
-
-/// How long each configuration is not answered at least, since it has to stand so long.
-pub(super) fn standing(deployment: &Deployment) -> FxHashMap<ConfigId, Duration> {
-    let all = deployment.configurations.iter().filter(|c| !c.safe);
-    all.map(|c| (c.id, least(deployment, c))).filter(|(_, lasts)| !lasts.is_zero()).collect()
 }
 
 impl Product<'_> {
