@@ -5,11 +5,9 @@
 //! since that step was quick, or led through places alone that would have heard it.
 
 use super::explore::{Barred, Edge, Graph};
-use super::shows::goes;
-use super::state::{Failed, Move, Next, State};
+use super::state::{Failed, Move};
 use crate::model::monitor::MONITORS_TYPE;
 use crate::model::{EventName, Monitor, RunState, StepPattern, Value};
-use crate::stack::Request;
 use crate::system::View;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -153,20 +151,9 @@ impl Graph<'_, '_> {
             let nexts = self.nexts(from).all;
             for number in numbers {
                 let next = self.edges[number].place.and_then(|place| nexts.get(place as usize));
-                with[number] = next.is_some_and(|next| self.does(&state, next, pattern));
+                with[number] = next.is_some_and(|next| self.product.does_step(&state, next, pattern));
             }
         }
         with
-    }
-
-    /// Whether such a step is done when these requests are carried out.
-    fn does(&self, before: &State, next: &Next, pattern: &StepPattern) -> bool {
-        let done = next.answers.iter().filter(|(_, verdict)| verdict.is_success());
-        let requests: Vec<Request> = done.map(|(request, _)| *request).collect();
-        if requests.is_empty() {
-            return false;
-        }
-        let steps = self.product.worlds.steps(before.world, &requests, &goes(before, &requests));
-        steps.iter().any(|planned| pattern.matches(&planned.step))
     }
 }

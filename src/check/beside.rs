@@ -186,7 +186,7 @@ fn claimed(claims: &Claims, ids: &BTreeSet<ConfigId>) -> Claim {
 
 /// The coordinators in groups that have nothing to do with each other: they touch nothing in common, hear nothing of each
 /// other, no safe configuration of one interrupts another, and nothing that an operator may apply touches what both touch. What
-/// holds of each group holds of all together.
+/// holds of each group holds of all together, but for when all of them are *down* at once (`Graph::goes_on_when_down`).
 pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
     if charts.len() < 2 {
         return (0..charts.len()).map(|number| vec![number]).collect();

@@ -34,6 +34,8 @@ pub enum Bound {
     Rounds,
     /// [`limits::CHECK_STOPPING`].
     Stopping,
+    /// A coordinator that is down goes on while others, followed apart, are not.
+    Apart,
     /// A coordinator could not be entered.
     Entered,
     /// Whether what a configuration stands for becomes true where others change what it looks at.
@@ -86,6 +88,10 @@ impl Bound {
             Self::Stands => "whether what a configuration stands for (`holds`) becomes true was not followed where others may change the \
                              run states that it looks at"
                 .to_owned(),
+            Self::Apart => {
+                "what leads a coordinator on that is down already, while others that it has nothing to do with are not, was not followed"
+                    .to_owned()
+            }
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {
                 "whether one comes up, or down, in time was not followed to the end: a time may add up to too much, and there are too many \

@@ -9,8 +9,10 @@ use super::explore::{Barred, Edge, Graph};
 use super::late::Late;
 use super::places::quickest;
 use super::state::{Failed, Move};
+use super::timers::Timers;
 use crate::model::Finding;
 use crate::model::codes::COORD_NO_WAY_DOWN;
+use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -23,6 +25,8 @@ pub(super) struct Slow {
     pub late: BTreeMap<u32, Late>,
     /// The same with those that a component may raise, if one does.
     pub reported: BTreeMap<u32, Late>,
+    /// On none, since what would lead on takes so long, and something else is over before, after so long.
+    pub overtaken: BTreeMap<u32, (Duration, Duration)>,
 }
 
 impl Graph<'_, '_> {
@@ -30,16 +34,23 @@ impl Graph<'_, '_> {
     pub(super) fn slow(&mut self, bars: &[Option<Barred>]) -> Slow {
         let within = self.product.deployment.shutdown.within;
         let stops = |at: u32| self.states[at as usize].stopping;
-        let takes = |edge: &Edge| (edge.from as usize, edge.to as usize, self.product.takes(edge.by));
         // What is refused is not raised; what may come leads there, and need not lead on.
         let comes = |(number, edge): &(usize, &Edge)| {
             stops(edge.from) && !matches!(bars[*number], Some(Barred::Closed | Barred::Late))
         };
         let leads = |number: usize| bars[number].is_none_or(|of| of == Barred::Reported);
-        let edges = || self.edges.iter().enumerate().filter(comes);
-        if !edges().any(|(_, edge)| matches!(edge.by, Move::Time(..))) {
+        let some: Vec<usize> = self.edges.iter().enumerate().filter(comes).map(|(number, _)| number).collect();
+        let timers = self.timers(&some);
+        if timers.is_empty() {
             return Slow::default();
         }
+        let stops = |at: u32| self.states[at as usize].stopping;
+        let edges = || some.iter().map(|number| (*number, &self.edges[*number]));
+        let whole = |timers: &Timers| timers.iter().map(|timer| self.product.lasts_whole(*timer)).max();
+        let takes = |(number, edge): (usize, &Edge)| {
+            let takes = timers.get(&number).and_then(whole).unwrap_or_default();
+            (edge.from as usize, edge.to as usize, takes)
+        };
         let (people, mut ends) = (self.stands_still(), self.arrives());
         ends.iter_mut().zip(&people).for_each(|(end, people)| *end |= people);
         let begins = |edge: &&Edge| !stops(edge.from) && stops(edge.to);
@@ -47,8 +58,8 @@ impl Graph<'_, '_> {
         let first: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).chain(still()).collect();
         // As if no two times ran at once: they last no longer than that.
         let begin = first.iter().map(|at| *at as usize).collect();
-        let there = quickest(self.states.len(), edges().map(|(_, edge)| takes(edge)), begin);
-        let on = edges().filter(|(number, _)| leads(*number)).map(|(_, edge)| takes(edge));
+        let there = quickest(self.states.len(), edges().map(takes), begin);
+        let on = edges().filter(|(number, _)| leads(*number)).map(takes);
         let last: Vec<usize> = (0..ends.len()).filter(|at| ends[*at]).collect();
         let on = quickest(self.states.len(), on.map(|(from, to, takes)| (to, from, takes)), last);
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
@@ -60,15 +71,16 @@ impl Graph<'_, '_> {
             event && rests(edge.from) && on[edge.to as usize].is_some_and(|on| !on.is_zero())
         };
         let late: Vec<bool> = (0..self.edges.len()).map(comes_late).collect();
-        if !(0u32..).zip(&self.states).any(|(at, _)| slow(at)) && !late.contains(&true) {
+        let mut waiting: FxHashSet<u32> = FxHashSet::default();
+        let contend = timers.keys().any(|number| !waiting.insert(self.edges[*number].from));
+        if !(0u32..).zip(&self.states).any(|(at, _)| slow(at)) && !late.contains(&true) && !contend {
             return Slow::default();
         }
         // With the times that run at once.
-        let some: Vec<usize> = edges().map(|(number, _)| number).collect();
         let left = self.left_to_enter_anew(&some);
         let stops = |at: u32| self.states[at as usize].stopping;
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
-        let Some(places) = self.places(&first, &some, &left, rests, &late) else {
+        let Some(places) = self.places(&first, &some, &timers, &left, rests, &late) else {
             self.cut(Bound::Times, Failed::Nothing);
             return Slow::default();
         };
@@ -77,7 +89,15 @@ impl Graph<'_, '_> {
         let there = quickest(count, legs().map(|leg| (leg.from, leg.to, leg.takes)), (0..places.first).collect());
         let last: Vec<usize> = (0..count).filter(|at| ends[places.list[*at].0 as usize]).collect();
         let back = legs().filter(|leg| leads(leg.edge)).map(|leg| (leg.to, leg.from, leg.takes));
+        let leads_on = on;
         let on = quickest(count, back, last.clone());
+        let mut overtaken: BTreeMap<u32, (Duration, Duration)> = BTreeMap::new();
+        for (from, edge, lasts, over) in &places.overtaken {
+            let (at, to) = (places.list[*from].0, self.edges[*edge].to);
+            if there[*from].is_some() && on[*from].is_none() && leads(*edge) && leads_on[to as usize].is_some() {
+                overtaken.entry(at).or_insert((*lasts, *over));
+            }
+        }
         let mut always: BTreeMap<u32, Duration> = BTreeMap::new();
         for (number, (at, _)) in places.list.iter().enumerate().filter(|(_, (at, _))| rests(*at)) {
             if let Some(all) = there[number].zip(on[number]).map(|(there, on)| there + on) {
@@ -93,7 +113,7 @@ impl Graph<'_, '_> {
         };
         let raised = late(&|bar| bar.is_none());
         let reported = if raised.is_empty() { late(&|_| true) } else { BTreeMap::new() };
-        Slow { always, late: raised, reported }
+        Slow { always, late: raised, reported, overtaken }
     }
 
     /// That no way down by a state is in time.
@@ -108,8 +128,29 @@ impl Graph<'_, '_> {
         self.too_slow(at, message, "let something lead on sooner")
     }
 
+    /// Nothing leads down from a state but what another time comes before.
+    pub(super) fn is_overtaken(&self, at: u32, (lasts, over): (Duration, Duration)) -> Finding {
+        let message = format!(
+            "from `{}` only what takes {} s leads down, and what takes {} s is always over before",
+            self.product.place(&self.states[at as usize]),
+            lasts.as_secs_f64(),
+            over.as_secs_f64()
+        );
+        self.not_led_down(at, message).path("shutdown.event").help(
+            "let that lead down as well, or give it more time; else what is left is taken down without the coordinator",
+        )
+    }
+
     /// A way down by a state is not in time.
     pub(super) fn too_slow(&self, at: u32, message: String, instead: &str) -> Finding {
+        let help = format!(
+            "give it more time with `shutdown.within_s`, or {instead}; else what is left is taken down without the coordinator"
+        );
+        self.not_led_down(at, message).path("shutdown.within_s").help(help)
+    }
+
+    /// What is said of one that is not down yet.
+    fn not_led_down(&self, at: u32, message: String) -> Finding {
         let state = &self.states[at as usize];
         // The one that is not down yet.
         let late = self
@@ -119,11 +160,6 @@ impl Graph<'_, '_> {
             .zip(&state.leaves)
             .find(|(member, leaf)| member.down.is_none_or(|down| !member.chart.is_inside(**leaf, down)));
         let (member, leaf) = late.unwrap_or((&self.product.members[0], &state.leaves[0]));
-        Finding::warning(COORD_NO_WAY_DOWN, message)
-            .at(member.chart.origin(*leaf))
-            .path("shutdown.within_s")
-            .help(format!(
-                "give it more time with `shutdown.within_s`, or {instead}; else what is left is taken down without the coordinator"
-            ))
+        Finding::warning(COORD_NO_WAY_DOWN, message).at(member.chart.origin(*leaf))
     }
 }

@@ -91,14 +91,28 @@ impl Graph<'_, '_> {
         reaches
     }
 
-    /// Which states are *down*, or not followed further, or nothing is known of them.
+    /// Whether coordinators that are down may go on before others are that are not followed with them: all of these have to be down
+    /// at once. What begins and ends the deployment is taken by all, or refused.
+    pub(super) fn goes_on_when_down(&self) -> bool {
+        let leads = |edge: &Edge| {
+            let comes = match edge.by {
+                Move::Event(_) => !self.product.is_first_or_last(edge.by),
+                by => matches!(by, Move::Time(..)),
+            };
+            comes && self.failed[edge.from as usize] == Failed::Nothing
+        };
+        let is_down = |at: u32| self.product.all_in(&self.states[at as usize], |member| member.down);
+        self.product.others && self.edges.iter().any(|edge| leads(edge) && is_down(edge.from) && !is_down(edge.to))
+    }
+
+    /// Which states are *down*, or what is in force there is taken away by force, or they are not followed further, or nothing is known of them.
     pub(super) fn arrives(&self) -> Vec<bool> {
         let of = |(state, followed): (&State, &bool)| {
             !followed || self.product.is_down(state) || self.product.worlds.top(state.world).is_some()
         };
         let mut arrives: Vec<bool> = self.states.iter().zip(&self.followed).map(of).collect();
-        let ends = self.ends.iter().copied().chain(self.troubles.iter().map(|(at, _)| *at));
-        ends.for_each(|at| arrives[at as usize] = true);
+        let forced = self.troubles.iter().filter(|(_, trouble)| trouble.stays_in_force()).map(|(at, _)| *at);
+        self.ends.iter().copied().chain(forced).for_each(|at| arrives[at as usize] = true);
         arrives
     }
 
@@ -122,7 +136,15 @@ impl Graph<'_, '_> {
         let mut before = reaches.to_vec();
         // Nothing comes of what is refused.
         let stops = |at: u32| self.states[at as usize].stopping;
-        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to).collect();
+        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to);
+        let begun: Vec<u32> = begun.collect();
+        // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
+        // it is told as unheard.
+        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped);
+        let heard = heard.map(|edge| edge.to).collect();
+        let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
+        let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
+        let begun: Vec<u32> = stale.chain(begun).collect();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
@@ -142,6 +164,8 @@ impl Graph<'_, '_> {
             let slow = self.slow(&bars);
             let tell = |graph: &Self, at| graph.lasts_too_long(at, slow.always[&at]);
             found_at(self, slow.always.keys().copied().collect(), true, &tell);
+            let tell = |graph: &Self, at| graph.is_overtaken(at, slow.overtaken[&at]);
+            found_at(self, slow.overtaken.keys().copied().collect(), true, &tell);
             for (late, certain) in [(&slow.late, true), (&slow.reported, false)] {
                 let tell = |graph: &Self, at| graph.lasts_too_long_late(at, &late[&at]);
                 found_at(self, late.keys().copied().collect(), certain, &tell);

@@ -7,15 +7,16 @@
 use super::beside;
 use super::closed::Raises;
 use super::effort::Far;
-use super::lasts;
+use super::lasts::{Soonest, soonest};
 use super::members::Member;
 use super::outcome::Held;
 use super::product::Product;
 use super::shows::goes;
-use super::state::{Move, Next, State};
+use super::state::{Failed, Move, Next, State};
+use super::timers::{Waits, takes};
 use super::tried::{Goal, Tried, Way};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, Findings, Ident, Snapshot};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, Findings, Ident, Snapshot, Verdict};
 use crate::plan::PlannedStep;
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
@@ -81,7 +82,12 @@ pub enum Until {
 
 impl Product<'_> {
     /// What happens next by itself when every request is answered *ok*; none: nothing does, or it is refused.
-    fn by_itself(&mut self, state: &State) -> Result<Option<Next>, (Request, Findings)> {
+    /// With `waits` told it is what comes first.
+    pub(super) fn by_itself(
+        &mut self,
+        state: &State,
+        waits: Option<&Waits>,
+    ) -> Result<Option<Next>, (Request, Findings)> {
         if let Some(turn) = state.desk.under_way().first().filter(|_| state.safe.is_empty() && state.due.is_empty()) {
             let (number, requests) = (turn.number, turn.batch.requests.clone());
             if self.worlds.get(state.world).is_some() {
@@ -98,16 +104,22 @@ impl Product<'_> {
             return Err((request, reasons.to_vec()));
         }
         // Answers on their way, then safe configurations, then what is under way, then what lies in the inboxes.
-        let nexts = self.nexts(state).all.into_iter();
-        Ok(nexts.into_iter().find(|next| matches!(next.by, Move::Answer | Move::Taken(..))))
+        let mut nexts = self.goes_on(state).all;
+        let Some(waits) = waits else { return Ok(nexts.into_iter().next()) };
+        // The first way in which something ends is that on which nothing fails.
+        let well = nexts.iter().enumerate().filter(|(_, next)| next.failed == Failed::Nothing);
+        let first = well.min_by_key(|(_, next)| takes(&self.timers_of(next, waits), waits)).map_or(0, |(at, _)| at);
+        Ok((first < nexts.len()).then(|| nexts.swap_remove(first)))
     }
 
-    /// Lets everything happen that does by itself, and appends it. Stops early where all are at the goal.
+    /// Lets everything happen that does by itself, and appends it. Stops early where all are at the goal, and with `waits` told
+    /// where something takes time.
     pub(super) fn rest(
         &mut self,
         state: State,
         goal: Goal,
         moves: &mut Vec<Next>,
+        mut waits: Option<&mut Waits>,
     ) -> Result<State, (Request, Findings)> {
         let mut state = state;
         let mut seen: FxHashSet<State> = FxHashSet::default();
@@ -117,13 +129,20 @@ impl Product<'_> {
             }
             // Where answers go round for ever the others come to what lies in their inboxes all the same.
             let next = match seen.insert(state.clone()) {
-                true => self.by_itself(&state)?,
+                true => self.by_itself(&state, waits.as_deref())?,
                 false => {
                     seen.clear();
                     self.goes_on(&state).all.into_iter().find(|next| matches!(next.by, Move::Taken(..)))
                 }
             };
             let Some(next) = next else { break };
+            if let Some(waits) = waits.as_deref_mut() {
+                let (after, took) = self.waits_behind(&state, &next, waits);
+                if !took.is_zero() {
+                    break;
+                }
+                *waits = after;
+            }
             state = next.state.clone();
             moves.push(next);
         }
@@ -139,6 +158,8 @@ impl Product<'_> {
                 (!first || name == tried.first) && name != tried.never
             }
             Move::Time(..) | Move::Confirmed(_) => !first,
+            // Where it is not confirmed it is taken back, if that does not fail.
+            Move::Answer => !first && next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted),
             _ => false,
         };
         let comes = |next: &Next| !tried.stopping || self.raises_while_stopping(next.by) > Raises::Nobody;
@@ -147,15 +168,24 @@ impl Product<'_> {
 }
 
 /// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*; where that
-/// has too little time, the one that lasts shortest. When there is none, the way to where it stops.
+/// has too little time, or waits for what another time comes before, the one that lasts shortest. When there is none, the way to where it stops.
 fn way(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
     let mut way = shortest(product, from, tried, goal);
-    if way.reached
-        && product.lasts(&way.from, &way.moves).0 >= tried.within
-        && let Some(moves) = lasts::soonest(product, &way, tried, goal)
-    {
-        way.moves = moves;
-        way.late = Some(product.lasts(&way.from, &way.moves)).filter(|(lasts, _)| *lasts >= tried.within);
+    if !way.reached {
+        return way;
+    }
+    let lasts = product.lasts(&way.from, &way.moves, tried);
+    if lasts.all < tried.within && lasts.overtaken.is_none() {
+        return way;
+    }
+    match soonest(product, &way.from, tried, goal) {
+        Soonest::Way(moves) => {
+            way.moves = moves;
+            let lasts = product.lasts(&way.from, &way.moves, tried);
+            way.late = (lasts.all >= tried.within).then_some((lasts.all, lasts.timers));
+        }
+        Soonest::Nowhere(moves) => (way.reached, way.moves, way.overtaken) = (false, moves, lasts.overtaken),
+        Soonest::TooMany => product.untimed = true,
     }
     way
 }
@@ -182,7 +212,7 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
         last = at;
         for next in product.outside_moves(&state, tried, at == 0) {
             let mut moves = vec![next.clone()];
-            let rest = product.rest(next.state, goal, &mut moves);
+            let rest = product.rest(next.state, goal, &mut moves, None);
             if let Some((by, last)) = tried.fails(product, &moves) {
                 moves.truncate(last + 1);
                 let _ = failed.get_or_insert((at, moves, by));
@@ -214,7 +244,7 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
     }
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
     let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
-    Way { from, moves, reached: reached.is_some(), refused, failed, late: None }
+    Way { from, moves, reached: reached.is_some(), refused, failed, late: None, overtaken: None }
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round
@@ -228,7 +258,7 @@ fn settled(product: &mut Product<'_>, start: &State) -> Vec<Next> {
         if last.waiting() > limits::CHECK_PILED || way.len() >= limits::CHECK_DRIVEN {
             return way;
         }
-        let Ok(Some(next)) = product.by_itself(&last) else { return way };
+        let Ok(Some(next)) = product.by_itself(&last, None) else { return way };
         let round = seen.get(&next.state).copied();
         seen.insert(next.state.clone(), way.len() + 1);
         way.push(next);

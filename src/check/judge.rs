@@ -416,7 +416,8 @@ impl Graph<'_, '_> {
     fn stuck(&mut self, found: &mut Traced) -> FxHashSet<u32> {
         let mut leads_on = vec![false; self.states.len()];
         self.edges.iter().filter(|edge| !edge.dropped).for_each(|edge| leads_on[edge.from as usize] = true);
-        let troubled: FxHashSet<u32> = self.troubles.iter().map(|(at, _)| *at).collect();
+        let troubled = self.troubles.iter().filter(|(_, trouble)| trouble.stays_in_force()).map(|(at, _)| *at);
+        let troubled: FxHashSet<u32> = troubled.collect();
         let mut stuck = FxHashSet::default();
         for at in self.in_order() {
             let state = &self.states[at as usize];

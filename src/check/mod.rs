@@ -49,6 +49,7 @@ mod shows;
 mod simulated;
 mod stands;
 mod state;
+mod timers;
 mod told;
 mod trace;
 mod tried;

@@ -2,10 +2,10 @@
 //! next.
 
 use super::explore::Graph;
-use super::lasts::Waits;
 use super::state::{Failed, Move, Next};
+use super::timers::{Timer, Timers, Wait, Waits, aged, takes};
 use crate::limits;
-use crate::statechart::{EventId, NodeId};
+use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -32,18 +32,44 @@ pub(super) struct Places {
     pub due: Vec<Option<Duration>>,
     /// It begins in so many, which come first.
     pub first: usize,
+    /// What never comes there, since something else is over before: from where, by which edge, how long it would take, and how
+    /// long that does.
+    pub overtaken: Vec<(usize, usize, Duration, Duration)>,
 }
 
 impl Graph<'_, '_> {
+    /// What these edges wait for, those that wait for something.
+    pub(super) fn timers(&mut self, edges: &[usize]) -> FxHashMap<usize, Timers> {
+        let mut timers: FxHashMap<usize, Timers> = FxHashMap::default();
+        let mut answers: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
+        for number in edges {
+            let edge = &self.edges[*number];
+            if let Move::Time(number_of, event) = edge.by {
+                timers.insert(*number, Timers::from_iter([Timer::Time(usize::from(number_of), event)]));
+            } else if edge.by == Move::Answer && self.product.may_wait(&self.states[edge.from as usize]) {
+                answers.entry(edge.from).or_default().push(*number);
+            }
+        }
+        for (from, numbers) in answers {
+            let nexts = self.nexts(from).all;
+            for number in numbers {
+                let next = self.edges[number].place.and_then(|place| nexts.get(place as usize));
+                let of = next.map(|next| self.product.answered_after(next)).unwrap_or_default();
+                if !of.is_empty() {
+                    timers.insert(number, of);
+                }
+            }
+        }
+        timers
+    }
+
     /// Of these edges, which states with a time of their own they leave and enter anew.
     pub(super) fn left_to_enter_anew(&mut self, edges: &[usize]) -> FxHashMap<usize, Vec<(usize, NodeId)>> {
         let mut left = FxHashMap::default();
         for number in edges {
             let edge = self.edges[*number];
             let (from, to) = (&self.states[edge.from as usize], &self.states[edge.to as usize]);
-            let stays = |(number, event, _): &(usize, EventId, Duration)| {
-                self.product.waits_in(to).iter().any(|(n, e, _)| (n, e) == (number, event))
-            };
+            let stays = |wait: &Wait| self.product.waits_in(to).iter().any(|other| other.timer == wait.timer);
             if !self.product.waits_in(from).iter().any(stays) {
                 continue;
             }
@@ -58,18 +84,19 @@ impl Graph<'_, '_> {
     }
 
     /// The places that such edges lead to from the first states, those of `late` also at the last moment; none: there are too
-    /// many.
+    /// many. Of two times the one with less left comes first.
     pub(super) fn places(
         &self,
         first: &[u32],
         edges: &[usize],
+        timers: &FxHashMap<usize, Timers>,
         left: &FxHashMap<usize, Vec<(usize, NodeId)>>,
         rests: impl Fn(u32) -> bool,
         late: &[bool],
     ) -> Option<Places> {
         let mut out: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
         edges.iter().for_each(|number| out.entry(self.edges[*number].from).or_default().push(*number));
-        let mut all = Places { list: Vec::new(), legs: Vec::new(), due: Vec::new(), first: 0 };
+        let mut all = Places { list: Vec::new(), legs: Vec::new(), due: Vec::new(), first: 0, overtaken: Vec::new() };
         let mut known: FxHashMap<(u32, Waits), usize> = FxHashMap::default();
         let mut open: VecDeque<usize> = VecDeque::new();
         let mut place = |at: u32, waits: Waits, all: &mut Places, open: &mut VecDeque<usize>| {
@@ -89,22 +116,30 @@ impl Graph<'_, '_> {
             }
             let (at, waits) = all.list[from].clone();
             let numbers = out.get(&at).into_iter().flatten().copied();
-            let times = numbers.clone().filter(|number| matches!(self.edges[*number].by, Move::Time(..)));
+            let of = |number: usize| timers.get(&number).map_or(&[][..], |timers| &timers[..]);
+            // What is asked for may take longer than it has to.
+            let sure = |number: &usize| of(*number).iter().any(|timer| !matches!(timer, Timer::Stands(_)));
+            let over = numbers.clone().filter(sure).map(|number| takes(of(number), &waits)).min();
             let after = |number: usize, waits: &Waits| {
                 let edge = &self.edges[number];
                 let (before, after) = (&self.states[edge.from as usize], &self.states[edge.to as usize]);
                 let left = left.get(&number).map_or(&[][..], Vec::as_slice);
-                self.product.waits_after((before, edge.by, after), left, waits)
+                self.product.waits_after((before, of(number), after), left, waits)
             };
-            let due = times.map(|number| after(number, &waits).1).min().filter(|_| rests(at));
+            let due = over.filter(|_| rests(at));
             all.due.push(due);
             for edge in numbers {
+                let sooner = |timer: &Timer| waits.iter().any(|wait| wait.timer == *timer && wait.sooner);
+                let lasts = takes(of(edge), &waits);
+                if let Some(over) = over.filter(|over| lasts > *over && !of(edge).iter().any(sooner)) {
+                    all.overtaken.push((from, edge, lasts, over));
+                    continue;
+                }
                 let (still, takes) = after(edge, &waits);
                 let to = place(self.edges[edge].to, still, &mut all, &mut open);
                 all.legs.push(Leg { from, to, takes, edge, late: false });
                 if let Some(due) = due.filter(|due| late[edge] && !due.is_zero()) {
-                    let aged = waits.iter().map(|(n, e, left)| (*n, *e, left.saturating_sub(due))).collect();
-                    let to = place(self.edges[edge].to, after(edge, &aged).0, &mut all, &mut open);
+                    let to = place(self.edges[edge].to, after(edge, &aged(&waits, due)).0, &mut all, &mut open);
                     all.legs.push(Leg { from, to, takes: due, edge, late: true });
                 }
             }

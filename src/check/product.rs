@@ -22,9 +22,11 @@ use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::rc::Rc;
+use std::time::Duration;
 
 /// The moves of the product.
 pub struct Product<'a> {
@@ -64,6 +66,8 @@ pub struct Product<'a> {
     pub never_down: bool,
     /// A configuration stands for run states that others may change: whether it becomes true is not judged.
     pub(super) unjudged: bool,
+    /// Configurations that have to stand for a time before they are answered, and how long at least.
+    pub(super) standing: FxHashMap<ConfigId, Duration>,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
     /// How much more is followed.
@@ -106,6 +110,7 @@ impl<'a> Product<'a> {
             minds_stopping,
             follows_by_hand: false,
             never_down: false,
+            standing: super::stands::standing(deployment),
             untimed: false,
             unjudged: false,
             effort: Effort::default().into(),

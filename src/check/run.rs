@@ -146,6 +146,9 @@ fn follow(
             if !minds {
                 graph.cut(Bound::Stopping, Failed::Nothing);
             }
+            if graph.goes_on_when_down() {
+                graph.cut(Bound::Apart, Failed::Nothing);
+            }
             found.extend(graph.judge());
             let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];
             let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));

@@ -16,8 +16,9 @@ use crate::stack::{Request, Requester};
 use crate::statechart::Chart;
 use crate::system::{System, View};
 use crate::time::Time;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Configurations of which it can be told: the platform shows what they look at, and nobody else can change that before
@@ -69,7 +70,7 @@ fn looks_at_states(condition: &Condition) -> bool {
 pub fn never(deployment: &Deployment, configuration: &Configuration, system: &System) -> Option<Finding> {
     let holds = configuration.holds.as_ref()?;
     let patience = configuration.timeout.unwrap_or(deployment.limits.step_timeout);
-    if comes_true(&favoured(holds, true), system, patience).is_some() {
+    if comes_true(&favoured(holds, true, &is_known), system, patience).is_some() {
         return None;
     }
     let mut named: BTreeSet<ComponentName> = BTreeSet::new();
@@ -125,21 +126,21 @@ fn comes_true(condition: &Condition, system: &System, patience: Duration) -> Opt
     Some(Duration::ZERO)
 }
 
-/// The condition where what is not known speaks for it (or, `so` being false, against it).
-fn favoured(condition: &Condition, so: bool) -> Condition {
+/// The condition where what is not `known` speaks for it (or, `so` being false, against it).
+fn favoured(condition: &Condition, so: bool, known: &dyn Fn(&Condition) -> bool) -> Condition {
     use ConditionKind as K;
-    let one = |condition: &Condition, so: bool| Box::new(favoured(condition, so));
-    let each = |all: &[Condition]| all.iter().map(|condition| favoured(condition, so)).collect();
+    let one = |condition: &Condition, so: bool| Box::new(favoured(condition, so, known));
+    let each = |all: &[Condition]| all.iter().map(|condition| favoured(condition, so, known)).collect();
     let unknown = || if so { K::All(Vec::new()) } else { K::Any(Vec::new()) };
     let kind = match &condition.kind {
-        K::InState { .. } | K::Faulted(_) => condition.kind.clone(),
-        K::Compare { .. } | K::IsTrue(_) | K::Silent { .. } => unknown(),
+        K::InState { .. } | K::Faulted(_) if known(condition) => condition.kind.clone(),
+        K::InState { .. } | K::Faulted(_) | K::Compare { .. } | K::IsTrue(_) | K::Silent { .. } => unknown(),
         K::All(all) => K::All(each(all)),
         K::Any(all) => K::Any(each(all)),
         K::No(of) => K::No(one(of, !so)),
         K::Implies(when, then) => K::Implies(one(when, !so), one(then, so)),
         // What is not known may turn at any moment.
-        K::Rise(of) | K::Fall(of) if is_known(of) => condition.kind.clone(),
+        K::Rise(of) | K::Fall(of) if known(of) => condition.kind.clone(),
         K::Rise(_) | K::Fall(_) => unknown(),
         K::Once { condition, interval } => K::Once { condition: one(condition, so), interval: *interval },
         K::Historically { condition, interval } => {
@@ -162,6 +163,20 @@ pub fn stands_after(deployment: &Deployment, configuration: &Configuration, syst
     comes_true(holds, system, configuration.timeout.unwrap_or(deployment.limits.step_timeout))
 }
 
+/// How long each configuration is not answered at least, since it has to stand so long.
+pub fn standing(deployment: &Deployment) -> FxHashMap<ConfigId, Duration> {
+    let all = deployment.configurations.iter().filter(|c| !c.safe);
+    all.map(|c| (c.id, least(deployment, c))).filter(|(_, lasts)| !lasts.is_zero()).collect()
+}
+
+/// How long it takes at least from its last step until a configuration stands, whatever is there.
+fn least(deployment: &Deployment, configuration: &Configuration) -> Duration {
+    let Some(holds) = &configuration.holds else { return Duration::ZERO };
+    let nothing = System::new(Arc::default());
+    let patience = configuration.timeout.unwrap_or(deployment.limits.step_timeout);
+    comes_true(&favoured(holds, true, &|_| false), &nothing, patience).unwrap_or_default()
+}
+
 /// Whether it rests on run states alone.
 fn is_known(condition: &Condition) -> bool {
     use ConditionKind as K;
@@ -175,7 +190,6 @@ mod tests {
     use super::*;
     use crate::model::monitor::PortSignal;
     use crate::model::{Catalogue, Origin};
-    use std::sync::Arc;
 
     fn of(kind: ConditionKind) -> Condition {
         Condition { kind, origin: Origin::NONE }
@@ -191,8 +205,9 @@ mod tests {
         let both = |a, b| of(K::All(vec![a, b]));
         let implies = |a, b| of(K::Implies(Box::new(a), Box::new(b)));
         let system = System::new(Arc::new(Catalogue::default()));
-        let may =
-            |condition: &Condition| comes_true(&favoured(condition, true), &system, Duration::from_secs(1)).is_some();
+        let may = |condition: &Condition| {
+            comes_true(&favoured(condition, true, &is_known), &system, Duration::from_secs(1)).is_some()
+        };
         for open in [port(), no(port()), implies(port(), runs()), no(both(port(), no(runs()))), implies(runs(), runs())]
         {
             assert!(may(&open), "{open:?}");

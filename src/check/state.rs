@@ -1,6 +1,7 @@
 //! The states of the product, and the moves between them.
 
 use super::outcome::WorldId;
+use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
 use crate::stack::{Batch, Desk, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};
@@ -196,6 +197,16 @@ pub enum Trouble {
     Hollow(Request, Rc<Findings>),
     /// Nobody hears that this is lost, or was taken back unconfirmed.
     Unheard(ConfigId, Verdict),
+}
+
+impl Trouble {
+    /// Whether something stays in force because another one above it does: that it is asked for in vain is told as what it is, and
+    /// whoever goes on asking is no further from *down* than the one above it.
+    pub fn stays_in_force(&self) -> bool {
+        let Self::Refused(request, reasons) = self else { return false };
+        request.ask.is_undo()
+            && reasons.first().is_some_and(|first| ![STACK_EMPTY, STACK_NO_FRAME].contains(&first.code))
+    }
 }
 
 /// All that follows from a state.

@@ -3,9 +3,10 @@
 use super::members::Member;
 use super::product::Product;
 use super::state::{Next, State};
+use super::timers::Timer;
 use crate::model::{EventName, Findings};
 use crate::stack::Request;
-use crate::statechart::{EventId, NodeId};
+use crate::statechart::NodeId;
 use std::time::Duration;
 
 /// A way: states with what leads to them.
@@ -16,8 +17,10 @@ pub struct Way {
     pub refused: Option<(Request, Findings)>,
     /// It ends where a coordinator is in a state that means that the bring-up has failed.
     pub failed: Option<usize>,
-    /// No way lasts shorter: so long, and the time events that it waits for. Only where it has less time.
-    pub late: Option<(Duration, Vec<(usize, EventId)>)>,
+    /// No way lasts shorter: so long, and what it waits for. Only where it has less time.
+    pub late: Option<(Duration, Vec<Timer>)>,
+    /// Another way would wait for the first of these, and the second always comes before it.
+    pub overtaken: Option<(Timer, Timer)>,
 }
 
 /// What is tried.

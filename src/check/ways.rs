@@ -5,11 +5,12 @@ use super::drive;
 use super::judge::Traced;
 use super::product::Product;
 use super::state::{Next, State};
+use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::Way;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Code, Coordinator, Finding, Severity};
-use crate::statechart::{EventId, NodeId};
+use crate::model::{Code, Coordinator, Finding, Origin, Severity};
+use crate::statechart::NodeId;
 use crate::system::View;
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
@@ -112,6 +113,10 @@ fn stops(
             let stops = if rests { "stops at" } else { "goes round for ever at" };
             let message = format!("{what} {stops} `{at}` and never reaches {}", goals.join(", "));
             let mut finding = Finding::error(code, message);
+            if let Some((waits, first)) = way.overtaken {
+                let why = format!("is never over: {} always comes first", product.waits_for(first));
+                finding = finding.also(waits_at(product, waits), why);
+            }
             for (member, leaf) in product.members.iter().zip(&way.end().leaves) {
                 finding = finding.also(member.chart.origin(*leaf), "stops here, even if every request succeeds");
             }
@@ -127,7 +132,13 @@ fn stops(
     let closed = if code == DEPLOY_NEVER_DOWN { product.closed_at(way.end()) } else { Vec::new() };
     let failed =
         way.failed.map(|_| "take it out of `deploy.failed`, or let the bring-up come up without it".to_owned());
-    let help = help.or(failed).unwrap_or_else(|| match closed.first() {
+    let overtaken = way.overtaken.map(|(waits, first)| {
+        let (waits, first) = (product.waits_for(waits), product.waits_for(first));
+        format!(
+            "what would lead on takes {waits}, and {first} always comes before: give it less time, or the other more"
+        )
+    });
+    let help = help.or(failed).or(overtaken).unwrap_or_else(|| match closed.first() {
         Some(event) => still_comes(event.as_str()),
         None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
         None => format!("look at the trace: which event does {several}?"),
@@ -140,17 +151,7 @@ fn late(product: &Product<'_>, way: &Way, code: Code, key: &str, what: &str) -> 
     let (lasts, times) = way.late.as_ref()?;
     let deployment = product.deployment;
     let within = if code == DEPLOY_NEVER_UP { deployment.deploy.within } else { deployment.shutdown.within };
-    let told = |(number, event): &(usize, EventId)| {
-        let chart = product.members[*number].chart;
-        let state = chart.nodes().find(|state| chart.time_event(*state) == Some(*event)).unwrap_or(NodeId::ROOT);
-        (
-            state,
-            chart,
-            format!("{} s in `{}`", chart.time_of(*event).unwrap_or_default().as_secs_f64(), chart.fqn(state)),
-        )
-    };
-    let told: Vec<_> = times.iter().map(told).collect();
-    let mut words: Vec<&str> = told.iter().map(|(_, _, words)| words.as_str()).collect();
+    let mut words: Vec<String> = times.iter().map(|timer| product.waits_for(*timer)).collect();
     let more = if words.len() > 4 { format!(" and {} more", words.len() - 4) } else { String::new() };
     words.truncate(4);
     let message = format!(
@@ -160,11 +161,22 @@ fn late(product: &Product<'_>, way: &Way, code: Code, key: &str, what: &str) -> 
         within.as_secs_f64()
     );
     let mut finding = Finding::error(code, message);
-    for (state, chart, _) in told.iter().take(4) {
-        finding = finding.also(chart.origin(*state), "waits here, even if every request is answered at once");
+    for timer in times.iter().take(4) {
+        finding = finding.also(waits_at(product, *timer), "waits here, even if every request is answered at once");
     }
     let help = format!("give it more time with `{key}`, or let something lead on sooner");
     Some(finding.help(help).at(deployment.key_origin(key)).path(key))
+}
+
+/// Where something is written that takes time.
+fn waits_at(product: &Product<'_>, timer: Timer) -> Origin {
+    match timer {
+        Timer::Time(number, _) => product.members[number].chart.origin(product.waits_at(timer).unwrap_or(NodeId::ROOT)),
+        Timer::Stands(id) | Timer::Reverts(id) => {
+            product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default()
+        }
+        Timer::Reports(at) => product.deployment.reactions[at].origin,
+    }
 }
 
 fn leftovers(product: &Product<'_>, end: &State) -> Option<Finding> {

@@ -215,6 +215,7 @@ impl Post {
 
 #[cfg(test)]
 mod tests {
+    use super::super::control::InTurn;
     use super::*;
 
     /// An event that a configuration waits for is not among what looking at the platform tells.
@@ -243,9 +244,9 @@ mod tests {
         assert_eq!(asked, limits::CONFIGURATOR_COMMANDS);
         let told = (0..1_000).filter(|_| post.command(AtOnce::Stopping)).count();
         assert_eq!(told, limits::CONFIGURATOR_CONTROL);
-        let Ok(Mail::Command(command)) = inbox.try_recv() else { panic!("a command") };
+        let Ok(Mail::Command(Command::InTurn(command))) = inbox.try_recv() else { panic!("a command") };
         assert!(!post.command(drift()), "it was taken in, and waits");
-        post.counts.command_taken(&command);
+        post.counts.command_taken(command.only_asks());
         assert!(post.command(drift()));
     }
 }

@@ -174,3 +174,82 @@ fn what_an_operator_applies_to_one_joins_nobody() {
     assert!(found.of("coord::shared").is_empty(), "{:#}", found.0);
     assert!(is_refused(&found, "left.undo") && !is_refused(&found, "right.undo"), "{:#}", found.0);
 }
+
+/// Up by its own configuration when `first` comes, and down from there by `stopped`.
+fn alone(of: &str, first: &str, stopped: &str) -> String {
+    format!(
+        "idle = state {{}}, building = state {{ entry = '{of}' }}, up = state {{}}, leaving = state {{ entry = '{of}.undo' }},
+         failed = state {{}},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'building', events = {{ '{first}' }} }},
+         trans {{ src = 'building', tgt = 'up', events = {{ '{of}.ok' }} }},
+         trans {{ src = 'building', tgt = 'failed', events = {{ '{of}.failed', '{of}.broken' }} }},
+         trans {{ src = 'building', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         {stopped}
+         trans {{ src = 'failed', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ '{of}.undone' }} }},
+         trans {{ src = 'leaving', tgt = 'failed', events = {{ '{of}.undo.failed', '{of}.undo.broken' }} }},"
+    )
+}
+
+const TWO: &str = "base = Configuration { create('a', 'Drive') }, lamp = Configuration { create('b', 'Drive') }";
+const AT_ONCE: &str = "trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },";
+
+/// They are down where all of them are at once.
+#[test]
+fn that_one_followed_apart_goes_on_when_it_is_down_is_told() {
+    let cools = "cooling = state {}, trans { src = 'up', tgt = 'cooling', events = { 'e_shutdown' } },
+         trans { src = 'cooling', tgt = 'leaving', events = { 'e_after(3.0)' } },";
+    let cases = [
+        ("e_after(1.0)", cools, "", 4, "followed"),
+        ("e_lamp", AT_ONCE, "raise('e_lamp')", 4, "followed"),
+        ("e_start", cools, "", 0, "sound"),
+    ];
+    for (first, stopped, raised, exit, verdict) in cases {
+        let (main, aux) = (alone("base", "e_start", stopped), alone("lamp", first, AT_ONCE));
+        let small = Small::several(TWO, &[("main", &main), ("aux", &aux)], "");
+        if first == "e_lamp" {
+            small.demo.replace("small.yaml", "up: up", "up: ['main:up', 'aux:idle']");
+        }
+        let said = small.check();
+        assert_eq!(said.0["verdict"], verdict, "{first} {:#}", said.0);
+        let told =
+            said.0["left"].as_array().unwrap().iter().filter(|left| left.as_str().unwrap().contains("down already"));
+        assert_eq!(told.count(), usize::from(verdict == "followed"), "{first} {:#}", said.0);
+        small.demo.write("run.lua", &format!("deploy('small.yaml')\nwait(0.1)\n{raised}\n"));
+        let ran = small.demo.run(&["run", "run.lua", "--clock", "simulated"]);
+        assert_eq!(ran.code, exit, "{first} {}{}", ran.out, ran.err);
+    }
+}
+
+/// What another one emits while a time runs begins that anew.
+#[test]
+fn what_another_one_emits_late_counts_in_how_long_the_way_down_lasts() {
+    let two = |turns: &str| {
+        let stopped = "cooling = state {}, trans { src = 'up', tgt = 'cooling', events = { 'e_shutdown' } },
+             trans { src = 'cooling', tgt = 'cooling', events = { 'x_1' } },
+             trans { src = 'cooling', tgt = 'leaving', events = { 'e_after(4.0)' } },";
+        let tells = format!(
+            "idle = state {{}}, up = state {{}}, turning = state {{}}, told = state {{ entry = 'x_1' }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'up', events = {{ 'e_start' }} }},
+             trans {{ src = 'up', tgt = 'turning', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'turning', tgt = 'told', events = {{ 'e_after({turns})' }} }},
+             trans {{ src = 'told', tgt = 'idle', events = {{ 'e_done' }} }},"
+        );
+        Small::several(BASE, &[("one", &alone("base", "e_start", stopped)), ("two", &tells)], "emits: [x_1]\n")
+    };
+    for (turns, told) in [("3.0", 1), ("0.5", 0)] {
+        let small = two(turns);
+        let said = small.check();
+        let found = said.of("deploy::never_down");
+        assert_eq!(found.len(), told, "{:#}", said.0);
+        assert!(found.iter().all(|f| f["message"].as_str().unwrap().starts_with("the shutdown lasts 7 s at least")));
+        small.demo.write("run.lua", "deploy('small.yaml')\nwait(0.1)\n");
+        let ran = small.demo.run(&["run", "run.lua", "--clock", "simulated"]);
+        // What is refused is not even started.
+        assert_eq!(ran.code, i32::from(told == 1), "{}{}", ran.out, ran.err);
+    }
+}
+
+const BASE: &str = "base = Configuration { create('a', 'Drive') }";

@@ -576,3 +576,37 @@ fn one_event_for_both_ends_is_told_as_what_it_is() {
     let findings = said.0["findings"].as_array().unwrap();
     assert_eq!(findings.iter().filter(|found| found["severity"] != "info").count(), 1, "{:#}", said.0);
 }
+
+/// The event that ends the deployment overtakes what has come just before, and is refused no more.
+#[test]
+fn an_event_that_came_just_before_is_heard_behind_the_one_that_ends_it() {
+    let states = |back: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, failed = state {{}},
+             leaving = state {{ entry = 'base.undo', going = state {{}}, turn = state {{}},
+               trans {{ src = 'initial', tgt = 'going' }},
+               trans {{ src = 'going', tgt = 'turn', events = {{ 'e_back' }} }},
+               trans {{ src = 'turn', tgt = 'going', events = {{ 'e_shutdown' }} }} }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+             trans {{ src = 'building', tgt = 'up', events = {{ 'base.ok' }} }},
+             trans {{ src = 'building', tgt = 'failed', events = {{ 'base.failed', 'base.broken' }} }},
+             trans {{ src = 'building', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'up', events = {{ 'e_estop' }} }},
+             trans {{ src = 'failed', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'leaving.going', tgt = 'idle', events = {{ 'base.undone' }} }},
+             trans {{ src = 'leaving.turn', tgt = '{back}', events = {{ 'base.undone' }} }},
+             trans {{ src = 'leaving', tgt = 'failed', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},"
+        )
+    };
+    for (back, warned, exit) in [("building", 1, 4), ("idle", 0, 0)] {
+        let small = Small::new(BASE, &states(back), "safety: [e_estop]\n");
+        let said = small.check();
+        let found = said.of("coord::no_way_down").into_iter().filter(|found| found["severity"] == "warning");
+        assert_eq!(found.count(), warned, "{back} {:#}", said.0);
+        small.demo.write("back.lua", "deploy('small.yaml')\nwait(0.1)\nraise('e_back')\n");
+        let ran = small.demo.run(&["run", "back.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, exit, "{back} {}{}", ran.out, ran.err);
+    }
+}

@@ -170,3 +170,189 @@ fn a_bound_hides_no_place_that_no_way_leads_down_from() {
     let messages: Vec<_> = said.of("coord::no_way_down").iter().map(|found| found["message"].clone()).collect();
     assert_eq!(messages, ["from `root.here` no way leads to `idle`"], "{:#}", said.0);
 }
+
+const BASE: &str = "base = Configuration { create('a', 'Drive') }";
+
+/// Up and down by `base`. `built` is where it comes when `base` is there, `stopped` when it is stopped in `up`; both end by themselves.
+fn by_base(built: &str, stopped: &str, more: &str) -> String {
+    format!(
+        "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, leaving = state {{ entry = 'base.undo' }},
+         failed = state {{}},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+         trans {{ src = 'building', tgt = '{built}', events = {{ 'base.ok' }} }},
+         trans {{ src = 'building', tgt = 'failed', events = {{ 'base.failed', 'base.broken' }} }},
+         trans {{ src = 'building', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'up', tgt = '{stopped}', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'failed', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone' }} }},
+         trans {{ src = 'leaving', tgt = 'failed', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},{more}"
+    )
+}
+
+/// The messages of a code, and how a run ends that brings it up, does `then`, and takes it down.
+fn said_and_run(small: &Small, code: &str, then: &str) -> (Vec<String>, i32) {
+    let said = small.check();
+    let messages = said.of(code).iter().map(|found| found["message"].as_str().unwrap().to_owned()).collect();
+    small.demo.write("run.lua", &format!("deploy('small.yaml')\nwait(0.1)\n{then}\n"));
+    let ran = small.demo.run(&["run", "run.lua", "--clock", "simulated", "--platform", "simulated"]);
+    (messages, ran.code)
+}
+
+/// That it is taken back unconfirmed, and that this fails, is not what everything being answered *ok* leads to.
+#[test]
+fn a_bring_up_waits_to_be_confirmed_or_to_be_taken_back() {
+    let conf = format!(
+        "{BASE}, try = Configuration {{ property_set('a.gain', 2.0), confirm = {{ event = 'e_conf', within = 1.0 }} }}"
+    );
+    let reports =
+        "simulated: { reactions: [{ after: property_set a.gain = 2.0, delay_s: 0.2, raise: e_conf, component: a }] }\n";
+    for (up, keys) in [("e_conf", reports), ("try.reverted", "")] {
+        let warming = format!(
+            "warming = state {{ entry = 'try' }},
+             trans {{ src = 'warming', tgt = 'up', events = {{ '{up}' }} }},
+             trans {{ src = 'warming', tgt = 'failed', events = {{ 'try.failed', 'try.broken', 'try.undo.failed' }} }},
+             trans {{ src = 'warming', tgt = 'leaving', events = {{ 'e_shutdown' }} }},"
+        );
+        let states = by_base("warming", "leaving", &warming).replace("'base.undo' }", "{ 'try.undo', 'base.undo' } }");
+        let small = Small::new(&conf, &states, keys);
+        let (told, code) = said_and_run(&small, "deploy::never_up", "wait_state('up', 3)");
+        assert_eq!((told, code), (Vec::new(), 0), "{up}");
+        let plan = small.demo.run(&["plan", "small.yaml", "--bringup"]);
+        assert!(plan.code == 0 && !plan.out.contains("never"), "{}{}", plan.out, plan.err);
+    }
+}
+
+/// That a request is refused does not lead down.
+#[test]
+fn a_request_that_is_refused_is_no_way_down() {
+    for entry in ["", "entry = 'base'", "entry = 'other.undo'"] {
+        let left = format!(
+            "left = state {{}}, again = state {{ {entry} }},
+             trans {{ src = 'left', tgt = 'again', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'again', tgt = 'left', events = {{ 'base.failed', 'base.broken', 'other.undo.failed', 'e_shutdown' }} }},"
+        );
+        let states = by_base("up", "leaving", &left)
+            .replace("tgt = 'failed', events = { 'base.undo.failed'", "tgt = 'left', events = { 'base.undo.failed'");
+        let conf = format!("{BASE}, other = Configuration {{ property_set('a.gain', 2.0) }}");
+        let small = Small::new(&conf, &states, "");
+        small.demo.write("fault.lua", "fault('destroy a', 'fail', 1)\ndeploy('small.yaml')\nshutdown()\n");
+        let ran = small.demo.run(&["run", "fault.lua", "--clock", "simulated", "--platform", "simulated"]);
+        assert_eq!(ran.code, 4, "{entry} {}{}", ran.out, ran.err);
+        let said = small.check();
+        let found = said.of("coord::no_way_down");
+        assert!(found.iter().any(|found| found["severity"] == "warning"), "{entry} {:#}", said.0);
+    }
+}
+
+/// Of two times that run together the one with less left is over first, and what it leads to is all that comes.
+#[test]
+fn a_time_that_another_one_always_comes_before_leads_nowhere() {
+    let up = |inside: &str, around: &str| {
+        let warming = format!(
+            "warming = state {{ a = state {{}}, trans {{ src = 'initial', tgt = 'a' }} }}, stays = state {{}},
+             trans {{ src = 'warming', tgt = 'up', events = {{ 'e_after({around})' }} }},
+             trans {{ src = 'warming.a', tgt = 'stays', events = {{ 'e_after({inside})' }} }},
+             trans {{ src = 'warming', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'stays', tgt = 'leaving', events = {{ 'e_shutdown' }} }},"
+        );
+        Small::new(BASE, &by_base("warming", "leaving", &warming), "")
+    };
+    let never = "the bring-up stops at `root.stays` and never reaches `up`".to_owned();
+    assert_eq!(said_and_run(&up("1.0", "3.0"), "deploy::never_up", ""), (vec![never.clone()], 1));
+    assert_eq!(said_and_run(&up("3.0", "1.0"), "deploy::never_up", ""), (Vec::new(), 0));
+    // What a simulated component reports has its time as well.
+    let reported = |delay: &str| {
+        let warming = "warming = state {}, stays = state {},
+             trans { src = 'warming', tgt = 'up', events = { 'e_rep' } },
+             trans { src = 'warming', tgt = 'stays', events = { 'e_after(0.2)' } },
+             trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown' } },
+             trans { src = 'stays', tgt = 'leaving', events = { 'e_shutdown' } },";
+        let reaction = format!(
+            "simulated: {{ reactions: [{{ after: create a, delay_s: {delay}, raise: e_rep, component: a }}] }}\n"
+        );
+        Small::new(BASE, &by_base("warming", "leaving", warming), &reaction)
+    };
+    assert_eq!(said_and_run(&reported("0.5"), "deploy::never_up", ""), (vec![never], 1));
+    assert_eq!(said_and_run(&reported("0.1"), "deploy::never_up", ""), (Vec::new(), 0));
+    // On the way down, and beside it.
+    let down = |stopped: &str, inside: &str| {
+        let cooling = format!(
+            "cooling = state {{ tick = state {{}}, trans {{ src = 'initial', tgt = 'tick' }} }}, blip = state {{}}, hot = state {{}},
+             trans {{ src = 'cooling.tick', tgt = 'blip', events = {{ 'e_after({inside})' }} }},
+             trans {{ src = 'blip', tgt = 'cooling', events = {{ 'e_done' }} }},
+             trans {{ src = 'cooling', tgt = 'leaving', events = {{ 'e_after(3.0)' }} }},
+             trans {{ src = 'up', tgt = 'hot', events = {{ 'e_hot' }} }},
+             trans {{ src = 'hot', tgt = 'cooling', events = {{ 'e_shutdown' }} }},"
+        );
+        Small::new(BASE, &by_base("up", stopped, &cooling), "")
+    };
+    let (told, code) = said_and_run(&down("cooling", "1.0"), "deploy::never_down", "");
+    assert!(told.len() == 1 && told[0].starts_with("the shutdown stops at `root."), "{told:?}");
+    assert_eq!(code, 1);
+    assert_eq!(said_and_run(&down("cooling", "4.0"), "deploy::never_down", ""), (Vec::new(), 0));
+    let beside = "from `root.cooling.tick` only what takes 3 s leads down, and what takes 1 s is always over before";
+    assert_eq!(
+        said_and_run(&down("leaving", "1.0"), "coord::no_way_down", "raise('e_hot') wait(0.1)"),
+        (vec![beside.to_owned()], 4)
+    );
+    assert_eq!(
+        said_and_run(&down("leaving", "4.0"), "coord::no_way_down", "raise('e_hot') wait(0.1)"),
+        (Vec::new(), 0)
+    );
+}
+
+/// What has to stand so long is not answered sooner, and what is reported so late does not come sooner.
+#[test]
+fn a_request_lasts_as_long_as_it_has_to_stand() {
+    let conf = |time: &str| {
+        format!(
+            "base = Configuration {{ create('a', 'Drive'), post_conf_state = {{ 'a:running' }} }},
+             park = Configuration {{ timeout = 10.0, holds = in_state('a', 'running'):for_at_least({time}),
+               property_set('a.gain', 0.0) }}"
+        )
+    };
+    let parking = "parking = state { entry = 'park' }, unpark = state { entry = 'park.undo' },
+         trans { src = 'parking', tgt = 'NEXT', events = { 'park.ok' } },
+         trans { src = 'parking', tgt = 'unpark', events = { 'park.failed', 'park.broken', 'park.lost' } },
+         trans { src = 'unpark', tgt = 'leaving', events = { 'park.undone' } },
+         trans { src = 'unpark', tgt = 'failed', events = { 'park.undo.failed', 'park.undo.broken', 'park.lost' } },
+         trans { src = 'leaving', tgt = 'failed', events = { 'park.lost' } },
+         trans { src = 'failed', tgt = 'unpark', events = { 'park.lost' } },";
+    let up = format!(
+        "{}trans {{ src = 'parking', tgt = 'unpark', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'up', tgt = 'unpark', events = {{ 'park.lost' }} }},",
+        parking.replace("NEXT", "up")
+    );
+    let up = by_base("parking", "unpark", &up);
+    let down = by_base("up", "parking", &parking.replace("NEXT", "unpark"));
+    let lasts = |what: &str, key: &str| {
+        format!("the {what} lasts 8 s at least (8 s until `park` stands), and `{key}.within_s` gives it 5 s")
+    };
+    let cases = [
+        (&up, "deploy::never_up", lasts("bring-up", "deploy"), 1),
+        (&down, "deploy::never_down", lasts("shutdown", "shutdown"), 1),
+    ];
+    for (states, code, message, exit) in cases {
+        assert_eq!(said_and_run(&Small::new(&conf("8"), states, ""), code, ""), (vec![message], exit));
+        assert_eq!(said_and_run(&Small::new(&conf("1"), states, ""), code, ""), (Vec::new(), 0));
+    }
+    // What is over before leads elsewhere, or is waited for inside.
+    let aside = format!(
+        "{up}stays = state {{}}, trans {{ src = 'parking', tgt = 'stays', events = {{ 'e_after(1.0)' }} }},
+         trans {{ src = 'stays', tgt = 'unpark', events = {{ 'e_shutdown', 'park.failed', 'park.broken', 'park.lost' }} }},"
+    );
+    let never = "the bring-up stops at `root.stays` and never reaches `up`".to_owned();
+    assert_eq!(said_and_run(&Small::new(&conf("2"), &aside, ""), "deploy::never_up", ""), (vec![never], 1));
+    let inside = "parking = state { entry = 'park', a = state {}, b = state {}, trans { src = 'initial', tgt = 'a' },
+         trans { src = 'a', tgt = 'b', events = { 'e_after(1.0)' } } }";
+    let inside = up.replace("parking = state { entry = 'park' }", inside);
+    assert_eq!(said_and_run(&Small::new(&conf("2"), &inside, ""), "deploy::never_up", ""), (Vec::new(), 0));
+    let reaction = "simulated: { reactions: [{ after: create a, delay_s: 8.0, raise: e_ready, component: a }] }\n";
+    let warming = "warming = state {}, trans { src = 'warming', tgt = 'up', events = { 'e_ready' } },
+         trans { src = 'warming', tgt = 'leaving', events = { 'e_shutdown' } },";
+    let small = Small::new(BASE, &by_base("warming", "leaving", warming), reaction);
+    let message =
+        "the bring-up lasts 8 s at least (8 s until `e_ready` is reported), and `deploy.within_s` gives it 5 s";
+    assert_eq!(said_and_run(&small, "deploy::never_up", ""), (vec![message.to_owned()], 1));
+}
