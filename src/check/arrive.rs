@@ -2,7 +2,7 @@
 
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
-use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, index};
+use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, bit, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
 use crate::stack::{Arrival, Arrived, Batch, Request, Requester, Turn, Why, given_up_of};
@@ -20,6 +20,9 @@ impl Product<'_> {
         let reaction = self.members[by].react(state.leaves[by], event);
         let (chart, deployment) = (self.members[by].chart, self.deployment);
         state.leaving &= !(reaction.taken && event == chart.event(deployment.deploy.event) && event != EventId::OTHER);
+        if self.crosses {
+            state.moved |= bit(by);
+        }
         self.follow(state, by, &reaction)
     }
 
@@ -290,7 +293,7 @@ impl Product<'_> {
         if request.why == Why::Asked
             && let Some(number) = self.member(request.requester)
         {
-            state.down &= !(1 << number.min(63));
+            state.down &= !bit(number);
         }
     }
 
@@ -317,7 +320,7 @@ impl Product<'_> {
             }
             state.desk.over(turn.number);
             if let Some(number) = self.member(first.requester) {
-                state.down |= 1 << number.min(63);
+                state.down |= bit(number);
             }
             state.leaving &= !self.all_down(state) || self.others || state.desk.asks_on();
             if self.all_down(state)

@@ -208,6 +208,15 @@ pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
     groups
 }
 
+/// Whether an operator may have frames for several groups. Where the stack is full the oldest are squashed into one, which touches then
+/// what both touch.
+pub fn is_tied(deployment: &Deployment, charts: &[&Chart], groups: &[Vec<usize>]) -> bool {
+    let meeting = Meeting::of(deployment, charts);
+    let ids = by_operator(deployment);
+    let met = |group: &&Vec<usize>| ids.iter().any(|id| group.iter().any(|number| meeting.is_met(*number, *id)));
+    groups.iter().filter(met).count() > 1
+}
+
 /// What of an operator is followed with a group: what touches something that it touches, and what is safe, since that
 /// interrupts everybody. What touches nothing that anybody touches is followed with the first coordinator.
 pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Vec<ConfigId> {

@@ -30,6 +30,12 @@ pub enum Bound {
     Forks,
     /// [`limits::CHECK_BY_HAND`]: a safe configuration of an operator.
     ByHand,
+    /// Several frames of an operator in force at once.
+    Together,
+    /// Frames of an operator that are squashed into one, and tie together who was followed apart.
+    Tied,
+    /// Events from outside that come before all have heard what came before.
+    Across,
     /// [`limits::CHECK_ROUNDS`].
     Rounds,
     /// [`limits::CHECK_STOPPING`].
@@ -78,6 +84,16 @@ impl Bound {
                 limits::CHECK_FORKS
             ),
             Self::ByHand => "what an operator's safe configuration leads to was not followed".to_owned(),
+            Self::Together => "what an operator's frames come to of which several are in force at once was not followed".to_owned(),
+            Self::Tied => {
+                "what comes of it that an operator's frames for coordinators that have nothing to do with each other are squashed into one \
+                 was not followed"
+                    .to_owned()
+            }
+            Self::Across => {
+                "what comes of an event from outside, or a time, that comes before all coordinators have heard what came before was not followed"
+                    .to_owned()
+            }
             Self::Rounds => {
                 "where each round leaves a frame more, not all rounds were followed to where the oldest frames are squashed"
                     .to_owned()

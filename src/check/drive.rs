@@ -155,7 +155,9 @@ impl Product<'_> {
         let fits = |next: &Next| match next.by {
             Move::Event(at) => {
                 let name = self.outside[usize::from(at)];
-                (!first || name == tried.first) && name != tried.never
+                // What they tell each other comes of them where all goes well.
+                let comes = if first { name == tried.first } else { !self.deployment.is_told_between(name.as_str()) };
+                comes && name != tried.never
             }
             Move::Time(..) | Move::Confirmed(_) => !first,
             // Where it is not confirmed it is taken back, if that does not fail.

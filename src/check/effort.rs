@@ -49,6 +49,11 @@ impl<'e> From<Effort<'e>> for Left<'e> {
 }
 
 impl Left<'_> {
+    /// The same, with so many transitions at most.
+    pub fn at_most(&self, transitions: usize) -> Self {
+        Effort { transitions: transitions.min(self.effort.transitions), ..self.effort }.into()
+    }
+
     /// So many transitions at most.
     pub fn transitions(&self) -> usize {
         self.effort.transitions

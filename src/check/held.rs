@@ -98,9 +98,10 @@ impl Worlds<'_> {
         self.get(id).is_some_and(|world| world.stack.goes_alone(batch))
     }
 
-    /// Whether an operator has a frame in force, and of what.
-    pub fn of_operator(&self, id: WorldId) -> Option<ConfigId> {
-        let frames = self.get(id)?.stack.frames();
-        frames.iter().find(|frame| frame.requester == Requester::Operator).map(|frame| frame.configuration)
+    /// Of what an operator has frames in force, the oldest first.
+    pub fn of_operator(&self, id: WorldId) -> SmallVec<[ConfigId; 2]> {
+        let frames = self.get(id).map(|world| world.stack.frames()).unwrap_or_default();
+        let own = frames.iter().filter(|frame| frame.requester == Requester::Operator);
+        own.map(|frame| frame.configuration).collect()
     }
 }

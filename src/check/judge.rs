@@ -157,8 +157,12 @@ impl Graph<'_, '_> {
             (None, true) => help.unwrap_or_else(|| "ask for it where it fits the system".to_owned()),
             (None, false) if others == [Requester::Operator] => {
                 let first = "let the operator undo that first (`davit undo`)";
-                let own = self.product.worlds.of_operator(state.world).filter(|id| !self.product.is_safe(*id));
-                if own.is_some() { format!("{first}, or leave it out of `operator:`") } else { first.to_owned() }
+                let own = self.product.worlds.of_operator(state.world);
+                if own.first().is_some_and(|id| !self.product.is_safe(*id)) {
+                    format!("{first}, or leave it out of `operator:`")
+                } else {
+                    first.to_owned()
+                }
             }
             (None, false) => {
                 "give each coordinator components of its own, or let one ask the other by an event".to_owned()

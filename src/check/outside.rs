@@ -3,7 +3,8 @@
 use super::judge::created;
 use super::members::Member;
 use super::product::Product;
-use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, index};
+use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, bit, index};
+use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use crate::statechart::{EdgeId, EventId};
@@ -13,30 +14,9 @@ use std::collections::BTreeSet;
 impl Product<'_> {
     /// What comes when nothing lies in the inboxes.
     pub(super) fn comes_from_outside(&mut self, state: &State, nexts: &mut Nexts) {
-        let mut heard: BTreeSet<usize> = BTreeSet::new();
-        let busy: SmallVec<[bool; 4]> =
-            self.members.iter().map(|member| state.outstanding(member.by) >= self.most_waiting).collect();
-        for number in 0..self.members.len() {
-            for event in self.members[number].offers(state.leaves[number]).iter() {
-                let name = self.members[number].name_of(*event);
-                match name.and_then(|name| self.outside.iter().position(|outside| *outside == name)) {
-                    Some(at) => _ = heard.insert(self.alike[at]),
-                    None if busy[number] => nexts.cut = true,
-                    None => self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts),
-                }
-            }
-        }
+        let heard = self.times_come(state, nexts);
         self.unheard_shutdown(state, &heard, nexts);
-        for at in heard {
-            let name = self.outside[at];
-            let takes =
-                |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
-            if self.members.iter_mut().enumerate().any(takes) {
-                nexts.cut = true;
-                continue;
-            }
-            self.raised(state, name, Move::Event(u16::try_from(at).unwrap_or(u16::MAX)), nexts);
-        }
+        self.events_come(state, heard, nexts);
         self.notices(state, nexts);
         self.operators(state, nexts);
         if self.others
@@ -52,6 +32,54 @@ impl Product<'_> {
             self.review_standings(&mut next);
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
+    }
+
+    /// What comes while some have not heard yet what came before: events from outside, also such as are waited for only behind that,
+    /// and the times of those that have not moved since. One comes so: two at once show what comes of more.
+    pub(super) fn comes_across(&mut self, state: &State, nexts: &mut Nexts) {
+        if state.across || state.inbox.len() + self.members.len() > limits::CHECK_INBOX {
+            return;
+        }
+        let state = State { across: true, ..state.clone() };
+        self.times_come(&state, nexts);
+        self.events_come(&state, self.alike.iter().copied().collect(), nexts);
+    }
+
+    /// Time passes for each. Answers the events from outside that are heard where they are.
+    fn times_come(&mut self, state: &State, nexts: &mut Nexts) -> BTreeSet<usize> {
+        let mut heard: BTreeSet<usize> = BTreeSet::new();
+        for number in 0..self.members.len() {
+            for event in self.members[number].offers(state.leaves[number]).iter() {
+                let name = self.members[number].name_of(*event);
+                match name.and_then(|name| self.outside.iter().position(|outside| *outside == name)) {
+                    Some(at) => _ = heard.insert(self.alike[at]),
+                    None if state.moved & bit(number) != 0 => {}
+                    None if self.is_busy(state, number) => nexts.cut = true,
+                    None => self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts),
+                }
+            }
+        }
+        heard
+    }
+
+    /// Each of these events comes from outside.
+    fn events_come(&mut self, state: &State, heard: BTreeSet<usize>, nexts: &mut Nexts) {
+        let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
+        for at in heard {
+            let name = self.outside[at];
+            let takes =
+                |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
+            if self.members.iter_mut().enumerate().any(takes) {
+                nexts.cut = true;
+                continue;
+            }
+            self.raised(state, name, Move::Event(u16::try_from(at).unwrap_or(u16::MAX)), nexts);
+        }
+    }
+
+    /// Whether a coordinator waits for as many answers as are followed.
+    fn is_busy(&self, state: &State, number: usize) -> bool {
+        state.outstanding(self.members[number].by) >= self.most_waiting
     }
 
     /// Of each event from outside the first that leads every coordinator to the same everywhere: one of them is followed for
@@ -103,8 +131,10 @@ impl Product<'_> {
         next.leaving |= name == self.deployment.shutdown.event && self.minds_operators();
         self.confirm(&mut next, name);
         self.spread(&mut next, name, None);
-        // If one alone hears it, there is nothing to wait for.
-        if let [(only, event)] = next.inbox[..] {
+        // If one alone hears it, there is nothing to wait for, unless more may come before it does.
+        if let [(only, event)] = next.inbox[..]
+            && !self.crosses
+        {
             next.inbox.clear();
             self.hear(next, usize::from(only), event, by, nexts);
         } else {
@@ -231,10 +261,15 @@ impl Product<'_> {
         if state.stopping || self.worlds.top(state.world).is_some() || state.outstanding(Requester::Operator) > 0 {
             return;
         }
-        let asks: Vec<Ask> = match self.worlds.of_operator(state.world) {
-            Some(id) => vec![Ask::UndoOf(id)],
-            None => self.operator.iter().map(|id| Ask::Apply(*id)).collect(),
-        };
+        let own = self.worlds.of_operator(state.world);
+        let mut asks: Vec<Ask> = Vec::new();
+        for id in &own {
+            asks.extend(Some(Ask::UndoOf(*id)).filter(|undo| !asks.contains(undo)));
+        }
+        let fits = |id: &&ConfigId| own.iter().chain([*id]).all(|own| !self.is_safe(*own)) || own.is_empty();
+        if own.len() < self.by_hand {
+            asks.extend(self.operator.iter().filter(fits).map(|id| Ask::Apply(*id)));
+        }
         // Nobody has anything to do with what is not there, but to make it.
         let empty = self.worlds.get(state.world).is_some_and(|world| world.system.is_empty()) && state.desk.is_empty();
         let makes = |ask: &Ask| match ask {

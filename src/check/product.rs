@@ -7,7 +7,7 @@
 //! when something comes that interrupts it or gives it up, these are moves of their own.
 //!
 //! An event from outside goes to all that wait for it somewhere, and each takes it when it comes to it: until then it lies
-//! in that one's inbox, and so does what another one emits. Answers go first. The next event from outside comes when all
+//! in that one's inbox, and so does what another one emits ([`inbox`](super::inbox)). Answers go first. The next event from outside comes when all
 //! inboxes are empty.
 
 use super::beside;
@@ -16,7 +16,7 @@ use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
-use super::state::{Failed, Move, Next, Nexts, State, index};
+use super::state::{Failed, Move, Next, Nexts, State, bit, index};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
@@ -70,6 +70,10 @@ pub struct Product<'a> {
     pub(super) standing: FxHashMap<ConfigId, Duration>,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
+    /// Events from outside, and times, come also before all have heard what came before.
+    pub crosses: bool,
+    /// So many frames of an operator are in force at once.
+    pub by_hand: usize,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
 }
@@ -87,7 +91,7 @@ impl<'a> Product<'a> {
         let (members, undone) = members(deployment, charts, numbers);
         let mut outside = BTreeSet::new();
         for number in numbers {
-            outside.extend(outside_of(&views[*number], charts, *number));
+            outside.extend(outside_of(deployment, &views[*number], charts[*number]));
         }
         let operator = beside::operated(deployment, charts, numbers);
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
@@ -113,12 +117,14 @@ impl<'a> Product<'a> {
             standing: super::stands::standing(deployment),
             untimed: false,
             unjudged: false,
+            crosses: false,
+            by_hand: 1,
             effort: Effort::default().into(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
         product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
-            let own = outside_of(&views[*number], charts, *number);
+            let own = outside_of(deployment, &views[*number], charts[*number]);
             product.members[place].listen(deployment, &own);
         }
         product
@@ -154,6 +160,8 @@ impl<'a> Product<'a> {
             down: 0,
             stopping: false,
             leaving: false,
+            moved: 0,
+            across: false,
             flight: Vec::new(),
         };
         let mut states = vec![state];
@@ -169,6 +177,8 @@ impl<'a> Product<'a> {
         let mut nexts = self.goes_on(state);
         if state.flight.is_empty() && state.inbox.is_empty() {
             self.comes_from_outside(state, &mut nexts);
+        } else if state.flight.is_empty() && self.crosses {
+            self.comes_across(state, &mut nexts);
         }
         nexts
     }
@@ -192,19 +202,19 @@ impl<'a> Product<'a> {
         }
         for number in 0..self.members.len() {
             let own = index(number);
-            // Answers go first.
+            // Answers go first, but for what is urgent.
             let mine = |(request, _): &(Request, Verdict)| self.member(request.requester) == Some(number);
             if let Some(at) = state.telling.iter().position(mine) {
                 let mut next = state.clone();
                 let (request, verdict) = next.telling.remove(at);
                 let event = self.members[number].chart.event(verdict.event(request.ask));
                 self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
+                let urgent = self.takes_next(state, number).into_iter().filter(|takes| takes.urgent);
+                self.take(state, number, urgent, &mut nexts);
                 continue;
             }
-            let Some(at) = state.inbox.iter().position(|(to, _)| *to == own) else { continue };
-            let mut next = state.clone();
-            let (_, event) = next.inbox.remove(at);
-            self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
+            let takes = self.takes_next(state, number);
+            self.take(state, number, takes, &mut nexts);
         }
         nexts
     }
@@ -238,14 +248,16 @@ impl<'a> Product<'a> {
 
     /// Whether the event that starts or the one that ends the deployment comes.
     pub(super) fn is_first_or_last(&self, by: Move) -> bool {
-        let ends = [self.deployment.deploy.event, self.deployment.shutdown.event];
-        matches!(by, Move::Event(at) if ends.contains(&self.outside[usize::from(at)]))
+        matches!(by, Move::Event(at) if self.deployment.begins_or_ends(self.outside[usize::from(at)]))
     }
 
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no
     /// decision: who comes to *down*, and when the deployment is down.
     pub(super) fn settle(&mut self, mut state: State) -> State {
         state.stopping &= !(state.is_at_rest() && self.all_in(&state, |member| member.down));
+        if state.inbox.is_empty() {
+            (state.moved, state.across) = (0, false);
+        }
         state
     }
 
@@ -321,7 +333,7 @@ impl<'a> Product<'a> {
 
     /// Whether all of them have come to *down* and asked for nothing since.
     pub(super) fn all_down(&self, state: &State) -> bool {
-        (0..self.members.len()).all(|number| state.down & (1 << number.min(63)) != 0)
+        (0..self.members.len()).all(|number| state.down & bit(number) != 0)
     }
 
     /// The coordinator that is in a state which means that the bring-up has failed: a running deployment is stopped there.
@@ -352,11 +364,8 @@ impl<'a> Product<'a> {
     }
 }
 
-/// Events that come to a coordinator from outside: what others raise comes from them, and only then.
-fn outside_of(view: &Deployment, charts: &[&Chart], number: usize) -> Vec<EventName> {
-    let raised = |event: &EventName| {
-        let others = charts.iter().enumerate().filter(|(other, _)| *other != number);
-        others.into_iter().any(|(_, chart)| chart.raises().iter().any(|site| site.name == *event))
-    };
-    outside_events(view, charts[number]).into_iter().filter(|event| !raised(event)).collect()
+/// Events that come to a coordinator from outside; what others alone raise comes from them, and only then.
+fn outside_of(deployment: &Deployment, view: &Deployment, chart: &Chart) -> Vec<EventName> {
+    let comes = |event: &EventName| deployment.never_from_outside(event.as_str()).is_none();
+    outside_events(view, chart).into_iter().filter(comes).collect()
 }

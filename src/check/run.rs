@@ -109,7 +109,12 @@ fn follow(
     if product.untimed {
         left.insert(Bound::Times.told(Failed::Nothing, 0, effort.transitions));
     }
-    for numbers in beside::groups(deployment, charts) {
+    let groups = beside::groups(deployment, charts);
+    if beside::is_tied(deployment, charts, &groups) {
+        left.insert(Bound::Tied.told(Failed::Nothing, 0, effort.transitions));
+        explored.complete = false;
+    }
+    for numbers in groups {
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
         if let Some(apart) = &mut apart {
@@ -150,6 +155,7 @@ fn follow(
                 graph.cut(Bound::Apart, Failed::Nothing);
             }
             found.extend(graph.judge());
+            graph.probe(&found);
             let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];
             let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
             let shared = beside::shared(deployment, charts, &numbers, verified);

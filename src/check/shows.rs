@@ -98,7 +98,8 @@ impl Shows {
         let goes_on = !before.desk.under_way().is_empty() || !before.safe.is_empty();
         let races = || goes_on && races(before, next);
         match next.by {
-            Move::Taken(..) => true,
+            // How much has come is seen by nobody: in a script all has.
+            Move::Taken(number, event) => product.takes_in_turn(before, &next.state, usize::from(number), event),
             Move::Answer => {
                 let own_time = (self.unheard || self.at_once) && !self.answers_idle(before, next);
                 // What is taken back unconfirmed may have to wait for what is under way.

@@ -83,6 +83,10 @@ pub struct State {
     /// The same as the configurator knows it: until all coordinators have come to *down*. Kept only where an operator may have
     /// put something in their way.
     pub leaving: bool,
+    /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
+    pub moved: u64,
+    /// One came meanwhile.
+    pub across: bool,
     /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
     pub flight: Vec<Batch>,
 }
@@ -233,6 +237,11 @@ impl Next {
         let failed = if std::mem::take(&mut state.stayed) { failed.max(Failed::Undo) } else { failed };
         Self { by, answers, state, failed, deep: (None, None), by_hand: false }
     }
+}
+
+/// A coordinator's bit.
+pub fn bit(number: usize) -> u64 {
+    1 << number.min(63)
 }
 
 /// A coordinator's number as a state has it.

@@ -33,6 +33,13 @@ pub const CHECK_STOPPING: usize = 20_000;
 /// as many.
 pub const CHECK_BY_HAND: usize = 20_000;
 
+/// Transitions up to which it is looked whether what is left out (orders of what comes to several coordinators, several frames of an
+/// operator) would be judged otherwise; where there are more, it is said to be left out.
+pub const CHECK_PROBED: usize = 10_000;
+
+/// Transitions that are followed to look for that.
+pub const CHECK_PROBE: usize = 50_000;
+
 /// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
 /// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
 pub const CHECK_LEAN: usize = 5_000;

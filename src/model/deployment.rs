@@ -242,6 +242,37 @@ impl Deployment {
         self.shutdown.event.as_str() == event || self.deploy.event.as_str() != event && safety()
     }
 
+    /// Events that go before all others, whoever raises them: those of safety, and those that begin and end the deployment. Of
+    /// each one waits at most.
+    pub fn urgent(&self) -> impl Iterator<Item = EventName> + '_ {
+        let safety = self.safety.iter().map(|(event, _)| *event);
+        safety.chain([self.deploy.event, self.shutdown.event])
+    }
+
+    /// Whether an event begins or ends the deployment: which of both came last says where it is to go, so one that waits already
+    /// waits from then on where it came last.
+    pub fn begins_or_ends(&self, event: EventName) -> bool {
+        [self.deploy.event, self.shutdown.event].contains(&event)
+    }
+
+    /// Whether an event is one that coordinators tell each other: whoever waits for it hears it of another one.
+    pub fn is_told_between(&self, event: &str) -> bool {
+        let numbers = || 0..self.coordinators.len();
+        let told =
+            |number: usize| numbers().any(|other| other != number && self.coordinators[other].chart.raises(event));
+        let mut hear = numbers().filter(|number| self.coordinators[*number].chart.waits_for(event)).peekable();
+        self.coordinators.len() > 1 && hear.peek().is_some() && hear.all(told)
+    }
+
+    /// The same of one that nobody else raises: no other source of it is declared, be it people or what brings it.
+    pub fn is_theirs_alone(&self, event: &str) -> bool {
+        let monitors = self.monitors.iter().flat_map(Monitor::events);
+        let reactions = self.reactions.iter().map(|reaction| reaction.raise);
+        let confirms = self.configurations.iter().filter_map(|c| Some(c.confirm?.event));
+        let mut declared = self.urgent().chain(monitors).chain(reactions).chain(confirms);
+        self.is_told_between(event) && declared.all(|own| own.as_str() != event)
+    }
+
     /// Whether an event is spelt like an answer of the configurator: it ends like one, or is about a configuration or `undo`.
     pub fn looks_like_answer(&self, event: &str) -> bool {
         match Verdict::split(event) {
@@ -254,13 +285,14 @@ impl Deployment {
         }
     }
 
-    /// Why an event cannot come from outside (of a component, a monitor, an operator): it tells what only Davit knows. None: it
-    /// can.
+    /// Why an event cannot come from outside (of a component, a monitor, an operator): it tells what only Davit knows, or what only
+    /// its coordinators tell each other. None: it can.
     pub fn never_from_outside(&self, event: &str) -> Option<String> {
         if is_internal(event) {
             Some(format!("`{event}` is an event of the statechart itself, which nobody else raises"))
         } else if !self.looks_like_answer(event) {
-            None
+            let told = || format!("`{event}` is what coordinators tell each other, which nobody else raises");
+            self.is_theirs_alone(event).then(told)
         } else if event.ends_with(UNDO) {
             Some(format!("`{event}` is a request to the configurator, no event"))
         } else {

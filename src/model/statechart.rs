@@ -28,6 +28,21 @@ impl Statechart {
     pub fn is_pure(&self) -> bool {
         self.root.is_pure()
     }
+
+    /// Whether something in it raises that name.
+    pub fn raises(&self, name: &str) -> bool {
+        let is = |action: &(Action, Origin)| matches!(action.0, Action::Raise(raised) if raised.as_str() == name);
+        self.root.any(&|state| {
+            let effects = state.transitions.iter().flat_map(|transition| &transition.effect);
+            state.entry.iter().chain(&state.exit).chain(effects).any(is)
+        })
+    }
+
+    /// Whether a transition waits for an event of that name.
+    pub fn waits_for(&self, name: &str) -> bool {
+        let is = |trigger: &(Trigger, Origin)| matches!(&trigger.0, Trigger::Event(event) if event.as_str() == name);
+        self.root.any(&|state| state.transitions.iter().flat_map(|transition| &transition.events).any(is))
+    }
 }
 
 impl Default for Statechart {
@@ -91,6 +106,12 @@ impl State {
                 Node::State(state) => state.is_pure(),
                 Node::Connector(_) => true,
             })
+    }
+
+    /// Whether something is so of it or of a state inside.
+    fn any(&self, is: &impl Fn(&Self) -> bool) -> bool {
+        let inside = |child: &Node| matches!(child, Node::State(state) if state.any(is));
+        is(self) || self.children.iter().any(inside)
     }
 
     /// Its own functions, each with the key of the part it stands in.

@@ -95,10 +95,14 @@ impl Session {
     pub fn may_raise(&self, event: &str) -> Result<(), NotFromOutside> {
         let deployment = self.deployment();
         let Some(message) = deployment.never_from_outside(event) else { return Ok(()) };
-        let help = deployment.asked_instead(event).map_or_else(
-            || "raise an event that a transition waits for; answers go to whoever asks for something".to_owned(),
-            instead_of,
-        );
+        let help = match deployment.asked_instead(event) {
+            Some(ask) => instead_of(ask),
+            None if deployment.is_theirs_alone(event) => {
+                "raise what leads a coordinator to tell it; one that people raise as well is listed under `safety:`, or has a name of its own"
+                    .to_owned()
+            }
+            None => "raise an event that a transition waits for; answers go to whoever asks for something".to_owned(),
+        };
         Err(NotFromOutside { message, help })
     }
 

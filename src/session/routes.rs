@@ -35,8 +35,7 @@ pub(super) struct Junction {
 impl Junction {
     /// Of a deployment whose threads do not run yet.
     pub fn new(deployment: &Deployment) -> Self {
-        let safety = deployment.safety.iter().map(|(event, _)| *event);
-        let urgent = safety.chain([deployment.deploy.event, deployment.shutdown.event]).collect();
+        let urgent = deployment.urgent().collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
         Self { urgent, ends, ..Self::default() }
     }

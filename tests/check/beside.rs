@@ -253,3 +253,192 @@ fn what_another_one_emits_late_counts_in_how_long_the_way_down_lasts() {
 }
 
 const BASE: &str = "base = Configuration { create('a', 'Drive') }";
+/// The states of one that goes from `up` to `idle`, with what is in `up`.
+fn going(up: &str, transitions: &str) -> String {
+    format!(
+        "idle = state {{}}, up = state {{ {up} }},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'up', events = {{ 'e_start' }} }},
+         trans {{ src = 'up', tgt = 'idle', events = {{ 'e_shutdown' }} }}, {transitions}"
+    )
+}
+
+/// One that has the component `b` while it is up, and asks for it once more in `trap`.
+fn trapped(up: &str) -> String {
+    format!(
+        "idle = state {{}}, off = state {{ entry = 'cb.undo' }}, left = state {{}},
+         up = state {{ entry = 'cb', t0 = state {{}}, {up} trans {{ src = 'initial', tgt = 't0' }} }},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'up', events = {{ 'e_start' }} }},
+         trans {{ src = 'up', tgt = 'off', events = {{ 'e_shutdown', 'cb.failed', 'cb.broken' }} }},
+         trans {{ src = 'off', tgt = 'idle', events = {{ 'cb.undone' }} }},
+         trans {{ src = 'off', tgt = 'left', events = {{ 'cb.undo.failed', 'cb.undo.broken' }} }},
+         trans {{ src = 'left', tgt = 'off', events = {{ 'e_shutdown' }} }},"
+    )
+}
+
+const TRAP: &str = "trap = state { entry = 'bad' }, after = state {},
+    trans { src = 'trap', tgt = 'after', events = { 'bad.failed', 'bad.broken' } },";
+const AGAIN: &str = "cb = Configuration { create('b', 'Drive') }, bad = Configuration { create('b', 'Drive') },";
+
+/// What was left out, of what is sound else.
+fn left(small: &Small) -> Vec<String> {
+    let said = said(small);
+    let word = said.0["verdict"].as_str().unwrap();
+    let left: Vec<String> =
+        said.0["left"].as_array().unwrap().iter().map(|of| of.as_str().unwrap().to_owned()).collect();
+    assert_eq!(word, if left.is_empty() { "sound" } else { "followed" }, "{:#}", said.0);
+    left
+}
+
+/// What is urgent overtakes what was told before it, also where one coordinator tells both to another.
+#[test]
+fn what_is_urgent_overtakes_what_was_told_before() {
+    let one = going(
+        "s0 = state {}, s1 = state { entry = { 'x_1', 'e_estop' } },
+         trans { src = 'initial', tgt = 's0' }, trans { src = 's0', tgt = 's1', events = { 'e_a' } },",
+        "",
+    );
+    let up = |urgent: &str| {
+        format!(
+            "t1 = state {{}}, t3 = state {{}}, {TRAP} trans {{ src = 't0', tgt = 't1', events = {{ 'x_1' }} }},
+             trans {{ src = 't0', tgt = 't3', events = {{ '{urgent}' }} }}, trans {{ src = 't3', tgt = 'trap', events = {{ 'x_1' }} }},"
+        )
+    };
+    let of = |safety: &str| {
+        let keys = format!("emits: [x_1, e_estop]\n{safety}");
+        said(&Small::several(AGAIN, &[("one", &one), ("two", &trapped(&up("e_estop")))], &keys))
+    };
+    assert!(!of("safety: [e_estop]\n").refused("bad").is_empty());
+    // In its turn it comes behind.
+    assert!(of("").refused("bad").is_empty());
+}
+
+/// Of an urgent event one waits: told again before it is heard it is the same.
+#[test]
+fn an_urgent_event_that_waits_is_one_with_the_next() {
+    let one = "idle = state {}, first = state { entry = 'e_tick' }, up = state { entry = 'e_tick' },
+         trans { src = 'initial', tgt = 'idle' },
+         trans { src = 'idle', tgt = 'first', events = { 'e_start' } },
+         trans { src = 'first', tgt = 'up', events = { 'e_done' } },
+         trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },";
+    let two = "idle = state {}, w0 = state {}, w1 = state {}, up = state {},
+         trans { src = 'initial', tgt = 'idle' },
+         trans { src = 'idle', tgt = 'w0', events = { 'e_start' } },
+         trans { src = 'w0', tgt = 'w1', events = { 'e_tick' } },
+         trans { src = 'w1', tgt = 'up', events = { 'e_tick' } },
+         trans { src = 'w0', tgt = 'idle', events = { 'e_shutdown' } },
+         trans { src = 'w1', tgt = 'idle', events = { 'e_shutdown' } },
+         trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },";
+    let of = |safety: &str| {
+        let keys = format!("emits: [e_tick]\n{safety}");
+        said(&Small::several("base = Configuration { create('a', 'Drive') },", &[("one", one), ("two", two)], &keys))
+    };
+    assert!(!of("safety: [e_tick]\n").of("deploy::never_up").is_empty());
+    assert!(of("").of("deploy::never_up").is_empty());
+}
+
+/// What only coordinators tell each other is raised by nobody else; what people may raise as well is followed as that.
+#[test]
+fn what_coordinators_tell_each_other_comes_of_them_alone() {
+    // It never comes to where it would tell it.
+    let one = going("s0 = state {}, s1 = state { entry = 'e_halt' }, trans { src = 'initial', tgt = 's0' },", "");
+    let two = trapped(&format!("{TRAP} trans {{ src = 't0', tgt = 'trap', events = {{ 'e_halt' }} }},"));
+    let of = |safety: &str| {
+        let keys = format!("emits: [e_halt]\n{safety}");
+        Small::several(AGAIN, &[("one", &one), ("two", &two)], &keys)
+    };
+    let (theirs, anybodys) = (of(""), of("safety: [e_halt]\n"));
+    assert!(said(&theirs).refused("bad").is_empty());
+    assert!(!said(&anybodys).refused("bad").is_empty());
+    let script = "deploy('small.yaml') wait(0.1) say(select(2, pcall(raise, 'e_halt')))";
+    theirs.demo.write("raise.lua", script);
+    let ran = theirs.demo.run(&["run", "raise.lua", "--clock", "simulated"]);
+    assert!(ran.out.contains("what coordinators tell each other"), "{}{}", ran.out, ran.err);
+}
+
+/// An event that comes before the last one was heard by all is not followed; that is said where the order matters.
+#[test]
+fn what_comes_before_all_have_heard_is_told_where_it_matters() {
+    let of = |one: &str, up: &str, configurations: &str| {
+        let keys = "emits: [x_1, x_2]\n";
+        let one = going(&format!("s0 = state {{}}, trans {{ src = 'initial', tgt = 's0' }}, {one}"), "");
+        left(&Small::several(configurations, &[("one", &one), ("two", &trapped(up))], keys))
+    };
+    let told = |left: &[String]| left.iter().any(|line| line.contains("before all coordinators have heard"));
+    // `e_b` may overtake what `e_a` leads to.
+    let tells = "s1 = state { entry = { 'x_1', 'x_2' } }, s2 = state {}, s9 = state {}, trans { src = 's0', tgt = 's1', events = { 'e_a' } },
+         trans { src = 's1', tgt = 's2', events = { 'e_b' } }, trans { src = 's0', tgt = 's9', events = { 'e_b' } },";
+    let hears = "t1 = state {}, t2 = state {}, t3 = state {}, trans { src = 't0', tgt = 't1', events = { 'x_1' } },
+         trans { src = 't1', tgt = 't2', events = { 'e_b' } }, trans { src = 't0', tgt = 't3', events = { 'e_b' } },";
+    let trap = format!("{hears} {TRAP} trans {{ src = 't3', tgt = 'trap', events = {{ 'x_1' }} }},");
+    assert!(told(&of(tells, &trap, AGAIN)));
+    // Two times at one moment.
+    let later =
+        "s1 = state { entry = 'x_1' }, s2 = state {}, trans { src = 's0', tgt = 's1', events = { 'e_after(1.0)' } },
+         trans { src = 's0', tgt = 's2', events = { 'x_2' } },";
+    let crossed = format!(
+        "t1 = state {{}}, t3 = state {{ entry = 'x_2' }}, {TRAP} trans {{ src = 't0', tgt = 't1', events = {{ 'x_1' }} }},
+         trans {{ src = 't0', tgt = 't3', events = {{ 'e_after(1.0)' }} }}, trans {{ src = 't3', tgt = 'trap', events = {{ 'x_1' }} }},"
+    );
+    assert!(told(&of(later, &crossed, AGAIN)));
+    // Whatever comes first, nothing is asked for.
+    assert_eq!(of(tells, hears, "cb = Configuration { create('b', 'Drive') },"), [""; 0]);
+}
+
+/// One that has `base` while it is up, and more by what is in `up`.
+fn based(base: &str, begins: &str, up: &str) -> String {
+    format!(
+        "idle = state {{}}, building = state {{ entry = '{base}' }}, up = state {{}}, leaving = state {{ entry = '{base}.undo' }},
+         failed = state {{}},
+         trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'building', events = {{ '{begins}' }} }},
+         trans {{ src = 'building', tgt = 'up', events = {{ '{base}.ok' }} }},
+         trans {{ src = 'building', tgt = 'failed', events = {{ '{base}.failed', '{base}.broken' }} }},
+         trans {{ src = 'building', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'failed', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ '{base}.undone' }} }},
+         trans {{ src = 'leaving', tgt = 'failed', events = {{ '{base}.undo.failed', '{base}.undo.broken' }} }}, {up}"
+    )
+}
+
+/// Several frames of an operator at once are not followed; that is said where they matter together.
+#[test]
+fn several_frames_of_an_operator_are_told_where_they_matter() {
+    let of = |second: &str| {
+        let configurations = format!(
+            "base = Configuration {{ create('a', 'Drive'), create('b', 'Drive'), create('c', 'Drive'), connect('a.out', 'b.in') }},
+             x = Configuration {{ destroy('c'), create('c', 'Drive') }},
+             p1 = Configuration {{ disconnect('a.out', 'b.in') }}, p2 = Configuration {{ {second} }},"
+        );
+        let up = "on = state { entry = 'x' }, off = state { entry = 'x.undo' },
+             trans { src = 'up', tgt = 'on', events = { 'e_a' } }, trans { src = 'on', tgt = 'off', events = { 'e_shutdown' } },
+             trans { src = 'on', tgt = 'failed', events = { 'x.failed', 'x.broken' } },
+             trans { src = 'off', tgt = 'leaving', events = { 'x.undone' } },
+             trans { src = 'off', tgt = 'failed', events = { 'x.undo.failed', 'x.undo.broken' } },";
+        let states =
+            based("base", "e_start", up).replace("src = 'failed', tgt = 'leaving'", "src = 'failed', tgt = 'off'");
+        left(&Small::new(&configurations, &states, "operator: [p1, p2]\n"))
+    };
+    let together = of("connect('c.out', 'b.in')");
+    assert!(together.iter().any(|line| line.contains("several are in force at once")), "{together:?}");
+    assert_eq!(of("property_set('b.gain', 2.0)"), [""; 0]);
+}
+
+/// An operator's frames for those that are followed apart may be squashed into one: that is said.
+#[test]
+fn an_operators_frames_for_several_are_told() {
+    let of = |operator: &str| {
+        let configurations =
+            "base = Configuration { create('a', 'Drive') }, lamp = Configuration { create('b', 'Drive') },
+             pa = Configuration { property_set('a.gain', 2.0) }, pb = Configuration { property_set('b.gain', 2.0) },";
+        let small = Small::several(
+            configurations,
+            &[("one", &based("base", "e_start", "")), ("two", &based("lamp", "e_start", ""))],
+            &format!("operator: [{operator}]\nlimits: {{ stack: 2 }}\n"),
+        );
+        left(&small)
+    };
+    assert!(of("pa, pb").iter().any(|line| line.contains("squashed into one")));
+    assert_eq!(of("pa"), [""; 0]);
+}
