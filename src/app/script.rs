@@ -3,6 +3,7 @@
 //! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
+mod failure;
 mod faults;
 mod interrupt;
 mod looks;
@@ -15,12 +16,14 @@ use super::{Refused, StartError};
 use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
 use crate::limits;
-use crate::model::finding::{Finding, did_you_mean};
+use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, Ident};
 use crate::runtime::Libraries;
 use crate::session::tap::Hears;
 use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
+use failure::IsRefused;
+pub use failure::ScriptFailure;
 pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
 use std::cell::RefCell;
@@ -56,35 +59,6 @@ pub struct ScriptEnd {
     /// How its deployment ended, if it had one.
     pub ended: Option<Ended>,
 }
-
-/// Why a script failed.
-#[derive(Debug, thiserror::Error)]
-pub enum ScriptFailure {
-    /// The file cannot be read, is no text, or is too large.
-    #[error("{}", .0.message)]
-    Unreadable(Box<Finding>),
-    /// It does not parse, or it raised an error; the text names file and line.
-    #[error("{message}")]
-    Lua {
-        /// What happened.
-        message: String,
-        /// Whether it is the text that is wrong.
-        syntax: bool,
-    },
-    /// A deployment it loads is refused.
-    #[error("{path} is refused")]
-    Refused {
-        /// The deployment.
-        path: PathBuf,
-        /// With its findings.
-        refused: Box<Refused>,
-    },
-}
-
-/// What `deploy` raises.
-#[derive(Debug, thiserror::Error)]
-#[error("{0} is refused")]
-struct IsRefused(String);
 
 struct Host {
     options: Options,

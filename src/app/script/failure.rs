@@ -1,0 +1,34 @@
+//! Why a script failed.
+
+use super::super::Refused;
+use crate::model::Finding;
+use std::path::PathBuf;
+
+/// Why a script failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ScriptFailure {
+    /// The file cannot be read, is no text, or is too large.
+    #[error("{}", .0.message)]
+    Unreadable(Box<Finding>),
+    /// It does not parse, or it raised an error; the text names file and line.
+    #[error("{message}")]
+    Lua {
+        /// What happened.
+        message: String,
+        /// Whether it is the text that is wrong.
+        syntax: bool,
+    },
+    /// A deployment it loads is refused.
+    #[error("{path} is refused")]
+    Refused {
+        /// The deployment.
+        path: PathBuf,
+        /// With its findings.
+        refused: Box<Refused>,
+    },
+}
+
+/// What `deploy` raises.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} is refused")]
+pub(super) struct IsRefused(pub String);
