@@ -99,7 +99,10 @@ pub const READ: &[(&str, &[Code])] = &[
         ],
     ),
     ("it is told of all that two coordinators ask for together: no way leads to it", &[COORD_SHARED]),
-    ("it is told as the reason why a request is refused, with the way to that", &[STACK_EMPTY, STACK_FULL]),
+    (
+        "it is told as the reason why a request is refused, with the way to that",
+        &[STACK_EMPTY, STACK_FULL, STACK_NO_FRAME],
+    ),
     (
         "what is planned leads through all run states on its way: only a component that has failed meets it",
         &[ILLEGAL_TRANSITION, NOT_UNCONFIGURED],
