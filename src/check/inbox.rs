@@ -6,7 +6,8 @@
 
 use super::product::Product;
 use super::state::{Move, Nexts, State, index};
-use crate::model::EventName;
+use crate::model::Precedence;
+use crate::model::precedence::taken_first;
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 
@@ -39,24 +40,15 @@ impl Product<'_> {
 
     /// What goes first of what has come to a coordinator, in the order in which it came; something has.
     fn first_of(&self, number: usize, came: &[(usize, EventId)]) -> Takes {
-        let urgent = |event: EventId| {
+        let precedence = |event: EventId| {
             let name = self.members[number].name_of(event);
-            name.filter(|name| self.deployment.urgent().any(|urgent| urgent == *name))
+            name.map_or(Precedence::InTurn, |name| self.deployment.precedence(name))
         };
-        // One that begins or ends the deployment waits where it came last.
-        let waits = |at: usize, event: EventId, name: EventName| match self.deployment.begins_or_ends(name) {
-            true => came[at + 1..].iter().all(|(_, other)| *other != event),
-            false => true,
-        };
-        let mut places = came.iter().enumerate().map(|(at, (_, event))| (at, *event));
-        let first = places.find(|(at, event)| urgent(*event).is_some_and(|name| waits(*at, *event, name)));
-        match first {
-            Some((_, event)) => {
-                let same = came.iter().filter(|(_, other)| *other == event).map(|(place, _)| *place);
-                Takes { event, urgent: true, places: same.collect() }
-            }
-            None => Takes { event: came[0].1, urgent: false, places: SmallVec::from_iter([came[0].0]) },
-        }
+        let told: SmallVec<[(EventId, Precedence); 4]> =
+            came.iter().map(|(_, event)| (*event, precedence(*event))).collect();
+        let taken = taken_first(&told);
+        let (event, precedence) = told[taken[0]];
+        Takes { event, urgent: precedence.is_urgent(), places: taken.iter().map(|at| came[*at].0).collect() }
     }
 
     /// Whether a coordinator has taken what it takes if all had come before: nobody could tell how much had, else.

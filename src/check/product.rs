@@ -19,7 +19,7 @@ use super::reactions::Asked;
 use super::state::{Failed, Move, Next, Nexts, State, bit, index};
 use super::world::Worlds;
 use crate::limits;
-use crate::model::{Catalogue, ConfigId, Deployment, EventName, RequestId, Verdict};
+use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, RequestId, Verdict};
 use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashMap;
@@ -248,7 +248,7 @@ impl<'a> Product<'a> {
 
     /// Whether the event that starts or the one that ends the deployment comes.
     pub(super) fn is_first_or_last(&self, by: Move) -> bool {
-        matches!(by, Move::Event(at) if self.deployment.begins_or_ends(self.outside[usize::from(at)]))
+        matches!(by, Move::Event(at) if self.deployment.precedence(self.outside[usize::from(at)]) == Precedence::UrgentAsLast)
     }
 
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no

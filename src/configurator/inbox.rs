@@ -184,10 +184,11 @@ impl Post {
         self.command(AtOnce::Hurry);
     }
 
-    /// Says that the deployment is led down from now on, or that it is brought up. It is for the requests that come after this,
-    /// so it goes with the next of them: alone it would wake the configurator before that.
+    /// Says that the deployment is led down from now on, or that it is brought up. What waits is judged by it too, so it is told
+    /// at once; when there is no room, with the next request.
     pub fn leaving(&self, leaving: bool) {
         self.counts.leaving.store(leaving, Ordering::Release);
+        self.tell_leaving();
     }
 
     /// Whether it is led down.

@@ -249,12 +249,6 @@ impl Deployment {
         safety.chain([self.deploy.event, self.shutdown.event])
     }
 
-    /// Whether an event begins or ends the deployment: which of both came last says where it is to go, so one that waits already
-    /// waits from then on where it came last.
-    pub fn begins_or_ends(&self, event: EventName) -> bool {
-        [self.deploy.event, self.shutdown.event].contains(&event)
-    }
-
     /// Whether an event is one that coordinators tell each other: whoever waits for it hears it of another one.
     pub fn is_told_between(&self, event: &str) -> bool {
         let numbers = || 0..self.coordinators.len();

@@ -7,11 +7,11 @@ use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
 use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
-use crate::model::{Ask, Deployment, EventName, RequestId, Verdict};
+use crate::model::{Ask, Deployment, EventName, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
-use rustc_hash::FxHashSet;
+use rustc_hash::FxHashMap;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
@@ -25,9 +25,8 @@ pub(super) struct Junction {
     /// With the names under which they ask.
     pub coordinators: Mutex<Vec<(Requester, Coordinator)>>,
     pub configurator: Mutex<Option<ConfiguratorHandle>>,
-    /// Events that go before all others, whoever raises them: those declared under `safety`, and those that begin and end
-    /// the deployment.
-    urgent: FxHashSet<EventName>,
+    /// Events that go before all others, whoever raises them.
+    urgent: FxHashMap<EventName, Precedence>,
     /// The events that begin and end the deployment.
     ends: Option<(EventName, EventName)>,
 }
@@ -35,7 +34,7 @@ pub(super) struct Junction {
 impl Junction {
     /// Of a deployment whose threads do not run yet.
     pub fn new(deployment: &Deployment) -> Self {
-        let urgent = deployment.urgent().collect();
+        let urgent = deployment.urgent().map(|event| (event, deployment.precedence(event))).collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
         Self { urgent, ends, ..Self::default() }
     }
@@ -55,10 +54,7 @@ impl Junction {
 
     /// An event of a class, unless it is one that goes before all others.
     pub fn incoming(&self, class: Class, event: EventName) -> Incoming {
-        let incoming = Incoming::new(if self.urgent.contains(&event) { Class::Urgent } else { class }, event);
-        // Which of both came last says where it is to go.
-        let last = self.ends.is_some_and(|(begins, ends)| event == begins || event == ends);
-        Incoming { last, ..incoming }
+        Incoming::new(class, event).going(self.urgent.get(&event).copied().unwrap_or_default())
     }
 
     /// The coordinator that asks under that name.

@@ -327,3 +327,67 @@ fn frames_are_counted_by_coordinator_and_a_way_that_is_cut_is_told() {
     assert_eq!(of_code(&json, "coord::stack_grows").len(), 1, "{json:#}");
     assert_eq!(json["explored"]["complete"], false, "{json:#}");
 }
+
+/// Whether it is being led down counts when an undo begins, not when it was asked for: what an operator has put in its way since
+/// goes with it only then. `before` and `after`: what is raised while the operator's request is under way.
+fn undo_that_waits(before: &str, after: &str) -> String {
+    let demo = Demo::new();
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ one: one.lua, two: two.lua }}
+deploy: {{ event: e_start, up: up, failed: [failed], within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: idle, within_s: 5 }}
+operator: [op]\n"
+        ),
+    );
+    demo.write(
+        "conf.lua",
+        r#"ConfiguratorConf {
+          base = Configuration { create("drive", "Drive") },
+          other = Configuration { create("lamp", "Drive") },
+          op = Configuration { property_set("drive.gain", 2.0) },
+        }"#,
+    );
+    demo.write(
+        "one.lua",
+        r#"return state {
+          idle = state {}, up = state { entry = "base" }, failed = state {}, leaving = state { entry = "base.undo" },
+          trans { src = "initial", tgt = "idle" },
+          trans { src = "idle", tgt = "up", events = { "e_start" } },
+          trans { src = "up", tgt = "failed", events = { "base.failed", "base.broken" } },
+          trans { src = "up", tgt = "leaving", events = { "e_shutdown", "e_leave" } },
+          trans { src = "leaving", tgt = "failed", events = { "base.undo.failed", "base.undo.broken" } },
+          trans { src = "leaving", tgt = "idle", events = { "base.undone" } },
+          trans { src = "failed", tgt = "leaving", events = { "e_shutdown" } },
+        }"#,
+    );
+    demo.write(
+        "two.lua",
+        r#"return state {
+          idle = state {}, up = state {}, failed = state {}, leaving = state { entry = "other.undo" },
+          trans { src = "initial", tgt = "idle" },
+          trans { src = "idle", tgt = "up", events = { "e_start" } },
+          trans { src = "up", tgt = "leaving", events = { "e_shutdown" } },
+          trans { src = "leaving", tgt = "idle", events = { "other.undone" } },
+        }"#,
+    );
+    demo.write(
+        "story.lua",
+        &format!(
+            "deploy(\"two.yaml\") wait(0.1) fault(\"property_set drive.gain\", \"slow\", 1, 0.06)
+             apply(\"op\") wait(0.02) raise(\"{before}\") wait(0.02) raise(\"{after}\") wait(0.1)"
+        ),
+    );
+    demo.run(&["run", "story.lua", "--clock", "simulated"]).out
+}
+
+#[test]
+fn whether_it_is_led_down_counts_when_an_undo_begins() {
+    // One leads down, the other one brings up again before the operator's request is over.
+    let out = undo_that_waits("e_shutdown", "e_start");
+    assert!(out.contains("`base` cannot be undone before `op`"), "{out}");
+    // It was asked for while it was up, and begins while it is led down.
+    let out = undo_that_waits("e_leave", "e_shutdown");
+    assert!(out.contains("`op` of an operator was undone with it") && !out.contains("base.undo.failed"), "{out}");
+}

@@ -11,7 +11,8 @@
 //!    [`limits::INBOX_ASKED`] requests of the coordinator are not answered: it would only ask for more.
 //!
 //! The first class goes first, after [`limits::INBOX_ROW`] in a row one of the other two; between these what came first, and
-//! after as many in a row of one class the other. Of the first class, after as many urgent ones a word.
+//! after as many in a row of one class the other. Of the first class, after as many urgent ones a word. Which goes first is, but
+//! for these turns, `model/precedence.rs`, where `check` asks the same.
 
 mod lists;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod tests;
 
 use super::core::Tag;
 use crate::limits;
+use crate::model::Precedence;
 use crate::model::names::EventName;
 use crate::statechart::NodeId;
 use lists::{List, Lists};
@@ -59,6 +61,13 @@ impl Incoming {
     /// An event of a class, for nobody in particular.
     pub fn new(class: Class, event: EventName) -> Self {
         Self { event, tag: None, class, ticket: 0, last: false }
+    }
+
+    /// The same, going before others as its precedence says.
+    #[must_use]
+    pub fn going(self, precedence: Precedence) -> Self {
+        let class = if precedence.is_urgent() { Class::Urgent } else { self.class };
+        Self { class, last: precedence == Precedence::UrgentAsLast, ..self }
     }
 
     /// The same, for whoever asked.

@@ -1,6 +1,7 @@
 //! Random sequences: what goes in comes out, in its order, within its bounds and its turns.
 
 use super::*;
+use crate::model::precedence::taken_first;
 use proptest::prelude::*;
 
 const SMALL: Bounds = Bounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
@@ -331,4 +332,42 @@ fn what_begins_and_what_ends_come_in_the_order_in_which_they_came_last() {
     }
     let order: Vec<_> = std::iter::from_fn(|| inbox.pop(&mut Vec::new())).map(|incoming| incoming.event).collect();
     assert_eq!(order, [name(2), name(1), name(0)]);
+}
+
+/// What has come, and is taken between: of each class as many events as make no turns necessary.
+fn arrivals() -> impl Strategy<Value = Vec<Option<(usize, Class)>>> {
+    let low = prop_oneof![Just(Class::Report), Just(Class::Outside)];
+    prop::collection::vec(prop::option::weighted(0.7, (0..4_usize, low)), 0..40)
+}
+
+proptest! {
+    /// As long as no class has to give way after a row, what is taken is what the rule says that `check` follows.
+    #[test]
+    fn what_is_taken_is_what_the_rule_says(arrivals in arrivals()) {
+        let precedence = |event: EventName| match event {
+            event if event == name(0) => Precedence::Urgent,
+            event if event == name(1) || event == name(2) => Precedence::UrgentAsLast,
+            _ => Precedence::InTurn,
+        };
+        let patient = Bounds { row: 100, report: 100, outside: 100, ..SMALL };
+        let mut inbox = Inbox::within(patient, (0..DECLARED).map(name));
+        let mut came: Vec<(EventName, Precedence)> = Vec::new();
+        for arrival in arrivals.into_iter().chain(std::iter::repeat_n(None, 40)) {
+            match arrival {
+                Some((event, class)) => {
+                    let event = name(event);
+                    inbox.push(Incoming::new(class, event).going(precedence(event))).unwrap();
+                    came.push((event, precedence(event)));
+                }
+                None => {
+                    let taken = taken_first(&came);
+                    let rule = taken.first().map(|at| came[*at].0);
+                    prop_assert_eq!(inbox.pop(&mut Vec::new()).map(|taken| taken.event), rule);
+                    let mut at = 0;
+                    came.retain(|_| { at += 1; !taken.contains(&(at - 1)) });
+                }
+            }
+        }
+        prop_assert!(came.is_empty() && inbox.is_empty());
+    }
 }

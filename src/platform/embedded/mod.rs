@@ -23,6 +23,7 @@
 mod calls;
 mod crews;
 mod order;
+mod others;
 mod prepared;
 mod registry;
 mod steps;

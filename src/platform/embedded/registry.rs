@@ -1,6 +1,7 @@
 //! What is there: components, connections, activities, as the configurator's side sees them. No activity ever touches it.
 
 use super::crews::Crew;
+use super::others::Others;
 use super::watchers::Watcher;
 use crate::model::{ComponentName, ComponentSnapshot, Direction, Ident, MemberRef, Policy, Snapshot, Value};
 use crate::platform::Cause;
@@ -8,7 +9,6 @@ use crate::runtime::builder::{CallerFn, Ends};
 use crate::runtime::cell::Cell;
 use crate::time::Join;
 use rustc_hash::{FxHashMap, FxHashSet};
-use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -70,12 +70,12 @@ pub(super) struct Entry {
 #[derive(Default)]
 pub(super) struct PortUse {
     /// The ports at the other ends of its connections.
-    pub(super) others: SmallVec<[MemberRef; 1]>,
+    pub(super) others: Others,
     /// Its connection is one of policy `data`.
     pub(super) data: bool,
     pub(super) written: bool,
     /// What was written; kept as memory for the next write when nothing is.
-    pub(super) value: Option<Value>,
+    pub(super) value: Option<Box<Value>>,
 }
 
 pub(super) struct Connection {
@@ -176,7 +176,7 @@ impl Registry {
         let ports = entry.cell.kind.ports.iter().zip(&entry.ports).zip(entry.cell.kind.ty.ports.values());
         ports.flat_map(move |((port, used), ty)| {
             let own = entry.cell.name.member(*port);
-            used.others.iter().map(move |other| match ty.direction {
+            used.others.as_slice().iter().map(move |other| match ty.direction {
                 Direction::Out => (own, *other),
                 Direction::In => (*other, own),
             })
@@ -296,7 +296,7 @@ fn written(entry: &Entry, ports: &mut BTreeMap<MemberRef, Value>) {
         if used.written
             && let Some(value) = &used.value
         {
-            ports.insert(entry.cell.name.member(*port), value.clone());
+            ports.insert(entry.cell.name.member(*port), Value::clone(value));
         }
     }
 }

@@ -8,7 +8,6 @@ use crate::platform::Cause;
 use crate::runtime::builder::PortEnd;
 use crate::runtime::guard;
 use crate::time::Time;
-use smallvec::SmallVec;
 
 impl Registry {
     /// The index of a port in the order of names, and its type.
@@ -96,13 +95,13 @@ impl Registry {
         if let Some(PortEnd::Out(end)) = &mut entry.ends.ports[out_port] {
             end.detach(connection.number);
         }
-        forget(&mut entry.ports[out_port].others, to);
+        entry.ports[out_port].others.forget(to);
         entry.connections -= 1;
         let entry = self.entry_mut(reader);
         if let Some(PortEnd::In(end)) = &mut entry.ends.ports[in_port] {
             end.close(connection.number);
         }
-        forget(&mut entry.ports[in_port].others, from);
+        entry.ports[in_port].others.forget(from);
         entry.ports[in_port].data = false;
         entry.connections -= 1;
         let name = entry.crew;
@@ -172,7 +171,7 @@ impl Registry {
             end.prepare();
         }
         if entry.ports[index].value.is_none() {
-            entry.ports[index].value = value.cloned();
+            entry.ports[index].value = value.cloned().map(Box::new);
         }
     }
 
@@ -207,18 +206,11 @@ impl Registry {
         let used = &mut entry.ports[index];
         used.written = value.is_some();
         match (&mut used.value, value) {
-            (Some(slot), Some(value)) => slot.clone_from(value),
-            (slot @ None, Some(value)) => *slot = Some(value.clone()),
+            (Some(slot), Some(value)) => Value::clone_from(slot, value),
+            (slot @ None, Some(value)) => *slot = Some(Box::new(value.clone())),
             (_, None) => {}
         }
         Ok(())
-    }
-}
-
-/// What was connected last is disconnected first, as a rule: a port with thousands of readers is not searched through.
-fn forget(others: &mut SmallVec<[MemberRef; 1]>, other: MemberRef) {
-    if let Some(at) = others.iter().rposition(|o| *o == other) {
-        others.remove(at);
     }
 }
 
