@@ -11,18 +11,6 @@ use super::product::Product;
 use super::state::Failed;
 use crate::limits;
 use crate::model::Severity;
-use crate::statechart::EventId;
-
-impl Product<'_> {
-    /// Whether one coordinator tells another one something.
-    fn tells_between(&self) -> bool {
-        self.members.iter().enumerate().any(|(number, member)| {
-            let others = || self.members.iter().enumerate().filter(|(other, _)| *other != number);
-            let hears = |name| others().any(|(_, other)| other.chart.event(name) != EventId::OTHER);
-            member.chart.raises().iter().any(|site| hears(site.name))
-        })
-    }
-}
 
 impl Graph<'_, '_> {
     /// Notes what was left out and matters. `found` is what is said already.
@@ -31,7 +19,7 @@ impl Graph<'_, '_> {
         if found.iter().any(|(finding, _)| finding.severity > Severity::Info) {
             return;
         }
-        if self.product.tells_between() && self.differs(|product| product.crosses = true) {
+        if self.product.members.len() > 1 && self.differs(|product| product.crosses = true) {
             self.cut(Bound::Across, Failed::Nothing);
         }
         self.product.crosses = false;
