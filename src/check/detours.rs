@@ -16,7 +16,7 @@ use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// States in which it is being stopped and rests, and that lie on ways down that are not in time.
+/// States in which it is being stopped and waits, and that lie on ways down that are not in time.
 #[derive(Default)]
 pub(super) struct Slow {
     /// On none that is: how long the quickest lasts.
@@ -38,7 +38,9 @@ impl Graph<'_, '_> {
         let comes = |(number, edge): &(usize, &Edge)| {
             stops(edge.from) && !matches!(bars[*number], Some(Barred::Closed | Barred::Late))
         };
-        let leads = |number: usize| bars[number].is_none_or(|of| of == Barred::Reported);
+        // That something fails, however soon, is no way on.
+        let fails: Vec<bool> = self.edges.iter().map(|edge| edge.failed != Failed::Nothing).collect();
+        let leads = |number: usize| !fails[number] && bars[number].is_none_or(|of| of == Barred::Reported);
         let some: Vec<usize> = self.edges.iter().enumerate().filter(comes).map(|(number, _)| number).collect();
         let timers = self.timers(&some);
         if timers.is_empty() {
@@ -63,8 +65,11 @@ impl Graph<'_, '_> {
         let last: Vec<usize> = (0..ends.len()).filter(|at| ends[*at]).collect();
         let on = quickest(self.states.len(), on.map(|(from, to, takes)| (to, from, takes)), last);
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
+        // Where it rests, or is answered after a time only.
+        let answered: FxHashSet<u32> = timers.keys().map(|number| self.edges[*number].from).collect();
+        let waits = |at: u32| stops(at) && !ends[at as usize] && (rests(at) || answered.contains(&at));
         let lasts = |at: u32| there[at as usize].zip(on[at as usize]).map(|(there, on)| there + on);
-        let slow = |at: u32| rests(at) && lasts(at).is_some_and(|lasts| lasts >= within);
+        let slow = |at: u32| waits(at) && lasts(at).is_some_and(|lasts| lasts >= within);
         let comes_late = |number: usize| {
             let edge = &self.edges[number];
             let event = matches!(edge.by, Move::Event(_)) && matches!(bars[number], None | Some(Barred::Reported));
@@ -80,6 +85,7 @@ impl Graph<'_, '_> {
         let left = self.left_to_enter_anew(&some);
         let stops = |at: u32| self.states[at as usize].stopping;
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
+        let waits = |at: u32| stops(at) && !ends[at as usize] && (rests(at) || answered.contains(&at));
         let Some(places) = self.places(&first, &some, &timers, &left, rests, &late) else {
             self.cut(Bound::Times, Failed::Nothing);
             return Slow::default();
@@ -99,7 +105,7 @@ impl Graph<'_, '_> {
             }
         }
         let mut always: BTreeMap<u32, Duration> = BTreeMap::new();
-        for (number, (at, _)) in places.list.iter().enumerate().filter(|(_, (at, _))| rests(*at)) {
+        for (number, (at, _)) in places.list.iter().enumerate().filter(|(_, (at, _))| waits(*at)) {
             if let Some(all) = there[number].zip(on[number]).map(|(there, on)| there + on) {
                 always.entry(*at).and_modify(|least| *least = all.min(*least)).or_insert(all);
             }
@@ -108,7 +114,7 @@ impl Graph<'_, '_> {
         let by_itself = self.by_itself(&places, last, leads);
         let late = |counts: &dyn Fn(Option<Barred>) -> bool| {
             let mut late = self.late(&places, &by_itself, &there, &on, |edge| counts(bars[edge]));
-            late.retain(|at, _| rests(*at));
+            late.retain(|at, _| waits(*at));
             late
         };
         let raised = late(&|bar| bar.is_none());

@@ -7,6 +7,7 @@ use crate::model::MemberRef;
 pub(super) enum Others {
     One(MemberRef),
     /// None: no other at all.
+    #[allow(clippy::box_collection)] // A list as long as a pointer: it is rarely needed.
     List(Option<Box<Vec<MemberRef>>>),
 }
 
