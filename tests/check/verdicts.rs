@@ -337,6 +337,16 @@ fn a_request_lasts_as_long_as_it_has_to_stand() {
         assert_eq!(said_and_run(&Small::new(&conf("8"), states, ""), code, ""), (vec![message], exit));
         assert_eq!(said_and_run(&Small::new(&conf("1"), states, ""), code, ""), (Vec::new(), 0));
     }
+    // Beside the main way down.
+    let beside = format!(
+        "{}side = state {{}}, trans {{ src = 'up', tgt = 'side', events = {{ 'e_side' }} }},
+         trans {{ src = 'side', tgt = 'parking', events = {{ 'e_shutdown' }} }},",
+        parking.replace("NEXT", "unpark")
+    );
+    let (beside, code, story) = (by_base("up", "leaving", &beside), "coord::no_way_down", "raise('e_side') wait(0.1)");
+    let long = "the way down by `root.parking` lasts 8 s at least, and `shutdown.within_s` gives it 5 s".to_owned();
+    assert_eq!(said_and_run(&Small::new(&conf("8"), &beside, ""), code, story), (vec![long], 4));
+    assert_eq!(said_and_run(&Small::new(&conf("1"), &beside, ""), code, story), (Vec::new(), 0));
     // What is over before leads elsewhere, or is waited for inside.
     let aside = format!(
         "{up}stays = state {{}}, trans {{ src = 'parking', tgt = 'stays', events = {{ 'e_after(1.0)' }} }},
