@@ -24,6 +24,8 @@ pub enum Bound {
     Left,
     /// What fails where frames are squashed.
     Squashed,
+    /// Which frames are squashed, where those that share nothing were pushed in one order and in another.
+    Orders,
     /// [`limits::CHECK_INBOX`].
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
@@ -76,6 +78,9 @@ impl Bound {
                 format!("more than {} frames of one configuration were not followed", limits::CHECK_LEFT)
             }
             Self::Squashed => "what fails where frames have been squashed was not followed".to_owned(),
+            Self::Orders => "which frames are squashed was followed for one order of frames that share nothing and were pushed in \
+                             several"
+                .to_owned(),
             Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
             Self::Forks => format!(
                 "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \

@@ -88,6 +88,11 @@ impl Worlds<'_> {
         self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
     }
 
+    /// Whether frames have been squashed somewhere, and which of them goes back to an order that was not followed everywhere.
+    pub fn squashes_mixed(&self) -> bool {
+        self.mixes_orders() && (0..self.count()).any(|id| self.is_piled_up(id))
+    }
+
     /// Whether a frame of this configuration is in force, in whatever shape.
     pub fn is_in_force(&self, id: WorldId, configuration: ConfigId) -> bool {
         self.get(id).is_some_and(|world| world.stack.is_in_force(configuration))

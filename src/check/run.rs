@@ -154,6 +154,9 @@ fn follow(
             if graph.goes_on_when_down() {
                 graph.cut(Bound::Apart, Failed::Nothing);
             }
+            if graph.product.worlds.squashes_mixed() {
+                graph.cut(Bound::Orders, Failed::Nothing);
+            }
             found.extend(graph.judge());
             graph.probe(&found);
             let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];

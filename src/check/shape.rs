@@ -40,20 +40,51 @@ pub struct Shapes {
     /// Which frames count.
     pub undone: Undone,
     frames: FrameBook,
+    orders: Orders,
+}
+
+/// In which orders frames of one requester were met, by their configurations: the lower one first.
+#[derive(Default)]
+struct Orders {
+    /// Of frames that count.
+    met: FxHashSet<(ConfigId, ConfigId)>,
+    /// As which they were taken instead, since it makes no difference to who undoes them.
+    taken_as: FxHashSet<(ConfigId, ConfigId)>,
+    /// Of one that counts and one that does not: which lies lower is not looked at.
+    beside: FxHashSet<(ConfigId, ConfigId)>,
+}
+
+impl Orders {
+    fn note(&mut self, frames: &[Arc<Frame>], counts: &[bool]) {
+        let own = |at: &usize| counts[*at];
+        for (at, one) in (0..frames.len()).filter(own).map(|at| (at, &frames[at])) {
+            for (other, frame) in frames.iter().enumerate().filter(|(_, frame)| frame.requester == one.requester) {
+                let pair = if other < at { (frame, one) } else { (one, frame) };
+                let pair = (pair.0.configuration, pair.1.configuration);
+                match counts[other] {
+                    true if at < other => _ = self.met.insert(pair),
+                    false => _ = self.beside.insert(pair),
+                    true => {}
+                }
+            }
+        }
+    }
 }
 
 impl Shapes {
     /// Shapes in which these frames count.
     pub fn new(undone: Undone) -> Self {
-        Self { undone, frames: FrameBook::default() }
+        Self { undone, frames: FrameBook::default(), orders: Orders::default() }
     }
 
     /// The frames that count, in a canonical order.
     pub fn of(&mut self, stack: &Stack) -> (Vec<Counted>, Vec<FrameId>) {
         let frames = stack.frames();
+        let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
+        self.orders.note(frames, &counts);
         let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
         for (i, frame) in frames.iter().enumerate() {
-            if !self.undone.counts(frame) {
+            if !counts[i] {
                 continue;
             }
             let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
@@ -85,10 +116,20 @@ impl Shapes {
                 }
             }
             let (frame, one) = kept.remove(least);
+            let passed = kept[..least].iter().filter(|(below, _)| below.requester == frame.requester);
+            self.orders.taken_as.extend(passed.map(|(below, _)| (frame.configuration, below.configuration)));
             counted.push(one);
             ids.push(frame.id);
         }
         (counted, ids)
+    }
+
+    /// Whether stacks were taken for one in which frames of one requester lie in different orders. Which of them are squashed, and
+    /// then are not undone by themselves any more, is known for one of these orders.
+    pub fn mixes_orders(&self) -> bool {
+        let Orders { met, taken_as, beside } = &self.orders;
+        let both = |(a, b): &(ConfigId, ConfigId)| a != b && beside.contains(&(*b, *a));
+        taken_as.intersection(met).next().is_some() || beside.iter().any(both)
     }
 
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by

@@ -291,6 +291,16 @@ impl<'a> Worlds<'a> {
         group.told.iter().any(|told| told.reason.is_some())
     }
 
+    /// How many there are: numbered from 0 on.
+    pub(super) fn count(&self) -> WorldId {
+        self.next()
+    }
+
+    /// [`Shapes::mixes_orders`].
+    pub(super) fn mixes_orders(&self) -> bool {
+        self.shapes.mixes_orders()
+    }
+
     fn next(&self) -> WorldId {
         WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX)
     }

@@ -366,3 +366,46 @@ fn a_request_lasts_as_long_as_it_has_to_stand() {
         "the bring-up lasts 8 s at least (8 s until `e_ready` is reported), and `deploy.within_s` gives it 5 s";
     assert_eq!(said_and_run(&small, "deploy::never_up", ""), (vec![message.to_owned()], 1));
 }
+
+/// Which frames are squashed is followed for one order of frames that nobody tells apart: where they come in several, it is said.
+#[test]
+fn which_frames_are_squashed_is_told_where_they_come_in_several_orders() {
+    let numbers: Vec<usize> = (0..9).collect();
+    let each = |one: &dyn Fn(&usize) -> String| numbers.iter().map(one).collect::<String>();
+    let conf = format!(
+        "base = Configuration {{ {} }}, {}",
+        each(&|n| format!("create('a{n}', 'Drive'),")),
+        each(&|n| format!("p{n} = Configuration {{ property_set('a{n}.gain', 2.0) }},"))
+    );
+    // One asks for `first` and `second`, then for all others, and at last to undo the first of them.
+    let chain = |name: &str, order: [usize; 3]| {
+        let all: Vec<usize> = order.into_iter().chain(3..9).collect();
+        let states = all.iter().map(|n| {
+            format!(
+                "{name}{n} = state {{ entry = 'p{n}' }},
+                 trans {{ src = '{name}{n}', tgt = 'failed', events = {{ 'p{n}.failed', 'p{n}.broken' }} }},
+                 trans {{ src = '{name}{n}', tgt = 'leaving', events = {{ 'e_shutdown' }} }},"
+            )
+        });
+        let next = all.windows(2).map(|pair| {
+            format!("trans {{ src = '{name}{}', tgt = '{name}{}', events = {{ 'p{}.ok' }} }},", pair[0], pair[1], pair[0])
+        });
+        let begin = format!("trans {{ src = 'up', tgt = '{name}{}', events = {{ 'e_{name}' }} }},", order[0]);
+        let back = format!(
+            "{name}_back = state {{ entry = 'p0.undo' }}, trans {{ src = '{name}8', tgt = '{name}_back', events = {{ 'p8.ok' }} }},
+             trans {{ src = '{name}_back', tgt = 'leaving', events = {{ 'p0.undone', 'p0.undo.failed', 'p0.undo.broken', 'e_shutdown' }} }},"
+        );
+        states.chain(next).chain([begin, back]).collect::<String>()
+    };
+    let left = |states: &str| {
+        let said = Small::new(&conf, &by_base("up", "leaving", states), "limits: { stack: 8 }\n").check();
+        said.0["left"].to_string()
+    };
+    let told = "which frames are squashed was followed for one order";
+    let both = left(&format!("{}{}", chain("x", [0, 1, 2]), chain("y", [1, 0, 2])));
+    assert!(both.contains(told), "{both}");
+    for one in [chain("x", [0, 1, 2]), chain("y", [1, 0, 2])] {
+        let one = left(&one);
+        assert!(!one.contains(told), "{one}");
+    }
+}
