@@ -22,7 +22,7 @@ impl Backwards {
     pub fn of(steps: &[PlannedStep]) -> Self {
         // Waves never decrease along a list.
         let last_wave = steps.last().map_or(0, |step| step.wave);
-        Self { waits: vec![Waits::new(); steps.len()], last_wave }
+        Self { waits: steps.iter().map(|_| Waits::new()).collect(), last_wave }
     }
 
     /// The wave of the undo of a step: the last one's come first.
@@ -36,17 +36,26 @@ impl Backwards {
     }
 
     /// What the undo of the step at place `i` waits for. All steps that wait for it have been [left](Self::leave) before.
+    #[inline]
     pub fn waits(&mut self, i: usize) -> Waits {
         let mut waits = std::mem::take(&mut self.waits[i]);
-        waits.sort_unstable();
-        waits.dedup();
+        if waits.len() > 1 {
+            waits.sort_unstable();
+            waits.dedup();
+        }
         waits
     }
 
     /// A step is taken back once these are done (what it waited for itself, where nothing needs to be done for it).
+    #[inline]
     pub fn leave(&mut self, done: &PlannedStep, last: &[StepId]) {
         for earlier in &done.after {
-            self.waits[*earlier as usize].extend_from_slice(last);
+            let waits = &mut self.waits[*earlier as usize];
+            // As a rule: a plan of tens of thousands of steps is undone step by step.
+            match last {
+                [one] => waits.push(*one),
+                last => waits.extend_from_slice(last),
+            }
         }
     }
 }

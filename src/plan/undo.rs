@@ -46,6 +46,7 @@ impl Item {
     }
 
     /// A step of the inverse of `done`.
+    #[inline]
     pub fn undoing(step: &Step, done: &PlannedStep) -> Self {
         let (call, was) = match &done.step {
             Step::Operation(call) => (Some(call.clone()), None),
