@@ -85,6 +85,9 @@ pub const TAP_PATIENCE: Duration = Duration::from_secs(30);
 /// (Ctrl-S) does not keep the process alive.
 pub const TAP_END: Duration = Duration::from_secs(3);
 
+/// How long it waits for what it says after that: the one stream may be read where the other one is not.
+pub const TAP_END_AGAIN: Duration = Duration::from_millis(300);
+
 /// Entries of the log kept in memory: an hour of busy switching, a few megabytes.
 pub const LOG_ENTRIES: usize = 4096;
 

@@ -4,6 +4,7 @@
 //! takes nothing else, so nothing runs that was not looked at.
 
 mod alike;
+mod alone;
 mod arrive;
 mod bars;
 mod beside;

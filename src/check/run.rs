@@ -9,7 +9,7 @@ use super::report::{Checked, Explored, Report};
 use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
-    beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety, settings,
+    alone, beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety, settings,
     simulated, types, unheard, universe, unwatched, ways,
 };
 use crate::limits;
@@ -37,6 +37,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
     findings.extend(simulated::check(deployment, &universe));
     findings.extend(declared::check(deployment, &universe));
     findings.extend(lets_go::check(deployment, &universe));
+    findings.extend(alone::check(deployment));
     let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;

@@ -69,6 +69,7 @@ pub const READ: &[(&str, &[Code])] = &[
             TYPE_SETTLED_ELSEWHERE,
             CONF_HOLDS_UNSEEN,
             CONF_SAFE_LETS_GO,
+            CONF_ALONE_IN_GROUP,
             DEPLOY_SAFETY_ANSWER,
             DEPLOY_UNKNOWN_CONFIGURATION,
             DEPLOY_UNKNOWN_STATE,

@@ -47,6 +47,7 @@ impl Died {
                 "coordinator": story.active(),
                 "outstanding": story.outstanding.values().collect::<Vec<_>>(),
                 "faults": story.faults,
+                "incomplete": story.incomplete,
                 "at": story.at,
             },
             "log": kept::log_file(&life.name),
@@ -67,7 +68,8 @@ impl Died {
         }
         if !story.outstanding.is_empty() {
             let asked: Vec<&str> = story.outstanding.values().map(String::as_str).collect();
-            out.line(format!("waiting for  {}", asked.join(", ")));
+            let perhaps = if story.incomplete { " (or answered: part of its log is missing)" } else { "" };
+            out.line(format!("waiting for  {}{perhaps}", asked.join(", ")));
         }
         for (component, reason) in &story.faults {
             out.line(format!("{} {component}: {reason}", out.paint(Style::Bad, "fault")));

@@ -12,10 +12,14 @@ use crate::time::clock::panic_text;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::panic::PanicHookInfo;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 type Job = Box<dyn FnOnce() + Send>;
 
 static WORDS: OnceLock<Tap<Job>> = OnceLock::new();
+
+/// Lines of the story were not read.
+static STALLED: AtomicBool = AtomicBool::new(false);
 
 /// From now on [`say`] does not wait, and a panic is told that way.
 ///
@@ -60,6 +64,7 @@ pub fn say(job: impl FnOnce() + Send + 'static) {
 /// So many lines of the story were not written, since nobody read them.
 pub fn unread(lines: u64) {
     if lines > 0 {
+        STALLED.store(true, Ordering::Relaxed);
         let lines = count(lines, "line");
         say(move || output::error(&format!("note: {lines} could not be written: nobody reads\n")));
     }
@@ -68,6 +73,7 @@ pub fn unread(lines: u64) {
 /// Waits until all is written, as long as somebody reads.
 pub fn end() {
     if let Some(tap) = WORDS.get() {
-        tap.flush(limits::TAP_END);
+        // Who took nothing of the story for that long is not waited for as long once more.
+        tap.flush(if STALLED.load(Ordering::Relaxed) { limits::TAP_END_AGAIN } else { limits::TAP_END });
     }
 }

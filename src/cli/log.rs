@@ -116,7 +116,7 @@ impl Args {
             if overlap.is_news(&entry) {
                 print(&entry);
             }
-            if output::reader_is_gone() {
+            if output::arrives_nowhere() {
                 return Ok(Exit::Done);
             }
         }

@@ -11,7 +11,8 @@ use serde_json::{Value as Json, json};
 /// Show what a property or a port of a running deployment is worth: value, unit, and when that was.
 ///
 /// A property and a written in-port are read from the platform; of an out-port, and of an in-port that is connected, the next
-/// sample is shown. Exit status: 0 there is a value; 1 there is none.
+/// sample is shown; a number that is not finite is a text in JSON: `"inf"`, `"-inf"`, `"nan"`. Exit status: 0 there is a value;
+/// 1 there is none.
 #[derive(Debug, clap::Args)]
 pub struct GetArgs {
     /// The property or port: `Component.member`.

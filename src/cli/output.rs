@@ -157,9 +157,10 @@ static ON_TERMINAL: AtomicBool = AtomicBool::new(false);
 
 static READER_GONE: AtomicBool = AtomicBool::new(false);
 
-/// Whether nobody reads any more: a command that goes on printing has nothing left to do.
-pub fn reader_is_gone() -> bool {
-    READER_GONE.load(Ordering::Relaxed)
+/// Whether what is printed arrives nowhere any more: nobody reads, or a disk is full. A command that would go on printing has
+/// nothing left to do then.
+pub fn arrives_nowhere() -> bool {
+    READER_GONE.load(Ordering::Relaxed) || unwritten().is_some()
 }
 
 #[derive(Clone, Copy)]

@@ -65,6 +65,29 @@ impl Watch {
     }
 }
 
+/// From now on who is asked to end gives the terminal back as it is now, and ends: a line editor has it take single keys, which
+/// would be left so.
+///
+/// # Errors
+/// When the operating system does not let signals be watched, or has no thread left.
+pub fn give_terminal_back() -> std::io::Result<()> {
+    let mut before = std::mem::MaybeUninit::<libc::termios>::uninit();
+    // SAFETY: `before` is as large as what is written to it, and it is read only when the call says that it was.
+    let before = match unsafe { libc::tcgetattr(libc::STDIN_FILENO, before.as_mut_ptr()) } {
+        0 => unsafe { before.assume_init() },
+        _ => return Ok(()),
+    };
+    let mut signals = Signals::new([SIGTERM, SIGHUP, SIGQUIT])?;
+    std::thread::Builder::new().name("davit-signals".to_owned()).spawn(move || {
+        for signal in signals.forever() {
+            // SAFETY: it is what the terminal itself has said. That a terminal is gone hurts nobody.
+            unsafe { libc::tcsetattr(libc::STDIN_FILENO, libc::TCSANOW, &raw const before) };
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    })?;
+    Ok(())
+}
+
 /// A terminal that takes no output from the background (`stty tostop`), and a file that may get no larger, would stop or end the
 /// process, coordinator and all. Ignored, the one lets the write through, and the other is a disk that is full.
 fn ignore_what_would_stop_it() {

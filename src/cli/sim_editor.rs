@@ -33,6 +33,7 @@ pub fn edit<'c, F: Hook>(context: &Context, make: impl Fn() -> Result<Sim<'c, F>
         let help = "`--events FILE` reads the events from a file, `--events -` from standard input";
         Failure::usage(CLI_EVENTS_UNREADABLE, format!("the terminal cannot be read: {error}"), help)
     };
+    super::signals::give_terminal_back().map_err(|why| unreadable(&why))?;
     let session = Session::new(make).map_err(|why| unreadable(&why))?;
     let session = Rc::new(RefCell::new(session));
     let config = Config::builder().max_history_size(crate::limits::SIM_LINES).map_err(|e| unreadable(&e))?.build();

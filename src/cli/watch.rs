@@ -94,7 +94,7 @@ impl Args {
                 }
             }
             looks += 1;
-            if self.count.is_some_and(|count| looks >= count) || output::reader_is_gone() {
+            if self.count.is_some_and(|count| looks >= count) || output::arrives_nowhere() {
                 return Ok(if answers { Exit::Done } else { Exit::No });
             }
             if answers {

@@ -261,6 +261,10 @@ codes! {
          that has called, and what an operation takes back, is taken back before the second one acts. For that moment nothing is \
          safe: where the first one brakes and the second one holds, the brakes open first. What both call is not taken back in \
          between. Let the second one call it too, or leave the group out: frames of safe configurations may be in force together.";
+    CONF_ALONE_IN_GROUP = "conf::alone_in_group", "a configuration is alone in its group, and another one is called nearly so",
+        "Configurations of one `group` are alternatives: applying one replaces the frame of the one that is in force. This group has \
+         only one configuration, which replaces nothing, and another group has nearly the same name: one of both is misspelt, as it \
+         seems. Correct it, or leave the group out.";
     UNKNOWN_COMPONENT = "conf::unknown_component", "there is no such component",
         "The configuration names a component that does not exist where it is applied: it was never created, was destroyed, or its name is misspelt. Nothing can be done to it. Create it earlier (or in the same configuration), or correct the name.";
     UNKNOWN_TYPE = "conf::unknown_type", "there is no such component type",

@@ -39,7 +39,8 @@ pub struct MemberView {
     pub ty: String,
     /// The unit, if its type states one.
     pub unit: Option<Arc<str>>,
-    /// The value; none: there is none, or it cannot be shown, as `why` says.
+    /// The value; none: there is none, or it cannot be shown, as `why` says. Of what a component sends a number that is not finite
+    /// is a text: `inf`, `-inf`, `nan`.
     pub value: Option<Json>,
     /// When that was: of what a component sends when it was sent, else when it was read; in seconds of the deployment's clock.
     pub at: Option<f64>,
@@ -224,6 +225,8 @@ fn assembled<'a>(ty: &ValueType, numbers: &mut impl Iterator<Item = &'a Sample>)
                 ValueType::Bool => (number != 0.0).into(),
                 #[allow(clippy::cast_possible_truncation)]
                 ValueType::Int => (number as i64).into(),
+                // JSON has no number for it, and null would be no value.
+                _ if !number.is_finite() => number.to_string().to_lowercase().into(),
                 _ => number.into(),
             }
         }
@@ -248,4 +251,19 @@ fn value_of(json: &Json) -> Result<Value, String> {
             Value::Record(fields.iter().map(field).collect::<Result<_, String>>()?)
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Time;
+
+    #[test]
+    fn what_is_not_finite_is_told_as_text() {
+        let sample = |value| Sample { value, at: Time(0), writes: 1, present: true };
+        let samples = [1.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN].map(sample);
+        let ty = ValueType::Array(Box::new(ValueType::Float), Some(4));
+        let seen = assembled(&ty, &mut samples.iter());
+        assert_eq!(seen, serde_json::json!([1.5, "inf", "-inf", "nan"]));
+    }
 }

@@ -181,3 +181,25 @@ fn what_moves_and_is_brought_to_rest_by_nothing_is_noted() {
     let named = small.check();
     assert!(named.of("deploy::no_rest").is_empty(), "{:#}", named.0);
 }
+
+#[test]
+fn a_group_that_is_misspelt_is_told() {
+    let told = |first: &str, second: &str, third: &str| {
+        let configurations = format!(
+            "{CONFIGURATIONS} one = Configuration {{ group = '{first}', property_set('a.gain', 1.0) }},
+             two = Configuration {{ group = '{second}', property_set('a.gain', 2.0) }},
+             three = Configuration {{ group = '{third}', property_set('a.gain', 3.0) }},"
+        );
+        let said = Small::new(&configurations, STATES, "").check();
+        texts(&said, "conf::alone_in_group").into_iter().map(|(message, help)| format!("{message}; {help}")).collect()
+    };
+    let found: Vec<String> = told("stiffness", "stiffness", "stifness");
+    assert_eq!(
+        found,
+        ["only `three` is of the group `stifness`, so it replaces nothing; did you mean `stiffness`? Else leave it out"]
+    );
+    for (first, second, third) in [("mode", "mode", "mode"), ("mode", "mode", "speed")] {
+        let found: Vec<String> = told(first, second, third);
+        assert!(found.is_empty(), "{found:?}");
+    }
+}

@@ -134,3 +134,31 @@ pub fn read_until(stream: &mut File, end: &str) -> String {
     }
     String::from_utf8_lossy(&text).into_owned()
 }
+
+/// A line editor has the terminal take single keys. Who is asked to end gives it back as it was.
+#[test]
+fn a_simulation_that_is_asked_to_end_gives_the_terminal_back() {
+    let demo = Demo::new();
+    let settings = |terminal: &OwnedFd| {
+        let mut settings = std::mem::MaybeUninit::<libc::termios>::uninit();
+        // SAFETY: as large as what is written, and read where it was.
+        unsafe {
+            assert_eq!(libc::tcgetattr(terminal.as_raw_fd(), settings.as_mut_ptr()), 0);
+            settings.assume_init().c_lflag
+        }
+    };
+    for signal in [libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT] {
+        let (mut person, program) = terminal();
+        let before = settings(&program);
+        let ends = || Stdio::from(program.try_clone().unwrap());
+        let mut sim = demo.command(&["sim", "coordinator.lua"]);
+        let mut sim = sim.env("TERM", "xterm").stdin(ends()).stdout(ends()).stderr(ends()).spawn().unwrap();
+        read_until(&mut person, "> ");
+        until("it takes single keys", || (settings(&program) != before).then_some(()));
+        // SAFETY: our own child, which was not waited for.
+        assert_eq!(unsafe { libc::kill(sim.id().cast_signed(), signal) }, 0);
+        let ended = sim.wait().unwrap();
+        assert_eq!(std::os::unix::process::ExitStatusExt::signal(&ended), Some(signal));
+        assert_eq!(settings(&program), before);
+    }
+}

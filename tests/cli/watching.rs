@@ -179,3 +179,24 @@ impl Drop for Stopped {
         unsafe { libc::kill(self.0, libc::SIGCONT) };
     }
 }
+
+/// What goes on printing ends where nothing can be printed, and says why.
+#[test]
+fn a_full_disk_ends_what_goes_on() {
+    let deployed = live();
+    for args in [&["watch", "--every", "0.01"][..], &["watch", "--json", "--every", "0.01"], &["log", "--follow"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let ran = deployed.0.command(args).stdout(Stdio::from(full)).stderr(Stdio::piped()).spawn().unwrap();
+        // Something to follow, as long as it does.
+        let ended = std::thread::scope(|scope| {
+            let waits = scope.spawn(|| ran.wait_with_output().unwrap());
+            crate::foreground::until("it ends", || {
+                deployed.0.run(&["apply", "slow", "--force", "--no-wait"]);
+                waits.is_finished().then_some(())
+            });
+            waits.join().unwrap()
+        });
+        assert_eq!(ended.status.code(), Some(2), "{args:?}");
+        assert!(String::from_utf8_lossy(&ended.stderr).contains("No space left"), "{args:?} {ended:?}");
+    }
+}

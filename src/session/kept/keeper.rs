@@ -195,7 +195,10 @@ struct Writer {
 impl Writer {
     fn keep(&mut self, news: News<Kept>) {
         match news {
-            News::Missed(entries) => self.missing += entries,
+            News::Missed(entries) => {
+                self.missing += entries;
+                self.story.incomplete = true;
+            }
             News::One(Kept::Own(mut own)) => {
                 own["at"] = json!(self.story.at);
                 self.write(&own);
@@ -223,7 +226,8 @@ impl Writer {
         // A full disk: what could not be written is counted, and told where it goes on once there is room.
         if self.missing > 0 {
             let missed = json!({ "at": self.story.at, "what": "missed", "entries": self.missing });
-            if self.put(&missed).is_ok() {
+            // What could not be written is known here all the same.
+            if self.put(&missed).is_ok() && self.put(&self.story.head()).is_ok() {
                 self.missing = 0;
             }
         }

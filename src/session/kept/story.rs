@@ -40,6 +40,8 @@ pub struct Story {
     pub outstanding: BTreeMap<u64, String>,
     /// Components that failed and of which nothing better was heard.
     pub faults: BTreeMap<String, String>,
+    /// Part of what happened is missing: what is still not answered, or failed, need not be so.
+    pub incomplete: bool,
 }
 
 impl Story {
@@ -67,7 +69,9 @@ impl Story {
                 self.states = serde_json::from_value(entry["states"].clone()).unwrap_or_default();
                 self.outstanding = serde_json::from_value(entry["outstanding"].clone()).unwrap_or_default();
                 self.faults = serde_json::from_value(entry["faults"].clone()).unwrap_or_default();
+                self.incomplete = entry["incomplete"] == true;
             }
+            "missed" => self.incomplete = true,
             "requested" => {
                 if let Some(number) = entry["request"].as_u64() {
                     self.outstanding.insert(number, format!("{} by {}", text("ask"), text("by")));
@@ -90,7 +94,7 @@ impl Story {
     pub fn head(&self) -> Json {
         serde_json::json!({
             "at": self.at, "what": "goes_on", "phase": self.phase, "states": self.states, "outstanding": self.outstanding,
-            "faults": self.faults
+            "faults": self.faults, "incomplete": self.incomplete
         })
     }
 
@@ -123,5 +127,9 @@ mod tests {
         assert_eq!(story.faults, BTreeMap::from([("a".to_owned(), "torn".to_owned())]));
         assert_eq!(Story::of(&[story.head()]), story);
         assert_eq!(Story::of(&[story.head(), entries[0].clone()]), Story::default(), "another life");
+        let missed = json!({"at": 0.6, "what": "missed", "entries": 3});
+        let with_hole = Story::of(&[&entries[..], std::slice::from_ref(&missed)].concat());
+        assert!(with_hole.incomplete && Story::of(&[with_hole.head()]).incomplete);
+        assert!(!Story::of(&[missed, story.head()]).incomplete, "what was missed is known from there on");
     }
 }
