@@ -175,8 +175,6 @@ pub(super) enum AtOnce {
     },
     /// Stopping begins: operators' requests are refused from now on.
     Stopping,
-    /// The event that ends the deployment came, or the one that begins it.
-    Leaving(bool),
     /// Somebody wants force: looked for by what takes its time.
     Hurry,
     /// A coordinator has come to its *down* state.

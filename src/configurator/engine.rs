@@ -191,7 +191,10 @@ impl Engine {
             let (observed, idle) = self.observing.until();
             let until = confirm.min(looks).min(observed).min(self.running_until()).min(self.standing_until());
             match self.inbox.recv_or_idle(until, idle) {
-                Ok(Mail::Request(request)) if self.is_idle() && self.began.is_none() => self.comes_alone(request),
+                Ok(Mail::Request(request)) if self.is_idle() && self.began.is_none() => {
+                    self.heed_leaving();
+                    self.comes_alone(request);
+                }
                 received => self.received(received),
             }
         }
@@ -199,6 +202,7 @@ impl Engine {
 
     /// The next batch that may begin, by its number.
     pub fn turn(&mut self) -> Option<u32> {
+        self.heed_leaving();
         let Self { desk, given, world, leaving, .. } = self;
         let alone = |batch: &Batch| leaving.is_some() && world.stack.goes_alone(batch);
         desk.turn(&given.claims, alone).map(|turn| turn.number)
@@ -237,6 +241,7 @@ impl Engine {
     }
 
     pub fn take_in(&mut self, mail: Mail) {
+        self.heed_leaving();
         match mail {
             Mail::Request(request) => self.arrive(Batch::one(request)),
             Mail::Batch(batch) => self.arrive(*batch),
@@ -271,7 +276,6 @@ impl Engine {
                 let _ = reply.try_send(());
             }
             AtOnce::Stopping => self.stopping_begins(),
-            AtOnce::Leaving(leaving) => self.leaves(leaving),
             // To have it come is all: who waits looks whether force is wanted.
             AtOnce::Hurry => {}
             // Stands in its coordinator's queue like a request.

@@ -54,8 +54,6 @@ pub(super) struct Counts {
     pub hurried: AtomicBool,
     /// The event that ends the deployment came, and it is not down since.
     pub leaving: AtomicBool,
-    /// The same, as the configurator was told last.
-    pub told: AtomicBool,
     reports: AtomicUsize,
     commands: AtomicUsize,
     control: AtomicUsize,
@@ -119,7 +117,6 @@ impl Post {
     #[allow(clippy::result_large_err)] // The batch is given back: it still has to be answered.
     /// Puts a batch in; `safe` of its requests ask for safe configurations. Gives it back when there is no room.
     pub fn batch(&self, batch: Batch, safe: usize) -> Result<(), Batch> {
-        self.tell_leaving();
         let plain = batch.requests.len() - safe;
         // However much an operator asks for, a coordinator finds room: it cannot wait for another time.
         let by_operator = batch.requests.iter().any(|request| request.requester == Requester::Operator);
@@ -184,27 +181,15 @@ impl Post {
         self.command(AtOnce::Hurry);
     }
 
-    /// Says that the deployment is led down from now on, or that it is brought up. What waits is judged by it too, so it is told
-    /// at once; when there is no room, with the next request.
+    /// Says that the deployment is led down from now on, or that it is brought up. Whoever takes something up looks: it wakes
+    /// nobody, for it changes nothing of what is under way.
     pub fn leaving(&self, leaving: bool) {
         self.counts.leaving.store(leaving, Ordering::Release);
-        self.tell_leaving();
     }
 
     /// Whether it is led down.
     pub fn is_leaving(&self) -> bool {
         self.counts.leaving.load(Ordering::Acquire)
-    }
-
-    fn tell_leaving(&self) {
-        let Counts { leaving, told, .. } = &*self.counts;
-        let now = leaving.load(Ordering::Acquire);
-        if told.load(Ordering::Acquire) == now || told.swap(now, Ordering::AcqRel) == now {
-            return;
-        }
-        if !self.command(AtOnce::Leaving(now)) {
-            told.store(!now, Ordering::Release);
-        }
     }
 
     /// Puts a worker's reply in: there is room for every call that is out. When the configurator has ended, nobody

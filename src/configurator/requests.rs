@@ -98,7 +98,6 @@ impl Engine {
                 // Who asks on is led anew since, and may be led down anew.
                 if self.all_down() && !self.desk.asks_on() {
                     self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
-                    self.counts.told.store(false, std::sync::atomic::Ordering::Release);
                     self.leaves(false);
                 }
                 if self.all_down() && self.world.settle_down() {

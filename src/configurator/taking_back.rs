@@ -16,6 +16,7 @@ use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Transaction};
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 impl Engine {
     /// From now on operators are refused, also those that wait.
@@ -102,6 +103,14 @@ impl Engine {
         let under_way = self.current.iter().map(|(request, _)| request).chain(&self.safety.waiting);
         let asked = under_way.map(|request| request.id).collect();
         Moment { next: self.world.stack.next(), at: self.given.clock.now(), asked, before: Vec::new() }
+    }
+
+    /// Takes notice of whether the deployment is led down.
+    pub(super) fn heed_leaving(&mut self) {
+        let leaving = self.counts.leaving.load(Ordering::Acquire);
+        if leaving != self.leaving.is_some() {
+            self.leaves(leaving);
+        }
     }
 
     /// The deployment is led down from now on, or it is no more.
