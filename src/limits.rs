@@ -20,6 +20,12 @@ pub const PREPARED: usize = 4;
 /// Signals that follow each other so closely have one cause.
 pub const SIGNAL_REPEATS: Duration = Duration::from_millis(100);
 
+/// Without a pause as long as that no signal asks for the end at once: a key that is held down repeats sooner than that.
+pub const SIGNAL_HELD: Duration = Duration::from_millis(500);
+
+/// So long before its processor time is over a process is led down, or when half of it is.
+pub const TIME_TO_LEAD_DOWN: Duration = Duration::from_secs(10);
+
 /// How long one step may take where the deployment does not say: longer than any software-only change, short enough that
 /// an operator does not think the program hangs.
 pub const STEP_TIMEOUT: Duration = Duration::from_secs(1);

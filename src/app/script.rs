@@ -26,6 +26,7 @@ use failure::IsRefused;
 pub use failure::ScriptFailure;
 pub use interrupt::Interrupt;
 use mlua::{Lua, Table, Value as LuaValue};
+use std::any::Any;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
@@ -49,7 +50,12 @@ pub struct Options {
     pub say: Box<dyn Fn(&str)>,
     /// By what somebody outside stops it.
     pub interrupt: Interrupt,
+    /// Makes a deployment on the real clock known under its name, until it is down; or says why that cannot be.
+    pub door: Option<Door>,
 }
+
+/// See [`Options::door`].
+pub type Door = Box<dyn Fn(&Arc<Session>) -> Result<Box<dyn Any>, String>>;
 
 /// How a script ended.
 #[derive(Debug)]
@@ -64,6 +70,8 @@ struct Host {
     options: Options,
     folder: PathBuf,
     session: Option<Arc<Session>>,
+    /// By what it is reached from outside.
+    door: Option<Box<dyn Any>>,
     /// What goes wrong, and where it does.
     faults: faults::Faults,
     /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
@@ -91,6 +99,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         options,
         folder,
         session: None,
+        door: None,
         faults: faults::Faults::default(),
         mark: 0,
         taken: Vec::new(),
@@ -112,6 +121,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
     let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
     if let Some(session) = host.session.take() {
         host.ended = Some(session.take_down(false));
+        host.door = None;
     }
     ScriptEnd { failure, ended: host.ended }
 }
@@ -245,6 +255,7 @@ fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
         let ended = session.take_down(force);
         let mut host = h.borrow_mut();
         host.session = None;
+        host.door = None;
         host.faults.down();
         let clean = ended.is_clean();
         let left = ended.left.join(", ");
@@ -319,6 +330,10 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     let played = if replay { Played::Replayed } else { Played::Steered };
     let started = super::start::start_open(&checked, &clock, played);
     let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
+    if !clock.is_simulated() {
+        let door = host.borrow().options.door.as_ref().map(|open| open(&session)).transpose().map_err(error)?;
+        host.borrow_mut().door = door;
+    }
     host.borrow_mut().faults.up(checked, simulated);
     if let Some(observer) = &host.borrow().options.observer {
         session.hub().attach(observer.clone());
@@ -345,6 +360,7 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
             }
             let mut host = host.borrow_mut();
             host.ended = Some(ended);
+            host.door = None;
             host.faults.down();
             Err(error(text))
         }

@@ -9,8 +9,8 @@ use super::report::{Checked, Explored, Report};
 use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
-    alone, beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety, settings,
-    simulated, types, unheard, universe, unwatched, ways,
+    alone, beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety,
+    settings, simulated, types, unheard, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};

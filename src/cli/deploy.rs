@@ -166,7 +166,7 @@ impl Args {
     }
 }
 
-fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
+pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
     let name = session.deployment().name;
     let service = Arc::new(SessionService::new(Arc::downgrade(session)));
     ControlSocket::open(name.as_str(), service).map_err(|error| match error {

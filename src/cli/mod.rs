@@ -208,6 +208,7 @@ pub fn command() -> clap::Command {
 
 /// The whole command line, with the component libraries a program has: parses the arguments, runs the command, prints what it has to say.
 pub fn main(libraries: Libraries) -> ExitCode {
+    signals::ignore_large_files();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::input::{Input, Parameters, is_deployment};
-use super::output::{Style, Table};
+use super::output::{self, Style, Table};
 use super::{Answer, Context, Failure, Run};
 use crate::check;
 use crate::diagnostics::{SourceMap, to_json};
@@ -180,7 +180,8 @@ impl Args {
         }
         let mut raised = |raised: Raised| self.event(context, &monitors, raised);
         let mut problem = None;
-        while lines.next().map_err(|error| unreadable(&error))? {
+        // An input may have no end.
+        while !output::arrives_nowhere() && lines.next().map_err(|error| unreadable(&error))? {
             if is_blank(&lines.text) {
                 continue;
             }

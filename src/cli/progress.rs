@@ -180,7 +180,10 @@ impl Screen {
             Happening::Requested { ask, by, .. } => {
                 self.bar.reset();
                 self.bar.set_message(format!("{ask} (asked by {by})"));
-                self.bar.enable_steady_tick(std::time::Duration::from_millis(100));
+                // It takes a thread, which there may not be: not where nobody sees it.
+                if !self.bar.is_hidden() {
+                    self.bar.enable_steady_tick(std::time::Duration::from_millis(100));
+                }
             }
             Happening::Answered(answer) => {
                 self.bar.disable_steady_tick();

@@ -9,16 +9,18 @@ use super::progress::Progress;
 use super::signals::{self, Watch};
 use super::{Answer, Context, Failure, Run};
 use crate::app::PLATFORMS;
-use crate::app::script::{self, Interrupt, Options, ScriptFailure};
+use crate::app::script::{self, Door, Interrupt, Options, ScriptFailure};
 use crate::model::Ident;
 use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX};
+use crate::time::Clock;
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
 ///
 /// Whatever the script does or fails to do, the deployment it brought up is shut down before the command ends, in the stages of
-/// `davit shutdown`; so it is at Ctrl-C, which ends the script. The functions a script may call are described in
+/// `davit shutdown`; so it is at Ctrl-C, which ends the script. On the real clock it has its name while it is up, like one of `davit
+/// deploy`: `davit status` and `davit event` reach it, and `davit shutdown` ends the script, too. The functions a script may call are described in
 /// docs/scripts.md.
 ///
 /// Exit status: 0 it ran to its end; 1 it failed or was interrupted; 2 it cannot be read; 4 what it brought up was shut down
@@ -82,6 +84,7 @@ impl Args {
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
                 interrupt,
+                door: Some(door(&clock)),
             },
         );
         clock.shutdown();
@@ -99,6 +102,24 @@ impl Args {
         failure.exit = stopped(failure.exit);
         Err(failure)
     }
+}
+
+/// On the real clock a script's deployment has its name and its socket like every other: nobody else commands the same robot, and
+/// who stands beside it can stop it.
+fn door(clock: &Clock) -> Door {
+    let clock = clock.clone();
+    Box::new(move |session| {
+        let words = |failure: Failure| {
+            let told = failure
+                .findings
+                .first()
+                .map(|found| format!("{}; {}", found.message, found.help.as_deref().unwrap_or_default()));
+            told.unwrap_or_else(|| "its control socket cannot be opened".to_owned())
+        };
+        let socket = super::deploy::open(session).map_err(words)?;
+        session.hub().attach(socket.observer(&clock).map_err(super::deploy::short).map_err(words)?);
+        Ok(Box::new(socket))
+    })
 }
 
 fn tell(failure: ScriptFailure) -> Failure {

@@ -1,9 +1,10 @@
 //! Ctrl-C, and being asked to end (SIGTERM, SIGHUP, SIGQUIT, SIGXCPU).
 
 use super::exit::Exit;
+use super::{last_words, output};
 use crate::limits;
 use crate::time::{Clock, Time};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGXCPU};
 use signal_hook::iterator::{Handle, Signals};
 use std::thread::JoinHandle;
 
@@ -13,16 +14,60 @@ pub struct Watch {
     thread: Option<JoinHandle<()>>,
 }
 
+/// What is said to Ctrl-Z.
+const STAYS_AWAKE: &str = "note: Ctrl-Z does not stop a deployment: nobody would look after the robot; `--detach` runs it in the background\n";
+
+/// What a signal asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asks {
+    Nothing,
+    Stop,
+    Force,
+    Leave,
+}
+
+/// The signals so far.
+#[derive(Debug, Default)]
+struct Seen {
+    count: u8,
+    /// When one counted last, and when any came.
+    counted: Option<Time>,
+    last: Option<Time>,
+}
+
+impl Seen {
+    /// Each signal asks for more. But one cause may bring several: a shell tells its jobs that the terminal is gone, and then the
+    /// kernel does; `timeout`, or who passes Ctrl-C on, tells a process and its group; those that come together come in any
+    /// order; a key that is held down repeats. So a terminal that is gone, or a time limit, asks for no more than the first one
+    /// has; what follows the first within [`limits::SIGNAL_REPEATS`] is the same; and only after a pause of
+    /// [`limits::SIGNAL_HELD`] one asks for the end at once.
+    fn asks(&mut self, signal: i32, now: Time) -> Asks {
+        let within = |of: Option<Time>, limit| of.is_some_and(|of| now.since(of) < limit);
+        let same = match self.count {
+            0 => false,
+            _ if matches!(signal, SIGHUP | SIGXCPU) => true,
+            1 => within(self.counted, limits::SIGNAL_REPEATS),
+            _ => within(self.last, limits::SIGNAL_HELD),
+        };
+        self.last = Some(now);
+        if same {
+            return Asks::Nothing;
+        }
+        self.counted = Some(now);
+        self.count = (self.count + 1).min(3);
+        match self.count {
+            1 => Asks::Stop,
+            2 => Asks::Force,
+            _ => Asks::Leave,
+        }
+    }
+}
+
 impl Watch {
-    /// Each signal asks for more: at the first it calls `stop(false)`, at the second `stop(true)`: by force. The third is for
-    /// when even that does not come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is
-    /// asked of the components, and what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is
-    /// no signal.
-    ///
-    /// One cause may bring several: a shell tells its jobs that the terminal is gone, and then the kernel does; `timeout` tells a
-    /// process and its group; a key that is held down repeats. So a terminal that is gone, or a time limit, asks for no more than the
-    /// first one has, and within [`limits::SIGNAL_REPEATS`] after another one neither does SIGTERM, nor does anything ask for the
-    /// end at once.
+    /// At the first signal calls `stop(false)`, at the second `stop(true)`: by force. The third is for when even that does not
+    /// come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is asked of the components, and
+    /// what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is no signal. What whoever has
+    /// started the process had it ignore (`nohup`, a shell without a terminal for what runs beside it) stays ignored.
     ///
     /// # Errors
     /// When the operating system does not let signals be watched.
@@ -31,28 +76,29 @@ impl Watch {
         stop: impl Fn(bool) + Send + 'static,
         leave: impl FnOnce() + Send + 'static,
     ) -> std::io::Result<Self> {
-        ignore_what_would_stop_it();
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU])?;
+        [libc::SIGTTOU, libc::SIGTTIN].into_iter().for_each(ignore);
+        warn_before_the_time_is_over();
+        let asking = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU].into_iter().filter(|signal| !is_ignored(*signal));
+        let mut signals = Signals::new(asking.chain([SIGTSTP]))?;
         let handle = signals.handle();
         let thread = std::thread::Builder::new().name("davit-signals".to_owned()).spawn(move || {
-            let (clock, mut seen, mut last) = (Clock::real(), 0, None::<Time>);
+            let (clock, mut seen) = (Clock::real(), Seen::default());
             for signal in signals.forever() {
-                let now = clock.now();
-                let same = last.replace(now).is_some_and(|last| now.since(last) < limits::SIGNAL_REPEATS);
-                let asks_for_more = match signal {
-                    SIGHUP | SIGXCPU => false,
-                    SIGTERM => !same,
-                    _ => seen < 2 || !same,
-                };
-                if signal == SIGHUP && detached || seen > 0 && !asks_for_more {
+                if signal == SIGTSTP {
+                    last_words::say(|| output::error(STAYS_AWAKE));
                     continue;
                 }
-                seen += 1;
-                if seen <= 2 {
-                    stop(seen == 2);
-                } else {
-                    leave();
-                    std::process::exit(i32::from(Exit::Forced.code()));
+                if signal == SIGHUP && detached {
+                    continue;
+                }
+                match seen.asks(signal, clock.now()) {
+                    Asks::Nothing => {}
+                    Asks::Stop => stop(false),
+                    Asks::Force => stop(true),
+                    Asks::Leave => {
+                        leave();
+                        std::process::exit(i32::from(Exit::Forced.code()));
+                    }
                 }
             }
         })?;
@@ -88,12 +134,42 @@ pub fn give_terminal_back() -> std::io::Result<()> {
     Ok(())
 }
 
-/// A terminal that takes no output from the background (`stty tostop`), and a file that may get no larger, would stop or end the
-/// process, coordinator and all. Ignored, the one lets the write through, and the other is a disk that is full.
-fn ignore_what_would_stop_it() {
-    for signal in [libc::SIGTTOU, libc::SIGXFSZ] {
-        // SAFETY: ignoring a signal runs no code of ours, and `signal` is given a number and a disposition that exist.
-        unsafe { libc::signal(signal, libc::SIG_IGN) };
+/// A file that may get no larger (`ulimit -f`) is a disk that is full: no end of the process.
+pub fn ignore_large_files() {
+    ignore(libc::SIGXFSZ);
+}
+
+/// A terminal that takes no output from the background (`stty tostop`), or is asked for input there, would stop the process,
+/// coordinator and all.
+fn ignore(signal: i32) {
+    // SAFETY: ignoring a signal runs no code of ours, and `signal` is given a number and a disposition that exist.
+    unsafe { libc::signal(signal, libc::SIG_IGN) };
+}
+
+/// Whether whoever has started this process had it ignore a signal.
+fn is_ignored(signal: i32) -> bool {
+    let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: nothing is set; `action` is as large as what is written to it, and a zeroed one is one.
+    let action = unsafe {
+        libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());
+        action.assume_init()
+    };
+    action.sa_sigaction == libc::SIG_IGN
+}
+
+/// `ulimit -t` sets both limits of processor time, and at the second one the kernel kills. So the first one, which can be led
+/// down at, is made to come sooner.
+fn warn_before_the_time_is_over() {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: a limit is written to a place for one, and one that is lower is set.
+    unsafe {
+        if libc::getrlimit(libc::RLIMIT_CPU, &raw mut limit) == 0 && limit.rlim_max != libc::RLIM_INFINITY {
+            let early = limit.rlim_max.saturating_sub((limit.rlim_max / 2).min(limits::TIME_TO_LEAD_DOWN.as_secs()));
+            if limit.rlim_cur > early {
+                limit.rlim_cur = early.max(1);
+                libc::setrlimit(libc::RLIMIT_CPU, &raw const limit);
+            }
+        }
     }
 }
 
@@ -110,6 +186,46 @@ impl Drop for Watch {
         self.handle.close();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// What signals ask for that come after so many milliseconds.
+    fn asked(signals: &[(u64, i32)]) -> Vec<Asks> {
+        let mut seen = Seen::default();
+        let at = |ms: u64| Time(0) + Duration::from_millis(ms);
+        signals.iter().map(|(ms, signal)| seen.asks(*signal, at(*ms))).collect()
+    }
+
+    #[test]
+    fn one_cause_is_one_signal() {
+        use Asks::{Force, Leave, Nothing, Stop};
+        assert_eq!(asked(&[(0, SIGINT), (500, SIGINT), (1500, SIGINT)]), [Stop, Force, Leave]);
+        assert_eq!(asked(&[(0, SIGTERM), (150, SIGTERM)]), [Stop, Force]);
+        for pair in [[SIGINT, SIGINT], [SIGQUIT, SIGQUIT], [SIGTERM, SIGINT], [SIGHUP, SIGINT], [SIGINT, SIGHUP]] {
+            assert_eq!(asked(&[(0, pair[0]), (3, pair[1])]), [Stop, Nothing]);
+        }
+        // Who closes the window, at any time; then a person, or a deadline, goes on.
+        assert_eq!(
+            asked(&[(0, SIGHUP), (700, SIGHUP), (900, SIGXCPU), (1000, SIGTERM)]),
+            [Stop, Nothing, Nothing, Force]
+        );
+        assert_eq!(asked(&[(0, SIGINT), (900, SIGHUP)]), [Stop, Nothing]);
+    }
+
+    #[test]
+    fn a_key_that_is_held_down_does_not_end_it_at_once() {
+        for every in [33, 92, 120, 400] {
+            let held: Vec<(u64, i32)> =
+                std::iter::once(0).chain((0..50).map(|n| 500 + n * every)).map(|ms| (ms, SIGINT)).collect();
+            let asked = asked(&held);
+            assert_eq!(asked[..2], [Asks::Stop, Asks::Force]);
+            assert!(asked[2..].iter().all(|asked| *asked == Asks::Nothing), "{every} {asked:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::input::{Parameters, coordinator};
-use super::output::Style;
+use super::output::{self, Style};
 use super::sim_editor::edit;
 use super::{Answer, Context, Failure, Run};
 use crate::functions::Opener;
@@ -104,8 +104,9 @@ impl Args {
     fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> Answer {
         let out = &context.out;
         let mut exit = Exit::Done;
+        // An input may have no end.
         let mut lines = Lines { input: BufReader::new(input), left: SIM_BYTES };
-        loop {
+        while !output::arrives_nowhere() {
             let line = match lines.next() {
                 Ok(None) => break,
                 Ok(Some(line)) => line,

@@ -123,6 +123,7 @@ impl Session {
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
         (held.len()..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let mut unwatched = false;
+        let giving = self.junction().giving();
         for part in held {
             match part.coordinator.deliver(incoming) {
                 Ok(_) => continue,
@@ -132,6 +133,7 @@ impl Session {
             }
             self.hub().taken_up(ticket, false);
         }
+        drop(giving);
         if gone && acted.is_none() {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });

@@ -12,7 +12,8 @@ use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
 use rustc_hash::FxHashMap;
-use std::sync::{Arc, Mutex, Weak};
+use smallvec::SmallVec;
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
 /// Why the event that begins the deployment is heard by nobody then.
@@ -29,6 +30,8 @@ pub(super) struct Junction {
     urgent: FxHashMap<EventName, Precedence>,
     /// The events that begin and end the deployment.
     ends: Option<(EventName, EventName)>,
+    /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
+    giving: Mutex<()>,
 }
 
 impl Junction {
@@ -55,6 +58,11 @@ impl Junction {
     /// An event of a class, unless it is one that goes before all others.
     pub fn incoming(&self, class: Class, event: EventName) -> Incoming {
         Incoming::new(class, event).going(self.urgent.get(&event).copied().unwrap_or_default())
+    }
+
+    /// What gives an event to several coordinators has this until all of them have it.
+    pub fn giving(&self) -> MutexGuard<'_, ()> {
+        lock(&self.giving)
     }
 
     /// The coordinator that asks under that name.
@@ -87,6 +95,7 @@ pub(super) struct ToConfigurator {
 impl Listener for ToConfigurator {
     fn raised(&mut self, _: &Chart, batch: &[Raised]) {
         let mut requests = Batch::default();
+        let mut emitted: SmallVec<[EventName; 2]> = SmallVec::new();
         for raised in batch {
             match self.hub.meaning(raised.name) {
                 Meaning::Request(ask) => {
@@ -101,11 +110,7 @@ impl Listener for ToConfigurator {
                 }
                 Meaning::Emitted(event) => {
                     self.hub.note(Happening::Emitted { event: event.to_string() });
-                    // It may be what confirms a configuration.
-                    if let Some(configurator) = self.configurator() {
-                        configurator.event(event);
-                    }
-                    self.tell_others(event);
+                    emitted.push(event);
                 }
                 Meaning::UnknownUndo(name) => {
                     // There is no such ID: answered at once, as the table of requests says.
@@ -123,6 +128,13 @@ impl Listener for ToConfigurator {
             let _ = configurator.submit(requests);
         }
         // Behind what the same step asks for.
+        for event in emitted {
+            // It may be what confirms a configuration.
+            if let Some(configurator) = self.configurator() {
+                configurator.event(event);
+            }
+            self.tell_others(event);
+        }
         self.tell_down();
     }
 
@@ -232,6 +244,7 @@ impl ToConfigurator {
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
             .map(|(_, other)| other.clone())
             .collect();
+        let _giving = junction.giving();
         for other in others {
             self.hub.taken(other.deliver(junction.incoming(Class::Report, event)));
         }
@@ -260,6 +273,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
             hub.note(Happening::Lost { event: event.to_string(), reasons });
             // In whatever state they are: it answers nothing that was asked there.
+            let _giving = junction.giving();
             for coordinator in junction.all() {
                 hub.taken(coordinator.deliver(Incoming::new(Class::Notice, event)));
             }
@@ -334,6 +348,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         junction.tell_leaving(configurator, event);
         make_safe(hub, configurator, event, Class::Report);
     }
+    let _giving = junction.giving();
     for coordinator in junction.all() {
         hub.taken(coordinator.deliver(junction.incoming(Class::Report, event)));
     }

@@ -218,6 +218,11 @@ impl Session {
         found.peek().is_some() && found.all(|(part, ids)| ids.iter().any(|id| part.coordinator.is_active(*id)))
     }
 
+    /// Whether a command waits for whoever drives the session.
+    pub fn is_commanded(&self) -> bool {
+        !lock(&self.commands).is_empty()
+    }
+
     /// Leaves a command for whoever drives the session. Where it is being stopped already, to shut down raises the event
     /// again, and force is the next stage.
     pub fn command(&self, command: Command) {

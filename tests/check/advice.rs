@@ -196,7 +196,9 @@ fn a_group_that_is_misspelt_is_told() {
     let found: Vec<String> = told("stiffness", "stiffness", "stifness");
     assert_eq!(
         found,
-        ["only `three` is of the group `stifness`, so it replaces nothing; did you mean `stiffness`? Else leave it out"]
+        [
+            "only `three` is of the group `stifness`, so it replaces nothing; did you mean `stiffness`? Else leave it out"
+        ]
     );
     for (first, second, third) in [("mode", "mode", "mode"), ("mode", "mode", "speed")] {
         let found: Vec<String> = told(first, second, third);

@@ -388,7 +388,10 @@ fn which_frames_are_squashed_is_told_where_they_come_in_several_orders() {
             )
         });
         let next = all.windows(2).map(|pair| {
-            format!("trans {{ src = '{name}{}', tgt = '{name}{}', events = {{ 'p{}.ok' }} }},", pair[0], pair[1], pair[0])
+            format!(
+                "trans {{ src = '{name}{}', tgt = '{name}{}', events = {{ 'p{}.ok' }} }},",
+                pair[0], pair[1], pair[0]
+            )
         });
         let begin = format!("trans {{ src = 'up', tgt = '{name}{}', events = {{ 'e_{name}' }} }},", order[0]);
         let back = format!(

@@ -54,6 +54,12 @@ impl Foreground {
         assert_eq!(unsafe { libc::kill(self.id, signal) }, 0, "{}", io::Error::last_os_error());
     }
 
+    /// Once more, so long after what came before that it is no echo of that.
+    pub fn signal_again(&self, signal: i32) {
+        Clock::real().sleep(Duration::from_millis(700));
+        self.signal(signal);
+    }
+
     /// How it ended.
     ///
     /// # Panics

@@ -116,14 +116,14 @@ fn one_in_the_foreground_is_kept_too_also_when_a_third_signal_ends_it() {
     demo.until_phase("up");
     child.signal(libc::SIGINT);
     demo.until_phase("shutting_down");
-    child.signal(libc::SIGINT);
+    child.signal_again(libc::SIGINT);
     let mut tried = 0;
     until("the second is heard", || {
         tried += 1;
         let status = demo.run(&["status", "--json"]).json();
         (status["stopping"]["stage"] == "forced" && tried > 10 || tried > 20).then_some(())
     });
-    child.signal(libc::SIGINT);
+    child.signal_again(libc::SIGINT);
     assert_eq!(child.end().code(), Some(4));
     let status = demo.run(&["status", "demo"]);
     for words in ["demo  died  it was ended at once, by a third signal", "look at the hardware"] {

@@ -47,7 +47,7 @@ fn a_second_signal_is_heard_too() {
     demo.until_phase("up");
     deployed.signal(libc::SIGINT);
     demo.until_phase("shutting_down");
-    deployed.signal(libc::SIGINT);
+    deployed.signal_again(libc::SIGINT);
     assert!(deployed.end().code().is_some_and(|code| code != 0), "it says that it did not end in order");
 }
 

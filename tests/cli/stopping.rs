@@ -4,6 +4,7 @@ use crate::demo::Demo;
 use crate::foreground::{Foreground, full_pipe, until};
 use crate::kept::process;
 use std::fs::File;
+use std::os::unix::process::CommandExt;
 use std::process::Stdio;
 
 /// `e_shutdown` leads to where it waits for what nobody says.
@@ -88,7 +89,7 @@ fn a_second_signal_and_force_begin_with_force() {
         let status = demo.run(&["status"]);
         assert!(status.out.contains("stopping     by its coordinator"), "{}", status.out);
         if by_signal {
-            deployed.signal(libc::SIGINT);
+            deployed.signal_again(libc::SIGINT);
         } else {
             assert_eq!(demo.run(&["shutdown", "--force"]).code, 4);
         }
@@ -175,7 +176,7 @@ fn a_script_is_stopped_by_signals_and_leaves_nothing() {
         running.signal(libc::SIGINT);
         if forced {
             until("waiting", || demo.read("out").contains("root.waiting").then_some(()));
-            running.signal(libc::SIGINT);
+            running.signal_again(libc::SIGINT);
         }
         assert_eq!(running.end().code(), Some(code), "{}{}", demo.read("out"), demo.read("err"));
         assert!(demo.read("err").contains("interrupted by a signal"), "{}", demo.read("err"));
@@ -362,7 +363,7 @@ fn a_terminal_that_closes_is_one_signal() {
     demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle,      within_s: 900");
     let deployed = deploy(&demo, "out");
     demo.until_phase("up");
-    for nothing in [libc::SIGTTOU, libc::SIGXFSZ] {
+    for nothing in [libc::SIGTTOU, libc::SIGTTIN, libc::SIGXFSZ, libc::SIGTSTP] {
         deployed.signal(nothing);
     }
     assert_eq!(demo.run(&["status", "--json"]).json()["phase"], "up");
@@ -376,9 +377,72 @@ fn a_terminal_that_closes_is_one_signal() {
         assert!(status.out.contains("stopping     by its coordinator"), "{}", status.out);
     }
     // A key that is held down asks for force, and not for the end at once.
+    deployed.signal_again(libc::SIGINT);
     for _ in 0..5 {
         deployed.signal(libc::SIGINT);
     }
     assert_eq!(deployed.end().code(), Some(4));
     assert!(demo.read("out").contains("demo down by force, nothing is left"), "{}", demo.read("out"));
+}
+
+/// What a shell without a terminal, or `nohup`, has it ignore stays ignored; and a limit of processor time is led down at, also where
+/// both of its limits are the same.
+#[test]
+fn what_it_was_started_with_is_heeded() {
+    let demo = Demo::new();
+    let mut command = demo.command(&["deploy", "deployment.yaml"]);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let limits = libc::rlimit { rlim_cur: 40, rlim_max: 40 };
+    // SAFETY: between fork and exec nothing is called that may not be.
+    unsafe {
+        command.pre_exec(move || {
+            libc::signal(libc::SIGHUP, libc::SIG_IGN);
+            match libc::setrlimit(libc::RLIMIT_CPU, &raw const limits) {
+                0 => Ok(()),
+                _ => Err(std::io::Error::last_os_error()),
+            }
+        });
+    }
+    let deployed = Foreground::start(&mut command);
+    demo.until_phase("up");
+    deployed.signal(libc::SIGHUP);
+    assert_eq!(demo.run(&["status", "--json"]).json()["phase"], "up");
+    let limits = std::fs::read_to_string(format!("/proc/{}/limits", deployed.id())).unwrap();
+    let of = limits.lines().find(|line| line.starts_with("Max cpu time")).unwrap();
+    assert_eq!(of.split_whitespace().skip(3).take(2).collect::<Vec<_>>(), ["30", "40"], "{of}");
+    deployed.signal(libc::SIGXCPU);
+    assert_eq!(deployed.end().code(), Some(0));
+    assert!(!demo.path("davit/demo.sock").exists());
+}
+
+/// On the real clock a script's deployment is one that others find: nobody else has its name, and whoever ends it ends the script.
+#[test]
+fn a_scripts_deployment_has_its_name() {
+    let demo = Demo::new();
+    demo.write("story.lua", "deploy('deployment.yaml') say('it is up') wait(1000) say('never')");
+    let mut command = demo.command(&["run", "story.lua", "--color", "never"]);
+    let errors = File::create(demo.path("err")).unwrap();
+    command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+    let running = Foreground::start(&mut command);
+    demo.until_phase("up");
+    for second in [vec!["run", "story.lua"], vec!["deploy", "deployment.yaml"]] {
+        let ran = demo.run(&second);
+        assert!(
+            ran.code == 1 && ran.err.contains("a deployment named `demo` is already running"),
+            "{}{}",
+            ran.out,
+            ran.err
+        );
+    }
+    assert_eq!(demo.run(&["apply", "fast", "--force"]).code, 0);
+    let ran = demo.run(&["shutdown"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert_eq!(running.end().code(), Some(1), "{}", demo.read("err"));
+    assert!(!demo.read("out").contains("\nnever\n"), "{}", demo.read("out"));
+    // It is free again, and in simulated time nobody has it.
+    demo.write("story.lua", "deploy('deployment.yaml') shutdown() deploy('deployment.yaml')");
+    let deployed = deploy(&demo, "other");
+    demo.until_phase("up");
+    assert_eq!(demo.run(&["run", "story.lua", "--clock", "simulated"]).code, 0);
+    drop(deployed);
 }

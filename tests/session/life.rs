@@ -123,6 +123,7 @@ fn runs(story: &str) {
             platform: None,
             observer: None,
             interrupt: Interrupt::default(),
+            door: None,
             say: Box::new(move |text| heard.lock().unwrap().push(text.to_owned())),
         },
     );
@@ -148,6 +149,7 @@ fn run_text(text: &str) -> (Option<String>, Option<bool>) {
             platform: None,
             observer: None,
             interrupt: Interrupt::default(),
+            door: None,
             say: Box::new(|_| {}),
         },
     );

@@ -40,7 +40,7 @@ impl Interrupt {
         let state = {
             let mut state = lock(&self.state);
             state.session = Arc::downgrade(session);
-            (self.is_asked(), state.force)
+            (self.asked.load(Ordering::Relaxed), state.force)
         };
         if let (true, force) = state {
             session.command(Command::Shutdown { force });
@@ -52,8 +52,10 @@ impl Interrupt {
         self.asked.clone()
     }
 
+    /// Also by who asks its deployment to end (`davit shutdown`).
     fn is_asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
+            || lock(&self.state).session.upgrade().is_some_and(|session| session.is_commanded())
     }
 
     /// Fails once it is asked for.
