@@ -391,3 +391,68 @@ fn whether_it_is_led_down_counts_when_an_undo_begins() {
     let out = undo_that_waits("e_leave", "e_shutdown");
     assert!(out.contains("`op` of an operator was undone with it") && !out.contains("base.undo.failed"), "{out}");
 }
+
+/// What one tells the other of an event comes behind that event, and behind what it asks for in the same step: on the real clock,
+/// where each has a thread of its own, round after round.
+#[test]
+fn what_is_told_comes_behind_what_it_is_about() {
+    let demo = Demo::new();
+    demo.write(
+        "two.yaml",
+        &format!(
+            "{DEPLOYMENT}coordinators: {{ one: one.lua, two: two.lua }}
+deploy: {{ event: e_start, up: up, within_s: 5 }}
+shutdown: {{ event: e_shutdown, down: idle, within_s: 5 }}
+emits: [x_made, x_gone]\n"
+        ),
+    );
+    demo.write(
+        "conf.lua",
+        r#"ConfiguratorConf {
+          make = Configuration { create("drive", "Drive") },
+          use = Configuration { property_set("drive.gain", 2.0) },
+        }"#,
+    );
+    demo.write(
+        "one.lua",
+        r#"return state {
+          idle = state {}, up = state {}, made = state { entry = { "make", "x_made" } },
+          gone = state { entry = { "make.undo", "x_gone" } },
+          trans { src = "initial", tgt = "idle" },
+          trans { src = "idle", tgt = "up", events = { "e_start" } },
+          trans { src = "up", tgt = "made", events = { "e_make" } },
+          trans { src = "made", tgt = "gone", events = { "e_take" } },
+          trans { src = "gone", tgt = "up", events = { "make.undone" } },
+          trans { src = "up", tgt = "idle", events = { "e_shutdown" } },
+        }"#,
+    );
+    // What it hears of the event itself comes before what the other one tells of it.
+    demo.write(
+        "two.lua",
+        r#"return state {
+          idle = state {}, up = state {}, waits = state {}, used = state { entry = "use" }, early = state {},
+          takes = state { entry = "use.undo" }, over = state {},
+          trans { src = "initial", tgt = "idle" },
+          trans { src = "idle", tgt = "up", events = { "e_start" } },
+          trans { src = "up", tgt = "waits", events = { "e_make" } },
+          trans { src = "up", tgt = "early", events = { "x_made" } },
+          trans { src = "waits", tgt = "used", events = { "x_made" } },
+          trans { src = "used", tgt = "early", events = { "use.failed" } },
+          trans { src = "used", tgt = "takes", events = { "e_use_over" } },
+          trans { src = "takes", tgt = "over", events = { "use.undone" } },
+          trans { src = "over", tgt = "up", events = { "x_gone" } },
+          trans { src = "up", tgt = "idle", events = { "e_shutdown" } },
+        }"#,
+    );
+    demo.write(
+        "story.lua",
+        r#"deploy("two.yaml")
+        for _ = 1, 60 do
+          raise("e_make") wait_state("two:root.used", 10) wait_answer("use.ok", 10)
+          raise("e_use_over") wait_state("two:root.over", 10)
+          raise("e_take") wait_state("one:root.up", 10) wait_state("two:root.up", 10)
+        end"#,
+    );
+    let ran = demo.run(&["run", "story.lua"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
