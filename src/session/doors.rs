@@ -9,6 +9,7 @@ use serde_json::Value as Json;
 use std::fs::File;
 use std::io;
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 
 /// The connections there are, and whether there may be more.
@@ -25,6 +26,9 @@ struct Inside {
     kept: usize,
     connections: Vec<Weak<Connection>>,
 }
+
+/// One that is let in, and finds no thread: the system has none left.
+type Waiting = (Arc<Connection>, Place);
 
 /// A place, until it is dropped.
 struct Place {
@@ -67,6 +71,16 @@ impl Doors {
         Some(Place { doors: self.clone(), kept })
     }
 
+    /// A place of those that are kept.
+    fn kept_place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+        let mut inside = lock(&self.inside);
+        if inside.kept >= shared.bounds.kept {
+            return None;
+        }
+        inside.kept += 1;
+        Some(Place { doors: self.clone(), kept: true })
+    }
+
     fn enter(&self, connection: &Arc<Connection>) {
         let mut inside = lock(&self.inside);
         inside.connections.retain(|there| there.strong_count() > 0);
@@ -77,12 +91,21 @@ impl Doors {
     pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<Shared>) {
         // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
         let mut spare = File::open("/dev/null").ok();
+        // There before there is none left: an emergency stop needs no thread.
+        let (waiting, waits) = sync_channel::<Waiting>(shared.bounds.kept);
+        let served = shared.clone();
+        let _ = std::thread::Builder::new().name("davit-kept".to_owned()).spawn(move || {
+            for (connection, place) in waits {
+                attend(&connection, &served, true);
+                drop(place);
+            }
+        });
         for (number, stream) in (2..).zip(listener.incoming()) {
             if self.is_closed() {
                 return;
             }
             match stream {
-                Ok(stream) => self.admit(number, stream, shared),
+                Ok(stream) => self.admit(number, stream, shared, &waiting),
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
                 Err(_) => {
                     drop(spare.take());
@@ -105,7 +128,13 @@ impl Doors {
         );
     }
 
-    fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>) {
+    fn admit(
+        self: &Arc<Self>,
+        number: u32,
+        stream: UnixStream,
+        shared: &Arc<Shared>,
+        waiting: &SyncSender<Waiting>,
+    ) {
         if !place::is_own(&stream) {
             let why = "this socket is for the processes of its own user";
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
@@ -113,17 +142,31 @@ impl Doors {
         let Some(place) = self.place(shared) else { return refuse(number, stream, shared, too_many()) };
         let Ok(connection) = Connection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
         self.enter(&connection);
-        let (shared, own) = (shared.clone(), connection.clone());
-        let serving = std::thread::Builder::new().name("davit-client".to_owned()).spawn(move || {
-            let _ = serve(&own, &shared, place.kept);
-            shared.subscribers.remove(own.number);
-            own.cut();
+        let may = {
+            let inside = lock(&self.inside);
+            inside.places + inside.kept <= shared.bounds.threads
+        };
+        let (serving, own) = (shared.clone(), connection.clone());
+        let attended = move || {
+            attend(&own, &serving, place.kept);
             drop(place);
-        });
-        if serving.is_err() {
+        };
+        let thread = || std::thread::Builder::new().name("davit-client".to_owned()).spawn(attended);
+        if may && thread().is_ok() {
+            return;
+        }
+        let place = self.kept_place(shared);
+        if place.is_none_or(|place| waiting.try_send((connection.clone(), place)).is_err()) {
             let _ = connection.send(&rpc::answer(&Json::Null, Err(too_many())));
         }
     }
+}
+
+/// Answers one connection to its end.
+fn attend(connection: &Arc<Connection>, shared: &Shared, kept: bool) {
+    let _ = serve(connection, shared, kept);
+    shared.subscribers.remove(connection.number);
+    connection.cut();
 }
 
 fn refuse(number: u32, stream: UnixStream, shared: &Shared, why: RpcError) {

@@ -41,6 +41,9 @@ pub struct Bounds {
     pub connections: usize,
     /// [`limits::SOCKET_KEPT`]
     pub kept: usize,
+    /// How many connections have a thread of their own; what must get through on another one is answered by a thread that there is
+    /// from the beginning, one call after the other.
+    pub threads: usize,
     /// [`limits::SOCKET_SAY`]
     pub say: Duration,
     /// [`limits::SOCKET_IDLE`]
@@ -58,6 +61,7 @@ impl Default for Bounds {
         Self {
             connections: limits::SOCKET_CONNECTIONS,
             kept: limits::SOCKET_KEPT,
+            threads: limits::SOCKET_CONNECTIONS + limits::SOCKET_KEPT,
             say: limits::SOCKET_SAY,
             idle: limits::SOCKET_IDLE,
             write: limits::SOCKET_WRITE,

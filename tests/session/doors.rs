@@ -116,6 +116,19 @@ fn idle_connections_lock_nobody_out() {
     until("places are free again", || Client::connect(Some(&name)).unwrap().call("stack", &Json::Null, LIMIT).ok());
 }
 
+/// Where the system has no thread left, what must get through does: one after the other.
+#[test]
+fn without_a_thread_of_its_own_what_must_get_through_does() {
+    let (name, socket, _) = open("threads", Bounds { threads: 0, ..Bounds::default() });
+    for _ in 0..3 {
+        let mut operator = Client::connect(Some(&name)).unwrap();
+        assert_eq!(operator.call("shutdown", &Json::Null, LIMIT).unwrap(), "shutdown");
+        let mut other = Client::connect(Some(&name)).unwrap();
+        assert_eq!(refused(other.call("stack", &Json::Null, LIMIT)).code, rpc::TOO_MANY);
+    }
+    drop(socket);
+}
+
 #[test]
 fn places_are_given_away_when_nothing_is_said() {
     let short = Duration::from_millis(50);
