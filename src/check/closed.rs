@@ -6,7 +6,7 @@ use super::explore::Barred;
 use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Move, State};
-use crate::model::{Ask, EventName, Monitor, Verdict};
+use crate::model::{Ask, EventName, FAULTED, Monitor, Verdict};
 use crate::statechart::EventId;
 
 /// Who may still raise an event from outside while the deployment is being stopped.
@@ -106,7 +106,7 @@ impl Product<'_> {
 
 /// Whether an event tells that a component has failed.
 pub(super) fn fails(name: EventName) -> bool {
-    name.as_str().ends_with(".faulted")
+    name.as_str().ends_with(FAULTED)
 }
 
 /// What to do about an event that is refused while the deployment is being stopped.

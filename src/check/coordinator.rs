@@ -6,7 +6,9 @@ use crate::model::codes::{
 };
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::statechart::is_internal;
-use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Monitor, Raise, Verdict};
+use crate::model::{
+    Ask, ChangeKind, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict,
+};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
 use std::collections::BTreeSet;
 
@@ -148,6 +150,29 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     }
 }
 
+/// That nobody raises an event, since it was meant to be another one: a time event, or the fault of a component.
+fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
+    if let Some((head, inner)) = event.split_once('(') {
+        let near = if head.contains("at") { "e_at" } else { "e_after" };
+        let message = format!("`{event}` is no time event: somebody must raise it under that very name");
+        return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{near}({inner}`?")));
+    }
+    let component = event.strip_suffix(FAULTED)?;
+    let created: BTreeSet<&str> = deployment
+        .configurations
+        .iter()
+        .flat_map(|configuration| &configuration.changes)
+        .filter_map(|change| match &change.kind {
+            ChangeKind::Create { component, .. } => Some(component.as_str()),
+            _ => None,
+        })
+        .collect();
+    (!created.contains(component)).then(|| {
+        Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
+            .help(did_you_mean(component, "components", created.iter().copied()))
+    })
+}
+
 fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let answers = answers(deployment, chart);
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
@@ -167,6 +192,10 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 continue;
             }
             let at = chart.edge_origin(edge);
+            if let Some(finding) = never_raised(deployment, &text) {
+                findings.push(finding.at(at));
+                continue;
+            }
             if !deployment.looks_like_answer(&text) {
                 // In a short name two letters make another word; and nobody slips twice in the same way.
                 let slips = if text.chars().count() < 8 { 1 } else { 2 };

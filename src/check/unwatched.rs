@@ -9,8 +9,8 @@ use super::universe::Universe;
 use crate::model::codes::DEPLOY_UNWATCHED;
 use crate::model::monitor::MONITORS_TYPE;
 use crate::model::{
-    ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, Finding, Findings, MemberRef, Origin,
-    RunState, Target, ValueType,
+    ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, FAULTED, Finding, Findings, MemberRef,
+    Origin, RunState, Target, ValueType,
 };
 use crate::statechart::Chart;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -92,7 +92,7 @@ impl Look<'_> {
     }
 
     fn is_fault_heard(&self, name: ComponentName) -> bool {
-        let Ok(event) = EventName::new(&format!("{name}.faulted")) else { return false };
+        let Ok(event) = EventName::new(&format!("{name}{FAULTED}")) else { return false };
         self.hears(event)
     }
 

@@ -4,6 +4,9 @@ use super::names::{ConfigId, EventName};
 use serde::Serialize;
 use std::fmt;
 
+/// How the event ends that tells of a component's fault: `COMPONENT.faulted`.
+pub const FAULTED: &str = ".faulted";
+
 /// The number of a request; every request gets exactly one answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct RequestId(pub u64);

@@ -30,7 +30,7 @@ pub use deployment::{
     Activity, BringUp, Coordinator, Deployment, DeploymentLimits, FaultKind, OPERATOR, OperatorMay, SimulatedReaction,
     StepFault, TakeDown, Written,
 };
-pub use event::{Ask, Raise, RequestId, Verdict};
+pub use event::{Ask, FAULTED, Raise, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
 pub use monitor::Monitor;
 pub use names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};

@@ -342,9 +342,10 @@ impl Trigger {
     /// [`NameError`] when `text` is neither: a time that is no finite number, a text with blanks.
     pub fn parse(text: &str) -> Result<Self, NameError> {
         for since in [Since::Entry, Since::Start] {
-            let inner = text.strip_prefix(since.word()).and_then(|rest| rest.strip_prefix('(')?.strip_suffix(')'));
+            let inner = text.strip_prefix(since.word()).and_then(|rest| rest.strip_prefix('('));
             if let Some(inner) = inner {
-                return Timed::parse(since, inner).map(Self::Timed).ok_or_else(|| NameError {
+                let timed = inner.strip_suffix(')').and_then(|inner| Timed::parse(since, inner));
+                return timed.map(Self::Timed).ok_or_else(|| NameError {
                     text: text.to_owned(),
                     kind: "time event",
                     reason: "it is written `e_after(SECONDS)` or `e_at(SECONDS)` with a number, such as `e_after(0.5)`",
@@ -412,6 +413,7 @@ mod tests {
         assert!(matches!(Trigger::parse("e_after"), Ok(Trigger::Event(_))), "without parentheses it is a plain event");
         assert!(Trigger::parse("e_after(soon)").is_err());
         assert!(Trigger::parse("e_after(nan)").is_err());
+        assert!(Trigger::parse("e_after(1").is_err());
         assert!(Trigger::parse("e_at(1e999)").is_err());
         assert!(Trigger::parse("e b").is_err());
         let Ok(Trigger::Timed(timed)) = Trigger::parse("e_after( 2 , x )") else { panic!("a time event") };

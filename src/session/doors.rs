@@ -128,13 +128,7 @@ impl Doors {
         );
     }
 
-    fn admit(
-        self: &Arc<Self>,
-        number: u32,
-        stream: UnixStream,
-        shared: &Arc<Shared>,
-        waiting: &SyncSender<Waiting>,
-    ) {
+    fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>, waiting: &SyncSender<Waiting>) {
         if !place::is_own(&stream) {
             let why = "this socket is for the processes of its own user";
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));

@@ -7,7 +7,7 @@ use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
 use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
-use crate::model::{Ask, Deployment, EventName, Precedence, RequestId, Verdict};
+use crate::model::{Ask, Deployment, EventName, FAULTED, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
 use crate::time::lock;
@@ -329,7 +329,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         PlatformEvent::Raised { event, component, .. } => (*event, component.to_string()),
         PlatformEvent::Faulted { component, reason, .. } => {
             hub.fault(component.as_str(), reason);
-            let event = EventName::new(&format!("{component}.faulted")).expect("a name with a suffix is one");
+            let event = EventName::new(&format!("{component}{FAULTED}")).expect("a name with a suffix is one");
             (event, component.to_string())
         }
         PlatformEvent::Returned { component, .. } => {

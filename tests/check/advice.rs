@@ -205,3 +205,26 @@ fn a_group_that_is_misspelt_is_told() {
         assert!(found.is_empty(), "{found:?}");
     }
 }
+
+/// A time event that is misspelt is an event that somebody must raise, and so is the fault of a component that there is not.
+#[test]
+fn an_event_that_nobody_can_mean_is_told() {
+    let cases = [
+        (
+            "e_aftre(1.5)",
+            "`e_aftre(1.5)` is no time event: somebody must raise it under that very name; did you mean `e_after(1.5)`?",
+        ),
+        ("E_at(3)", "`E_at(3)` is no time event: somebody must raise it under that very name; did you mean `e_at(3)`?"),
+        ("aa.faulted", "`aa.faulted` never comes: there is no component `aa`; did you mean `a`?"),
+    ];
+    for (event, told) in cases {
+        let more = format!("trans {{ src = \"stuck\", tgt = \"leaving\", events = {{ \"{event}\" }} }},");
+        let found: Vec<String> = texts(&check(&more, ""), "coord::near_event")
+            .into_iter()
+            .map(|(message, help)| format!("{message}; {help}"))
+            .collect();
+        assert_eq!(found, [told]);
+    }
+    let more = "trans { src = \"stuck\", tgt = \"leaving\", events = { \"a.faulted\", \"e_after(1.5)\" } },";
+    assert!(texts(&check(more, ""), "coord::near_event").is_empty());
+}
