@@ -5,9 +5,11 @@
 use super::budget::Budget;
 use super::errors::message_within;
 use super::{patterns, work};
+use mlua::chunk::ChunkMode;
 use mlua::thread::ThreadStatus;
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::rc::Rc;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 const GUARDS: &str = include_str!("lua/guards.lua");
@@ -66,8 +68,19 @@ pub fn loops(lua: &Lua, charge: &Function) -> Result<()> {
     let globals = lua.globals();
     let library = |name: &str| globals.raw_get::<Value>(name);
     let arguments = (charge, library("string")?, library("table")?, library("utf8")?);
-    let tonumber: Function = lua.load(LOOPS).set_name("=[davit]").into_function()?.call(arguments)?;
+    let tonumber: Function = compiled(lua)?.call(arguments)?;
     globals.raw_set("tonumber", tonumber)
+}
+
+/// [`LOOPS`] as a function: read once in a process, for that costs more than all else that makes a state.
+fn compiled(lua: &Lua) -> Result<Function> {
+    static CODE: OnceLock<Vec<u8>> = OnceLock::new();
+    if let Some(code) = CODE.get() {
+        return lua.load(&code[..]).set_mode(ChunkMode::Binary).set_name("=[davit]").into_function();
+    }
+    let function = lua.load(LOOPS).set_name("=[davit]").into_function()?;
+    let _ = CODE.set(function.dump(false));
+    Ok(function)
 }
 
 /// What is asked before a pattern function of Lua's runs.

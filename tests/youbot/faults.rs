@@ -215,8 +215,8 @@ fn push(name: &str, direction: &str) {
         fault - t,
         at - t
     );
-    assert!(rest < 0.02, "{rest} m/s 0.3 s after the fault");
-    assert!(way < 0.2, "{way} m");
+    assert!(rest < 0.02, "{direction}: {rest} m/s 0.3 s after the fault");
+    assert!(way < 0.2, "{direction}: {way} m");
     assert!(step < 0.5, "{step} N m in 1 ms at {} s", at - t);
 }
 
@@ -225,6 +225,14 @@ fn a_hard_push_ends_at_rest() {
     push("youbot_arm", "0 40 0");
     push("youbot_arm", "40 0 0");
     push("youbot_arm_scoped", "0 -40 0");
+}
+
+/// Up, down, towards the base, and obliquely away from it.
+#[test]
+fn a_hard_push_ends_at_rest_up_and_down_too() {
+    for direction in ["-40 0 0", "0 0 40", "0 0 -40", "28 0 28"] {
+        push("youbot_arm", direction);
+    }
 }
 
 /// Taking hold, letting go, a link that is cut, two modes: no torque changes by more than half a newton metre in 1 ms.
