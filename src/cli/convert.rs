@@ -66,6 +66,10 @@ impl Run for Args {
                 let finding = Finding::info(CONVERT_FUNCTIONS, message).help(help);
                 context.out.findings(&[finding], &loaded.sources);
             }
+            if let Some(directory) = &self.output {
+                // Why it cannot be made is said of the first file that cannot be written.
+                _ = std::fs::create_dir_all(directory);
+            }
             for (name, text) in lang::print::deployment(&deployment, language) {
                 match &self.output {
                     Some(directory) => {

@@ -37,14 +37,19 @@ pub struct Args {
     #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
     /// How often to look, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.5, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.5, value_parser = pause)]
     every: f64,
     /// End after so many looks.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// Print JSON: one object a line.
     #[arg(long)]
     json: bool,
+}
+
+/// A pause between looks: asking without one would only keep a processor busy.
+fn pause(text: &str) -> Result<f64, String> {
+    seconds(text).and_then(|value| if value < 0.01 { Err("give at least 0.01 s".to_owned()) } else { Ok(value) })
 }
 
 impl Run for Args {

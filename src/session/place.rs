@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 pub const LONGEST: usize = 107;
 
 /// The directory of the control sockets: `$XDG_RUNTIME_DIR/davit`, else `davit-UID` in the system's directory for
-/// temporary files.
+/// temporary files. A path that is not absolute counts for nothing (XDG Base Directory Specification).
 pub fn directory() -> PathBuf {
-    match std::env::var_os("XDG_RUNTIME_DIR").filter(|d| !d.is_empty()) {
+    match std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| Path::new(dir).is_absolute()) {
         Some(runtime) => PathBuf::from(runtime).join("davit"),
         None => std::env::temp_dir().join(format!("davit-{}", user())),
     }

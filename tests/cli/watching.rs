@@ -72,7 +72,7 @@ fn monitors_are_shown_with_what_they_say() {
     let seen = look(&|seen| seen["monitors"][0]["verdict"] == true && seen["monitors"][1]["verdict"].is_boolean());
     assert_eq!((&seen["monitors"][0]["robustness"], &seen["monitors"][1]["robustness"]), (&3.0.into(), &(-6.0).into()));
 
-    let lines = run(&["watch", "--count", "2", "--every", "0"]);
+    let lines = run(&["watch", "--count", "2", "--every", "0.01"]);
     assert_eq!(lines.out.lines().count(), 2, "{}", lines.out);
     for line in lines.out.lines() {
         for words in ["up", "root.operational.fast_mode", "4 frames", "high: true +3.0000"] {

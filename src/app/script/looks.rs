@@ -17,8 +17,11 @@ pub(super) fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<
 }
 
 pub(super) fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Result<()> {
+    let known = || did_you_mean(wanted, "run states", RunState::NAMES.iter().copied());
+    let wanted =
+        RunState::from_name(wanted).ok_or_else(|| error(format!("`{wanted}` is no run state: {}", known())))?;
     match component_state(host, name)? {
-        Some(state) if state.as_str() == wanted => Ok(()),
+        Some(state) if state == wanted => Ok(()),
         Some(state) => Err(error(format!("`{name}` is {state}, not {wanted}"))),
         None => Err(no_component(name, &system(host)?)),
     }
