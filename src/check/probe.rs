@@ -27,7 +27,7 @@ impl Graph<'_, '_> {
         let (listed, safes) =
             (self.product.operator.iter().any(|id| !safe(id)), self.product.operator.iter().any(safe));
         // One that is safe is followed alone.
-        if listed && safes || listed && self.differs(|product| product.by_hand = 2) {
+        if listed && (safes || self.differs(|product| product.by_hand = 2)) {
             self.cut(Bound::Together, Failed::Nothing);
         }
         self.product.by_hand = 1;
