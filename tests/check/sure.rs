@@ -218,19 +218,17 @@ fn what_begins_the_deployment_comes_once() {
 #[test]
 fn what_cannot_stand_so_long_is_told_also_of_what_others_have() {
     let of = |lasts: &str| {
-        let parking = format!(
-            "parking = state {{ entry = 'park' }}, un = state {{ entry = 'park.undo' }},
-             trans {{ src = 'parking', tgt = 'up', events = {{ 'park.ok' }} }},
-             trans {{ src = 'parking', tgt = 'un', events = {{ 'park.failed', 'park.broken', 'park.lost', 'e_shutdown' }} }},
-             trans {{ src = 'un', tgt = 'leaving', events = {{ 'park.undone' }} }},
-             trans {{ src = 'un', tgt = 'failed', events = {{ 'park.undo.failed', 'park.undo.broken' }} }},"
-        );
+        let parking = "parking = state { entry = 'park' }, un = state { entry = 'park.undo' },
+             trans { src = 'parking', tgt = 'up', events = { 'park.ok' } },
+             trans { src = 'parking', tgt = 'un', events = { 'park.failed', 'park.broken', 'park.lost', 'e_shutdown' } },
+             trans { src = 'un', tgt = 'leaving', events = { 'park.undone' } },
+             trans { src = 'un', tgt = 'failed', events = { 'park.undo.failed', 'park.undo.broken' } },";
         let conf = format!(
             "{BASE}, lamp = Configuration {{ create('b', 'Drive'), post_conf_state = {{ 'b:running' }} }},
              park = Configuration {{ timeout = 1.0, holds = in_state('b', 'running'):for_at_least({lasts}), property_set('a.gain', 2.0) }}"
         );
         let lamp = by_base("up", "leaving", "").replace("base", "lamp");
-        let small = Small::several(&conf, &[("one", &by_base("parking", "un", &parking)), ("two", &lamp)], "");
+        let small = Small::several(&conf, &[("one", &by_base("parking", "un", parking)), ("two", &lamp)], "");
         // No script goes the way to what never becomes true.
         let said = small.demo.run(&["check", "small.yaml", "--json"]).json();
         said["findings"].as_array().unwrap().iter().filter(|found| found["code"] == "conf::holds_never").count()
