@@ -125,7 +125,7 @@ impl Graph<'_, '_> {
             hears.push(members.into_iter().any(|(member, leaf)| member.takes(*leaf, names[0])));
         }
         for reaction in raising {
-            let set_off = self.edges_with(&StepPattern::new(&reaction.after));
+            let set_off = self.edges_with(0..self.edges.len(), &StepPattern::new(&reaction.after));
             let is_it = |edge: &Edge| matches!(edge.by, Move::Event(by) if usize::from(by) == at);
             let passes = |(number, edge): &(usize, &Edge)| {
                 !set_off[*number] && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
@@ -137,11 +137,11 @@ impl Graph<'_, '_> {
         comes
     }
 
-    /// The edges on which such a step is done, as far as nothing fails.
-    fn edges_with(&mut self, pattern: &StepPattern) -> Vec<bool> {
+    /// Of these edges those on which such a step is done, as far as nothing fails.
+    pub(super) fn edges_with(&mut self, some: impl Iterator<Item = usize>, pattern: &StepPattern) -> Vec<bool> {
         let mut with = vec![false; self.edges.len()];
         let mut of: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (number, edge) in self.edges.iter().enumerate() {
+        for (number, edge) in some.map(|number| (number, &self.edges[number])) {
             if edge.by == Move::Answer && edge.failed == Failed::Nothing {
                 of.entry(edge.from).or_default().push(number);
             }

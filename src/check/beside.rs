@@ -41,7 +41,7 @@ pub fn asked(deployment: &Deployment, chart: &Chart) -> BTreeSet<ConfigId> {
 }
 
 /// What an operator may ask for at any time.
-fn by_operator(deployment: &Deployment) -> BTreeSet<ConfigId> {
+pub(super) fn by_operator(deployment: &Deployment) -> BTreeSet<ConfigId> {
     let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id);
     let listed = deployment.operator_applies().filter(|id| deployment.configuration(*id).is_some());
     safe.chain(listed).collect()
@@ -166,9 +166,20 @@ impl<'a> Meeting<'a> {
             let mut raises = self.charts[a].raises().iter();
             raises.any(|site| self.charts[b].event(site.name) != EventId::OTHER)
         };
+        // What a simulated component reports comes of who has it.
+        let simulated = self.deployment.platform.as_str() == "simulated";
+        let reactions = || self.deployment.reactions.iter().filter(|_| simulated);
+        let has = |ids: &BTreeSet<ConfigId>, component| {
+            let mut configurations = ids.iter().filter_map(|id| self.deployment.configuration(*id));
+            configurations.any(|c| claims::components(c).contains(&component))
+        };
+        let reports = |ids: &BTreeSet<ConfigId>, to: usize| {
+            let heard = |raise| self.charts[to].event(raise) != EventId::OTHER;
+            reactions().any(|reaction| heard(reaction.raise) && has(ids, reaction.component))
+        };
         let safe = own.iter().chain(other).any(is_safe);
         let same = own.intersection(other).next().is_some();
-        same || safe || hears(a, b) || hears(b, a) || claim.meets(theirs)
+        same || safe || hears(a, b) || hears(b, a) || reports(own, b) || reports(other, a) || claim.meets(theirs)
     }
 
     /// Whether what a coordinator does and this, done by an operator, have to do with each other.

@@ -36,6 +36,14 @@ pub enum Bound {
     Together,
     /// Frames of an operator that are squashed into one, and tie together who was followed apart.
     Tied,
+    /// Whether it is led down where an operator has frames and a coordinator that is followed apart begins again.
+    Begun,
+    /// Two times that are over at the same moment, and lead to different ends.
+    Ties,
+    /// Ways up and down that come elsewhere in another order of answers and of what coordinators tell each other.
+    Turns,
+    /// What leads up from *down* and came just before the event that ends the deployment.
+    Stale,
     /// Events from outside that come before all have heard what came before.
     Across,
     /// [`limits::CHECK_ROUNDS`].
@@ -93,6 +101,22 @@ impl Bound {
             Self::Tied => {
                 "what comes of it that an operator's frames for coordinators that have nothing to do with each other are squashed into one \
                  was not followed"
+                    .to_owned()
+            }
+            Self::Begun => {
+                "what an undo takes along of an operator's frames was not followed where a coordinator that is followed apart begins again \
+                 while others are led down"
+                    .to_owned()
+            }
+            Self::Ties => {
+                "which of two times comes first that are over at the same moment, and lead to different ends, is not known".to_owned()
+            }
+            Self::Turns => "whether it comes up, or down, was followed for one order of answers and of what coordinators tell each other, \
+                            and another one leads elsewhere"
+                .to_owned(),
+            Self::Stale => {
+                "what comes of an event that leads up from where all are down, and came just before the one that ends the deployment, was \
+                 not followed"
                     .to_owned()
             }
             Self::Across => {

@@ -25,12 +25,12 @@ pub fn bad_answers(ask: Ask) -> [EventName; 2] {
     [ask.failed().event(ask), ask.broken().event(ask)]
 }
 
-/// What is wrong between the coordinator and the deployment.
-pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+/// What is wrong between the coordinator and the deployment. `told`: what coordinators raise.
+pub fn check(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>) -> Findings {
     let mut findings = Vec::new();
     states(deployment, chart, &mut findings);
     raised(deployment, chart, &mut findings);
-    heard(deployment, chart, &mut findings);
+    heard(deployment, chart, told, &mut findings);
     findings
 }
 
@@ -173,7 +173,7 @@ fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
     })
 }
 
-fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, findings: &mut Findings) {
     let answers = answers(deployment, chart);
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
     let mut known: BTreeSet<&str> =
@@ -200,6 +200,7 @@ fn heard(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 // In a short name two letters make another word; and nobody slips twice in the same way.
                 let slips = if text.chars().count() < 8 { 1 } else { 2 };
                 if !declared.contains(&event)
+                    && !told.contains(&event)
                     && listed(chart, *trigger) < 2
                     && let Some(near) = nearest(&text, known.iter().copied())
                     && strsim::damerau_levenshtein(&text, near) <= slips

@@ -7,7 +7,7 @@
 use super::bound::Bound;
 use super::explore::{Barred, Edge, Graph};
 use super::late::Late;
-use super::places::quickest;
+use super::places::{Leg, Timed, quickest};
 use super::state::{Failed, Move};
 use super::timers::Timers;
 use crate::model::Finding;
@@ -82,11 +82,12 @@ impl Graph<'_, '_> {
             return Slow::default();
         }
         // With the times that run at once.
-        let left = self.left_to_enter_anew(&some);
+        let (left, set_off) = (self.left_to_enter_anew(&some), self.set_off(&some));
+        let timed = Timed { timers, set_off, left };
         let stops = |at: u32| self.states[at as usize].stopping;
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
         let waits = |at: u32| stops(at) && !ends[at as usize] && (rests(at) || answered.contains(&at));
-        let Some(places) = self.places(&first, &some, &timers, &left, rests, &late) else {
+        let Some(places) = self.places(&first, &some, &timed, rests, &late) else {
             self.cut(Bound::Times, Failed::Nothing);
             return Slow::default();
         };
@@ -94,13 +95,16 @@ impl Graph<'_, '_> {
         let legs = || places.legs.iter().filter(|leg| !leg.late);
         let there = quickest(count, legs().map(|leg| (leg.from, leg.to, leg.takes)), (0..places.first).collect());
         let last: Vec<usize> = (0..count).filter(|at| ends[places.list[*at].0 as usize]).collect();
-        let back = legs().filter(|leg| leads(leg.edge)).map(|leg| (leg.to, leg.from, leg.takes));
+        // What is sure to be reported there comes, whatever it does on another way.
+        let leads_by = leads;
+        let leads = |leg: &Leg| !fails[leg.edge] && (leg.reported || leads(leg.edge));
+        let back = legs().filter(|leg| leads(leg)).map(|leg| (leg.to, leg.from, leg.takes));
         let leads_on = on;
         let on = quickest(count, back, last.clone());
         let mut overtaken: BTreeMap<u32, (Duration, Duration)> = BTreeMap::new();
         for (from, edge, lasts, over) in &places.overtaken {
             let (at, to) = (places.list[*from].0, self.edges[*edge].to);
-            if there[*from].is_some() && on[*from].is_none() && leads(*edge) && leads_on[to as usize].is_some() {
+            if there[*from].is_some() && on[*from].is_none() && leads_by(*edge) && leads_on[to as usize].is_some() {
                 overtaken.entry(at).or_insert((*lasts, *over));
             }
         }
@@ -119,6 +123,9 @@ impl Graph<'_, '_> {
         };
         let raised = late(&|bar| bar.is_none());
         let reported = if raised.is_empty() { late(&|_| true) } else { BTreeMap::new() };
+        if places.tied {
+            self.cut(Bound::Ties, Failed::Nothing);
+        }
         Slow { always, late: raised, reported, overtaken }
     }
 

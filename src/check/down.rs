@@ -91,18 +91,18 @@ impl Graph<'_, '_> {
         reaches
     }
 
-    /// Whether coordinators that are down may go on before others are that are not followed with them: all of these have to be down
-    /// at once. What begins and ends the deployment is taken by all, or refused.
-    pub(super) fn goes_on_when_down(&self) -> bool {
+    /// Whether coordinators that are down may go on: by an event, or `also_by_time`. What begins and ends the deployment is taken by
+    /// all, or refused. Where others are not followed with them all of these have to be down at once.
+    pub(super) fn goes_on_when_down(&self, also_by_time: bool) -> bool {
         let leads = |edge: &Edge| {
             let comes = match edge.by {
                 Move::Event(_) => !self.product.is_first_or_last(edge.by),
-                by => matches!(by, Move::Time(..)),
+                by => also_by_time && matches!(by, Move::Time(..)),
             };
             comes && self.failed[edge.from as usize] == Failed::Nothing
         };
         let is_down = |at: u32| self.product.all_in(&self.states[at as usize], |member| member.down);
-        self.product.others && self.edges.iter().any(|edge| leads(edge) && is_down(edge.from) && !is_down(edge.to))
+        self.edges.iter().any(|edge| leads(edge) && is_down(edge.from) && !is_down(edge.to))
     }
 
     /// Which states are *down*, or what is in force there is taken away by force, or they are not followed further, or nothing is known of them.

@@ -156,8 +156,10 @@ impl Product<'_> {
             Move::Event(at) => {
                 let name = self.outside[usize::from(at)];
                 // What they tell each other comes of them where all goes well.
-                let comes = if first { name == tried.first } else { !self.deployment.is_told_between(name.as_str()) };
-                comes && name != tried.never
+                let wanted = name == tried.first;
+                let comes = if first { wanted } else { !self.deployment.is_told_between(name.as_str()) };
+                // It is wanted up once.
+                comes && name != tried.never && (first || tried.stopping || !wanted)
             }
             Move::Time(..) | Move::Confirmed(_) => !first,
             // Where it is not confirmed it is taken back, if that does not fail.
@@ -172,18 +174,36 @@ impl Product<'_> {
 /// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*; where that
 /// has too little time, or waits for what another time comes before, the one that lasts shortest. When there is none, the way to where it stops.
 fn way(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
+    let mut way = timely(product, from, tried, goal);
+    if product.comes_elsewhere(&way.moves) {
+        product.unordered |= way.reached;
+        way.in_this_order = !way.reached && product.arrives_in_some_order(&way.from, tried, goal);
+    }
+    way
+}
+
+fn timely(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
     let mut way = shortest(product, from, tried, goal);
     if !way.reached {
-        return way;
+        // What has to stand for a time may be overtaken.
+        if !product.standing.is_empty()
+            && let Soonest::Way(moves) = soonest(product, &way.from, tried, goal)
+        {
+            way = Way { moves, reached: true, refused: None, failed: None, ..way };
+        } else {
+            return way;
+        }
     }
     let lasts = product.lasts(&way.from, &way.moves, tried);
     if lasts.all < tried.within && lasts.overtaken.is_none() {
+        product.tied |= lasts.tied;
         return way;
     }
     match soonest(product, &way.from, tried, goal) {
         Soonest::Way(moves) => {
             way.moves = moves;
             let lasts = product.lasts(&way.from, &way.moves, tried);
+            product.tied |= lasts.tied;
             way.late = (lasts.all >= tried.within).then_some((lasts.all, lasts.timers));
         }
         Soonest::Nowhere(moves) => (way.reached, way.moves, way.overtaken) = (false, moves, lasts.overtaken),
@@ -246,7 +266,7 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
     }
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
     let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
-    Way { from, moves, reached: reached.is_some(), refused, failed, late: None, overtaken: None }
+    Way { from, moves, reached: reached.is_some(), refused, failed, late: None, overtaken: None, in_this_order: false }
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round

@@ -3,7 +3,7 @@
 
 use super::product::Product;
 use super::state::{Move, Next, State};
-use super::timers::{Timer, Waits, aged, takes};
+use super::timers::{Timer, Waits, aged, comes_behind, takes};
 use super::tried::{Goal, Tried};
 use crate::limits;
 use rustc_hash::FxHashSet;
@@ -18,6 +18,8 @@ pub(super) struct Lasts {
     pub timers: Vec<Timer>,
     /// It waits for the first, and the second is over before that and leads elsewhere.
     pub overtaken: Option<(Timer, Timer)>,
+    /// Something else is over at the same moment as what it waits for, and leads to another end.
+    pub tied: bool,
 }
 
 /// The way that lasts shortest.
@@ -40,17 +42,16 @@ impl Product<'_> {
 
     /// How long these moves last at least, and what they wait for.
     pub(super) fn lasts(&mut self, from: &State, moves: &[Next], tried: &Tried) -> Lasts {
-        let (mut waits, mut lasts) = (Waits::new(), Lasts { all: Duration::ZERO, timers: Vec::new(), overtaken: None });
+        let mut lasts = Lasts { all: Duration::ZERO, timers: Vec::new(), overtaken: None, tied: false };
+        let mut waits = Waits::new();
         let mut before = from;
         for next in moves {
             let (after, took) = self.waits_behind(before, next, &waits);
             if !took.is_zero() {
                 let timer = self.comes_by(next, &waits).map(|(_, timer)| timer);
-                let first = self
-                    .coming(before, tried, &waits)
-                    .iter()
-                    .filter_map(|next| self.comes_by(next, &waits))
-                    .min_by_key(|(at, _)| *at);
+                let coming = self.coming(before, tried, &waits);
+                let first = coming.iter().filter_map(|next| self.comes_by(next, &waits)).min_by_key(|(at, _)| *at);
+                lasts.tied = lasts.tied || coming.iter().any(|other| self.are_tied(before, (next, other), &waits));
                 let first = first.filter(|(at, _)| *at < took).map(|(_, first)| first);
                 lasts.overtaken = lasts.overtaken.or(timer.zip(first));
                 lasts.timers.extend(timer);
@@ -60,6 +61,26 @@ impl Product<'_> {
             before = &next.state;
         }
         lasts
+    }
+
+    /// Whether two moves come at the same moment and lead to different ends, since one of them takes away what the other waits for.
+    fn are_tied(&mut self, before: &State, (one, other): (&Next, &Next), waits: &Waits) -> bool {
+        let Some((first, second)) = self.comes_by(one, waits).zip(self.comes_by(other, waits)) else { return false };
+        if first.0 != second.0 || first.1 == second.1 || one.state == other.state {
+            return false;
+        }
+        let (behind_one, behind_other) =
+            (self.waits_behind(before, one, waits).0, self.waits_behind(before, other, waits).0);
+        let mut same = |first: &Next, second: &Next| {
+            let mut all = self.nexts(&first.state).all.into_iter();
+            all.any(|next| next.by == second.by && next.state == second.state)
+        };
+        match (comes_behind(&behind_one, second.1), comes_behind(&behind_other, first.1)) {
+            (true, true) => false,
+            (true, false) => !same(one, other),
+            (false, true) => !same(other, one),
+            (false, false) => true,
+        }
     }
 
     /// What comes in a state, by itself or from outside.

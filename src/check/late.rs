@@ -4,7 +4,7 @@
 //! somebody raises at once what leads on. Whoever raises something else may do so at any moment before.
 
 use super::explore::Graph;
-use super::places::{Places, quickest};
+use super::places::{Leg, Places, quickest};
 use super::state::Move;
 use crate::model::Finding;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -31,6 +31,11 @@ impl Add for Cost {
     }
 }
 
+/// Whether a leg comes when its time is over.
+fn comes_by_itself(leg: &Leg, by: Move) -> bool {
+    leg.reported || matches!(by, Move::Time(..))
+}
+
 /// How it goes on by itself: of each place by which leg, and the places with the farthest from the end first.
 pub(super) struct ByItself {
     legs: Vec<Option<usize>>,
@@ -39,13 +44,13 @@ pub(super) struct ByItself {
 
 impl Graph<'_, '_> {
     /// How it goes on to one of the `last` by itself, by edges that lead.
-    pub(super) fn by_itself(&self, places: &Places, last: Vec<usize>, leads: impl Fn(usize) -> bool) -> ByItself {
+    pub(super) fn by_itself(&self, places: &Places, last: Vec<usize>, leads: impl Fn(&Leg) -> bool) -> ByItself {
         let cost = |number: usize| {
             let leg = &places.legs[number];
             let by = self.edges[leg.edge].by;
-            let first = !matches!(by, Move::Time(..)) || places.due[leg.from].is_none_or(|due| leg.takes <= due);
-            let goes = first && !leg.late && leads(leg.edge);
-            goes.then(|| Cost(u32::from(matches!(by, Move::Event(_))), leg.takes, 1))
+            let first = !comes_by_itself(leg, by) || places.due[leg.from].is_none_or(|due| leg.takes <= due);
+            let goes = first && !leg.late && leads(leg);
+            goes.then(|| Cost(u32::from(matches!(by, Move::Event(_)) && !leg.reported), leg.takes, 1))
         };
         let (all, count) = (|| 0..places.legs.len(), places.list.len());
         let back = all().filter_map(|number| Some((places.legs[number].to, places.legs[number].from, cost(number)?)));
@@ -86,7 +91,7 @@ impl Graph<'_, '_> {
         let prolongs = |number: &usize| {
             let leg = &places.legs[*number];
             let itself = by_itself.legs[leg.from].map(|own| &places.legs[own]);
-            let waits = itself.filter(|own| matches!(self.edges[own.edge].by, Move::Time(..)));
+            let waits = itself.filter(|own| comes_by_itself(own, self.edges[own.edge].by));
             leg.late && counts(leg.edge) && waits.is_some_and(|own| on[leg.to] > on[own.to])
         };
         let mut out: Vec<Vec<usize>> = by_itself.legs.iter().map(|leg| leg.iter().copied().collect()).collect();

@@ -33,6 +33,7 @@ mod loss;
 mod members;
 mod monitors;
 mod nowhere;
+mod orders;
 mod outcome;
 mod outside;
 mod places;

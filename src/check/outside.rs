@@ -37,7 +37,11 @@ impl Product<'_> {
     /// What comes while some have not heard yet what came before: events from outside, also such as are waited for only behind that,
     /// and the times of those that have not moved since. One comes so: two at once show what comes of more.
     pub(super) fn comes_across(&mut self, state: &State, nexts: &mut Nexts) {
-        if state.across || state.inbox.len() + self.members.len() > limits::CHECK_INBOX {
+        if state.across {
+            return;
+        }
+        if state.inbox.len() + self.members.len() > limits::CHECK_INBOX {
+            self.overflow = true;
             return;
         }
         let state = State { across: true, ..state.clone() };

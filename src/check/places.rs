@@ -1,10 +1,11 @@
 //! What there is between the beginning of stopping and its end: states, with what is waited for there, and what leads from one to the
 //! next.
 
-use super::explore::Graph;
+use super::explore::{Barred, Graph};
 use super::state::{Failed, Move, Next};
-use super::timers::{Timer, Timers, Wait, Waits, aged, takes};
+use super::timers::{Timer, Timers, Wait, Waits, aged, comes_behind, takes};
 use crate::limits;
+use crate::model::{EventName, StepPattern};
 use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
@@ -21,6 +22,19 @@ pub(super) struct Leg {
     pub edge: usize,
     /// It comes at the last moment before a time leads on.
     pub late: bool,
+    /// It is an event that is sure to be reported.
+    pub reported: bool,
+}
+
+/// What edges have to do with time.
+#[derive(Default)]
+pub(super) struct Timed {
+    /// What they wait for; of an event what may report it.
+    pub timers: FxHashMap<usize, Timers>,
+    /// What is reported a time after them.
+    pub set_off: FxHashMap<usize, Vec<Timer>>,
+    /// Which states with a time of their own they leave and enter anew.
+    pub left: FxHashMap<usize, Vec<(usize, NodeId)>>,
 }
 
 /// What there is between the beginning of stopping and its end, with the times that run at once.
@@ -35,6 +49,8 @@ pub(super) struct Places {
     /// What never comes there, since something else is over before: from where, by which edge, how long it would take, and how
     /// long that does.
     pub overtaken: Vec<(usize, usize, Duration, Duration)>,
+    /// Somewhere two times are over at the same moment, and lead to different ends.
+    pub tied: bool,
 }
 
 impl Graph<'_, '_> {
@@ -46,6 +62,13 @@ impl Graph<'_, '_> {
             let edge = &self.edges[*number];
             if let Move::Time(number_of, event) = edge.by {
                 timers.insert(*number, Timers::from_iter([Timer::Time(usize::from(number_of), event)]));
+            } else if let (Move::Event(at), Some(Barred::Gone)) = (edge.by, edge.barred) {
+                let raises = |name: EventName| self.product.alike_to(at).any(|alike| alike == name);
+                let of = self.product.delayed().filter(|(_, reaction)| raises(reaction.raise));
+                let of: Timers = of.map(|(reaction, _)| Timer::Reports(reaction)).collect();
+                if !of.is_empty() {
+                    timers.insert(*number, of);
+                }
             } else if edge.by == Move::Answer && self.product.may_wait(&self.states[edge.from as usize]) {
                 answers.entry(edge.from).or_default().push(*number);
             }
@@ -61,6 +84,27 @@ impl Graph<'_, '_> {
             }
         }
         timers
+    }
+
+    /// Of these edges, what is reported a time after them.
+    pub(super) fn set_off(&mut self, edges: &[usize]) -> FxHashMap<usize, Vec<Timer>> {
+        let mut set_off: FxHashMap<usize, Vec<Timer>> = FxHashMap::default();
+        for (at, reaction) in self.product.delayed() {
+            let with = self.edges_with(edges.iter().copied(), &StepPattern::new(&reaction.after));
+            let of = edges.iter().filter(|number| with[**number]);
+            of.for_each(|number| set_off.entry(*number).or_default().push(Timer::Reports(at)));
+        }
+        set_off
+    }
+
+    /// What an edge waits for where this is to wait for: an event for what reports it first, if something does.
+    fn waits_of(&self, number: usize, timers: &FxHashMap<usize, Timers>, waits: &[Wait]) -> Timers {
+        let Some(all) = timers.get(&number) else { return Timers::new() };
+        if !matches!(self.edges[number].by, Move::Event(_)) {
+            return all.clone();
+        }
+        let first = waits.iter().filter(|wait| all.contains(&wait.timer)).min_by_key(|wait| wait.left);
+        first.map(|wait| wait.timer).into_iter().collect()
     }
 
     /// Of these edges, which states with a time of their own they leave and enter anew.
@@ -89,14 +133,20 @@ impl Graph<'_, '_> {
         &self,
         first: &[u32],
         edges: &[usize],
-        timers: &FxHashMap<usize, Timers>,
-        left: &FxHashMap<usize, Vec<(usize, NodeId)>>,
+        timed: &Timed,
         rests: impl Fn(u32) -> bool,
         late: &[bool],
     ) -> Option<Places> {
         let mut out: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
         edges.iter().for_each(|number| out.entry(self.edges[*number].from).or_default().push(*number));
-        let mut all = Places { list: Vec::new(), legs: Vec::new(), due: Vec::new(), first: 0, overtaken: Vec::new() };
+        let mut all = Places {
+            list: Vec::new(),
+            legs: Vec::new(),
+            due: Vec::new(),
+            first: 0,
+            overtaken: Vec::new(),
+            tied: false,
+        };
         let mut known: FxHashMap<(u32, Waits), usize> = FxHashMap::default();
         let mut open: VecDeque<usize> = VecDeque::new();
         let mut place = |at: u32, waits: Waits, all: &mut Places, open: &mut VecDeque<usize>| {
@@ -116,31 +166,60 @@ impl Graph<'_, '_> {
             }
             let (at, waits) = all.list[from].clone();
             let numbers = out.get(&at).into_iter().flatten().copied();
-            let of = |number: usize| timers.get(&number).map_or(&[][..], |timers| &timers[..]);
+            let of = |number: usize| self.waits_of(number, &timed.timers, &waits);
             // What is asked for may take longer than it has to.
             let sure = |number: &usize| of(*number).iter().any(|timer| !matches!(timer, Timer::Stands(_)));
-            let over = numbers.clone().filter(sure).map(|number| takes(of(number), &waits)).min();
+            let over = numbers.clone().filter(sure).map(|number| takes(&of(number), &waits)).min();
             let after = |number: usize, waits: &Waits| {
                 let edge = &self.edges[number];
                 let (before, after) = (&self.states[edge.from as usize], &self.states[edge.to as usize]);
-                let left = left.get(&number).map_or(&[][..], Vec::as_slice);
-                self.product.waits_after((before, of(number), after), left, waits)
+                let left = timed.left.get(&number).map_or(&[][..], Vec::as_slice);
+                let (mut still, took) = self.product.waits_after((before, &of(number), after), left, waits);
+                for timer in timed.set_off.get(&number).into_iter().flatten() {
+                    self.product.begins_anew(&mut still, *timer);
+                }
+                (still, took)
             };
+            let tied = |(one, other): (usize, usize)| {
+                let edge = |number: usize| &self.edges[number];
+                let same = |first: usize, second: usize| {
+                    let behind = out.get(&edge(first).to).into_iter().flatten();
+                    behind.into_iter().any(|at| edge(*at).by == edge(second).by && edge(*at).to == edge(second).to)
+                };
+                let comes = |first: usize, second: usize| {
+                    let behind = after(first, &waits).0;
+                    of(second).iter().all(|timer| comes_behind(&behind, *timer))
+                };
+                let differ = of(one) != of(other) && edge(one).to != edge(other).to;
+                differ
+                    && match (comes(one, other), comes(other, one)) {
+                        (true, true) => false,
+                        (true, false) => !same(one, other),
+                        (false, true) => !same(other, one),
+                        (false, false) => true,
+                    }
+            };
+            let at_once = |number: &usize| !of(*number).is_empty() && Some(takes(&of(*number), &waits)) == over;
+            let timed: Vec<usize> = numbers.clone().filter(at_once).collect();
+            let mut pairs =
+                timed.iter().enumerate().flat_map(|(at, one)| timed[..at].iter().map(|other| (*one, *other)));
+            all.tied = all.tied || pairs.any(tied);
             let due = over.filter(|_| rests(at));
             all.due.push(due);
             for edge in numbers {
                 let sooner = |timer: &Timer| waits.iter().any(|wait| wait.timer == *timer && wait.sooner);
-                let lasts = takes(of(edge), &waits);
+                let lasts = takes(&of(edge), &waits);
+                let reported = matches!(self.edges[edge].by, Move::Event(_)) && !of(edge).is_empty();
                 if let Some(over) = over.filter(|over| lasts > *over && !of(edge).iter().any(sooner)) {
                     all.overtaken.push((from, edge, lasts, over));
                     continue;
                 }
                 let (still, takes) = after(edge, &waits);
                 let to = place(self.edges[edge].to, still, &mut all, &mut open);
-                all.legs.push(Leg { from, to, takes, edge, late: false });
-                if let Some(due) = due.filter(|due| late[edge] && !due.is_zero()) {
+                all.legs.push(Leg { from, to, takes, edge, late: false, reported });
+                if let Some(due) = due.filter(|due| late[edge] && !reported && !due.is_zero()) {
                     let to = place(self.edges[edge].to, after(edge, &aged(&waits, due)).0, &mut all, &mut open);
-                    all.legs.push(Leg { from, to, takes: due, edge, late: true });
+                    all.legs.push(Leg { from, to, takes: due, edge, late: true, reported });
                 }
             }
         }

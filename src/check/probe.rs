@@ -10,7 +10,7 @@ use super::judge::Traced;
 use super::product::Product;
 use super::state::Failed;
 use crate::limits;
-use crate::model::Severity;
+use crate::model::{ConfigId, Severity};
 
 impl Graph<'_, '_> {
     /// Notes what was left out and matters. `found` is what is said already.
@@ -23,8 +23,11 @@ impl Graph<'_, '_> {
             self.cut(Bound::Across, Failed::Nothing);
         }
         self.product.crosses = false;
-        let listed = self.product.operator.iter().any(|id| !self.product.is_safe(*id));
-        if listed && self.differs(|product| product.by_hand = 2) {
+        let safe = |id: &ConfigId| self.product.is_safe(*id);
+        let (listed, safes) =
+            (self.product.operator.iter().any(|id| !safe(id)), self.product.operator.iter().any(safe));
+        // One that is safe is followed alone.
+        if listed && (safes || self.differs(|product| product.by_hand = 2)) {
             self.cut(Bound::Together, Failed::Nothing);
         }
         self.product.by_hand = 1;

@@ -70,6 +70,10 @@ pub struct Product<'a> {
     pub(super) standing: FxHashMap<ConfigId, Duration>,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
+    /// Two times were over at the same moment on a way up or down, and led to different ends.
+    pub(super) tied: bool,
+    /// A way up or down comes elsewhere in another order.
+    pub(super) unordered: bool,
     /// Events from outside, and times, come also before all have heard what came before.
     pub crosses: bool,
     /// So many frames of an operator are in force at once.
@@ -116,6 +120,8 @@ impl<'a> Product<'a> {
             never_down: false,
             standing: super::stands::standing(deployment),
             untimed: false,
+            tied: false,
+            unordered: false,
             unjudged: false,
             crosses: false,
             by_hand: 1,

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, Finding, Findings, StepFault};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, StepFault};
 use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;
@@ -58,8 +58,13 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
         findings.extend(unwatched::check(deployment, &universe, &charts));
         let of = |number| beside::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
+        let told: BTreeSet<EventName> = charts
+            .iter()
+            .flat_map(|chart| chart.raises())
+            .filter_map(|site| EventName::new(site.name.as_str()).ok())
+            .collect();
         for (view, chart) in views.iter().zip(&charts) {
-            findings.extend(coordinator::check(view, chart));
+            findings.extend(coordinator::check(view, chart, &told));
             findings.extend(unheard::check(view, chart));
             findings.extend(purity::check(view));
         }
@@ -110,7 +115,15 @@ fn follow(
     if product.untimed {
         left.insert(Bound::Times.told(Failed::Nothing, 0, effort.transitions));
     }
+    for (bound, _) in [(Bound::Ties, product.tied), (Bound::Turns, product.unordered)].iter().filter(|(_, is)| *is) {
+        left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
+        explored.complete = false;
+    }
     let groups = beside::groups(deployment, charts);
+    if groups.len() > 1 && !beside::by_operator(deployment).is_empty() {
+        left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
+        explored.complete = false;
+    }
     if beside::is_tied(deployment, charts, &groups) {
         left.insert(Bound::Tied.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
@@ -152,8 +165,11 @@ fn follow(
             if !minds {
                 graph.cut(Bound::Stopping, Failed::Nothing);
             }
-            if graph.goes_on_when_down() {
+            if graph.product.others && graph.goes_on_when_down(true) {
                 graph.cut(Bound::Apart, Failed::Nothing);
+            }
+            if graph.goes_on_when_down(false) {
+                graph.cut(Bound::Stale, Failed::Nothing);
             }
             if graph.product.worlds.squashes_mixed() {
                 graph.cut(Bound::Orders, Failed::Nothing);

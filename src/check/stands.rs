@@ -49,7 +49,11 @@ pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> (FxHashSet<ConfigId
             let strange = component.prefix() != configuration.id.prefix();
             free |= strange || !alone && !claimed.contains(&component) && beside;
         });
-        if !free {
+        // What nothing in the world makes true in its time is known, too.
+        let patience = configuration.timeout.unwrap_or(deployment.limits.step_timeout);
+        let nothing = System::new(Arc::default());
+        let never = || comes_true(&favoured(holds, true, &|_| false), &nothing, patience).is_none();
+        if !free || never() {
             all.insert(configuration.id);
         } else {
             left |= looks_at_states(holds) && by.iter().any(|(_, ids)| ids.contains(&configuration.id));

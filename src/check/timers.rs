@@ -47,12 +47,17 @@ pub(super) fn takes(timers: &[Timer], waits: &[Wait]) -> Duration {
     timers.iter().filter_map(|timer| left_of(*timer, waits)).max().unwrap_or_default()
 }
 
+/// Whether that is over at the moment from which this is to wait for.
+pub(super) fn comes_behind(waits: &[Wait], timer: Timer) -> bool {
+    waits.iter().any(|wait| wait.timer == timer && wait.left.is_zero())
+}
+
 /// So much time has passed without any of it being over.
 pub(super) fn aged(waits: &[Wait], by: Duration) -> Waits {
     waits.iter().map(|wait| Wait { left: wait.left.saturating_sub(by), ..*wait }).collect()
 }
 
-impl Product<'_> {
+impl<'a> Product<'a> {
     /// How long something lasts from its beginning.
     pub(super) fn lasts_whole(&self, timer: Timer) -> Duration {
         match timer {
@@ -169,17 +174,24 @@ impl Product<'_> {
         let left = self.left_by(before, next);
         let timers = self.timers_of(next, waits);
         let (mut after, took) = self.waits_after((before, &timers, &next.state), &left, waits);
-        if self.deployment.platform.as_str() == "simulated" {
-            let delayed = |(_, reaction): &(usize, &SimulatedReaction)| !reaction.delay.is_zero();
-            for (at, reaction) in self.deployment.reactions.iter().enumerate().filter(delayed) {
-                let timer = Timer::Reports(at);
-                if next.by == Move::Answer && self.does_step(before, next, &StepPattern::new(&reaction.after)) {
-                    after.retain(|wait| wait.timer != timer);
-                    after.push(Wait { timer, left: reaction.delay, sooner: false });
-                }
+        for (at, reaction) in self.delayed() {
+            if next.by == Move::Answer && self.does_step(before, next, &StepPattern::new(&reaction.after)) {
+                self.begins_anew(&mut after, Timer::Reports(at));
             }
         }
         (after, took)
+    }
+
+    /// What simulated components report a time after a step.
+    pub(super) fn delayed(&self) -> impl Iterator<Item = (usize, &'a SimulatedReaction)> + use<'a> {
+        let all = if self.deployment.platform.as_str() == "simulated" { &self.deployment.reactions[..] } else { &[] };
+        all.iter().enumerate().filter(|(_, reaction)| !reaction.delay.is_zero())
+    }
+
+    /// It is waited for from now on, also if it was before.
+    pub(super) fn begins_anew(&self, waits: &mut Waits, timer: Timer) {
+        waits.retain(|wait| wait.timer != timer);
+        waits.push(Wait { timer, left: self.lasts_whole(timer), sooner: false });
     }
 
     /// Whether such a step is done when these requests are carried out.

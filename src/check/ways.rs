@@ -49,9 +49,10 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
         let trace = if findings.is_empty() { Vec::new() } else { trace(product, ways) };
         found.extend(findings.into_iter().map(|finding| (finding, trace.clone())));
     }
+    let in_this_order = rise.in_this_order || fall.as_ref().is_some_and(|fall| fall.in_this_order);
     for (finding, _) in &mut found {
-        // What functions decide is not known here.
-        if !product.members.iter().all(|member| member.chart.is_pure()) {
+        // What functions decide is not known here, and in another order it comes there.
+        if in_this_order || !product.members.iter().all(|member| member.chart.is_pure()) {
             finding.severity = finding.severity.min(Severity::Warning);
         }
     }

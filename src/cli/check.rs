@@ -139,7 +139,7 @@ impl Run for Args {
         };
         out.line(format!("{name}: {verdict}{reach}"));
         report.left.iter().for_each(|left| out.line(format!("  {left}")));
-        for line in bounds(&explored, self.budget) {
+        for line in bounds(&explored, &read.deployment, self.budget) {
             out.line(out.paint(Style::Dim, format!("  {line}")));
         }
         Ok(exit)
@@ -250,7 +250,7 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
 }
 
 /// How far the coordinators were followed, and what was left out.
-fn bounds(explored: &Explored, budget: Budget) -> Vec<String> {
+fn bounds(explored: &Explored, deployment: &Deployment, budget: Budget) -> Vec<String> {
     let mut lines = Vec::new();
     if explored.states == 0 {
         return lines;
@@ -258,6 +258,14 @@ fn bounds(explored: &Explored, budget: Budget) -> Vec<String> {
     lines.push(format!(
         "at most {CHECK_FRAMES} frames of one configuration are in force ({CHECK_LEFT} where undoing failed)"
     ));
+    if deployment.coordinators.len() > 1 {
+        lines.push(
+            "at most one event from outside comes before all coordinators have heard what came before".to_owned(),
+        );
+    }
+    if deployment.operator_applies().next().is_some() {
+        lines.push("at most 2 frames of an operator are in force at once, or one that is safe".to_owned());
+    }
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };
         lines.push(format!(

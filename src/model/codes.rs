@@ -258,9 +258,9 @@ codes! {
          ask for at any time. `on_failure` says something else of failures. Leave it out.";
     CONF_SAFE_LETS_GO = "conf::safe_lets_go", "a safe configuration lets go of what another one has made safe",
         "Two safe configurations are alternatives (`group`), so that applying the second one undoes the first one's frame: what \
-         that has called, and what an operation takes back, is taken back before the second one acts. For that moment nothing is \
-         safe: where the first one brakes and the second one holds, the brakes open first. What both call is not taken back in \
-         between. Let the second one call it too, or leave the group out: frames of safe configurations may be in force together.";
+         that has called, and what an operation takes back, set, or brought to a run state is taken back before the second one acts. \
+         From that moment on it is not safe: where the first one brakes and the second one holds, the brakes open first. What both call \
+         is not taken back in between. Let the second one do it too, or leave the group out: frames of safe configurations may be in force together.";
     CONF_ALONE_IN_GROUP = "conf::alone_in_group", "a configuration is alone in its group, and another one is called nearly so",
         "Configurations of one `group` are alternatives: applying one replaces the frame of the one that is in force. This group has \
          only one configuration, which replaces nothing, and another group has nearly the same name: one of both is misspelt, as it \

@@ -445,10 +445,10 @@ fn what_commands_an_actuator_and_dies_is_noticed() {
 
 #[test]
 fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
-    let told = |halt: &str| {
+    let of = |stop: &str, halt: &str| {
         let configurations = format!(
             "base = Configuration {{ create(\"a\", \"Drive\") }},
-             stop = Configuration {{ safe = true, group = \"stopped\", operation_call(\"a.open\") }},
+             stop = Configuration {{ safe = true, group = \"stopped\", operation_call(\"a.open\"){stop} }},
              halt = Configuration {{ {halt} property_set(\"a.gain\", 0.0) }},"
         );
         let said = Small::new(&configurations, STATES, "").check();
@@ -456,6 +456,7 @@ fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
         assert!(found.iter().all(|finding| finding["severity"] == "warning"), "{:#}", said.0);
         found.iter().map(|finding| finding["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
+    let told = |halt: &str| of(", property_set(\"a.gain\", 0.0)", halt);
     let told_of = told("safe = true, group = \"stopped\",");
     assert_eq!(told_of.len(), 1, "{told_of:?}");
     assert!(told_of[0].starts_with("`halt` replaces `stop`") && told_of[0].contains("`a.close`"), "{told_of:?}");
@@ -463,6 +464,12 @@ fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
     assert_eq!(told("safe = true, group = \"stopped\", operation_call(\"a.open\"),"), [""; 0]);
     assert_eq!(told("safe = true,"), [""; 0]);
     assert_eq!(told("group = \"stopped\","), [""; 0]);
+    // What is set, and brought to a run state, is taken back as well.
+    let both = "safe = true, group = \"stopped\", operation_call(\"a.open\"),";
+    let (set, brought) =
+        (of("", both), of(", property_set(\"a.gain\", 1.0), post_conf_state = { \"a:stopped\" }", both));
+    assert!(set.len() == 1 && set[0].contains("lets go of what that has made safe: `a.gain` is set back"), "{set:?}");
+    assert!(brought.len() == 1 && brought[0].contains("the run state of `a` is taken back"), "{brought:?}");
 }
 
 /// What others may change meanwhile is not judged, and that is said.

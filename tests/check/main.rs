@@ -15,4 +15,5 @@ mod replayed;
 mod shown;
 mod stopping;
 mod support;
+mod sure;
 mod verdicts;

@@ -171,10 +171,10 @@ fn a_bound_hides_no_place_that_no_way_leads_down_from() {
     assert_eq!(messages, ["from `root.here` no way leads to `idle`"], "{:#}", said.0);
 }
 
-const BASE: &str = "base = Configuration { create('a', 'Drive') }";
+pub const BASE: &str = "base = Configuration { create('a', 'Drive') }";
 
 /// Up and down by `base`. `built` is where it comes when `base` is there, `stopped` when it is stopped in `up`; both end by themselves.
-fn by_base(built: &str, stopped: &str, more: &str) -> String {
+pub fn by_base(built: &str, stopped: &str, more: &str) -> String {
     format!(
         "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, leaving = state {{ entry = 'base.undo' }},
          failed = state {{}},
@@ -191,7 +191,7 @@ fn by_base(built: &str, stopped: &str, more: &str) -> String {
 }
 
 /// The messages of a code, and how a run ends that brings it up, does `then`, and takes it down.
-fn said_and_run(small: &Small, code: &str, then: &str) -> (Vec<String>, i32) {
+pub fn said_and_run(small: &Small, code: &str, then: &str) -> (Vec<String>, i32) {
     let said = small.check();
     let messages = said.of(code).iter().map(|found| found["message"].as_str().unwrap().to_owned()).collect();
     small.demo.write("run.lua", &format!("deploy('small.yaml')\nwait(0.1)\n{then}\n"));
