@@ -152,9 +152,18 @@ pub fn at_home(args: &[&str]) -> Ran {
     Ran::from(program(Path::new(env!("CARGO_MANIFEST_DIR")), args).output().expect("the program starts"))
 }
 
+/// What starts the tests may have had them ignore signals (a job of a script ignores SIGINT), and programs that they start would.
+fn hear_signals() {
+    for signal in [libc::SIGINT, libc::SIGQUIT, libc::SIGHUP, libc::SIGTERM] {
+        // SAFETY: the default disposition runs no code of ours.
+        unsafe { libc::signal(signal, libc::SIG_DFL) };
+    }
+}
+
 impl Demo {
     /// The demo as it stands above.
     pub fn new() -> Self {
+        hear_signals();
         let demo = Self { dir: TempDir::new().expect("a directory") };
         demo.write("deployment.yaml", DEPLOYMENT);
         demo.write("configurations.lua", CONFIGURATIONS);
