@@ -191,41 +191,4 @@ impl Drop for Watch {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::time::Duration;
-
-    /// What signals ask for that come after so many milliseconds.
-    fn asked(signals: &[(u64, i32)]) -> Vec<Asks> {
-        let mut seen = Seen::default();
-        let at = |ms: u64| Time(0) + Duration::from_millis(ms);
-        signals.iter().map(|(ms, signal)| seen.asks(*signal, at(*ms))).collect()
-    }
-
-    #[test]
-    fn one_cause_is_one_signal() {
-        use Asks::{Force, Leave, Nothing, Stop};
-        assert_eq!(asked(&[(0, SIGINT), (500, SIGINT), (1500, SIGINT)]), [Stop, Force, Leave]);
-        assert_eq!(asked(&[(0, SIGTERM), (150, SIGTERM)]), [Stop, Force]);
-        for pair in [[SIGINT, SIGINT], [SIGQUIT, SIGQUIT], [SIGTERM, SIGINT], [SIGHUP, SIGINT], [SIGINT, SIGHUP]] {
-            assert_eq!(asked(&[(0, pair[0]), (3, pair[1])]), [Stop, Nothing]);
-        }
-        // Who closes the window, at any time; then a person, or a deadline, goes on.
-        assert_eq!(
-            asked(&[(0, SIGHUP), (700, SIGHUP), (900, SIGXCPU), (1000, SIGTERM)]),
-            [Stop, Nothing, Nothing, Force]
-        );
-        assert_eq!(asked(&[(0, SIGINT), (900, SIGHUP)]), [Stop, Nothing]);
-    }
-
-    #[test]
-    fn a_key_that_is_held_down_does_not_end_it_at_once() {
-        for every in [33, 92, 120, 400] {
-            let held: Vec<(u64, i32)> =
-                std::iter::once(0).chain((0..50).map(|n| 500 + n * every)).map(|ms| (ms, SIGINT)).collect();
-            let asked = asked(&held);
-            assert_eq!(asked[..2], [Asks::Stop, Asks::Force]);
-            assert!(asked[2..].iter().all(|asked| *asked == Asks::Nothing), "{every} {asked:?}");
-        }
-    }
-}
+mod tests;
