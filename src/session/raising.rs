@@ -122,18 +122,20 @@ impl Session {
         self.junction().tell_leaving(self.configurator(), event);
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
         (held.len()..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
-        let mut unwatched = false;
-        let giving = self.junction().giving();
-        for part in held {
-            match part.coordinator.deliver(incoming) {
-                Ok(_) => continue,
-                // It waits already, and too many want to know what becomes of it.
-                Err(Refused::Full) => unwatched = true,
-                Err(Refused::Detached) => gone = true,
+        let (mut unwatched, mut missed) = (false, 0);
+        {
+            let _giving = self.junction().giving();
+            for part in held {
+                match part.coordinator.deliver(incoming) {
+                    Ok(_) => continue,
+                    // It waits already, and too many want to know what becomes of it.
+                    Err(Refused::Full) => unwatched = true,
+                    Err(Refused::Detached) => gone = true,
+                }
+                missed += 1;
             }
-            self.hub().taken_up(ticket, false);
         }
-        drop(giving);
+        (0..missed).for_each(|_| self.hub().taken_up(ticket, false));
         if gone && acted.is_none() {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });

@@ -65,6 +65,15 @@ impl Junction {
         lock(&self.giving)
     }
 
+    /// Gives an event to these. What becomes of it is told when all of them have it: whoever hears that may raise another one.
+    fn give(&self, hub: &Hub, to: Vec<Coordinator>, incoming: Incoming) {
+        let delivered: SmallVec<[_; 4]> = {
+            let _giving = self.giving();
+            to.iter().map(|coordinator| coordinator.deliver(incoming)).collect()
+        };
+        delivered.into_iter().for_each(|delivered| hub.taken(delivered));
+    }
+
     /// The coordinator that asks under that name.
     pub fn coordinator(&self, name: Requester) -> Option<Coordinator> {
         lock(&self.coordinators).iter().find(|(own, _)| *own == name).map(|(_, coordinator)| coordinator.clone())
@@ -244,10 +253,7 @@ impl ToConfigurator {
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
             .map(|(_, other)| other.clone())
             .collect();
-        let _giving = junction.giving();
-        for other in others {
-            self.hub.taken(other.deliver(junction.incoming(Class::Report, event)));
-        }
+        junction.give(&self.hub, others, junction.incoming(Class::Report, event));
     }
 
     fn deliver(&self, incoming: Incoming) {
@@ -273,10 +279,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
             hub.note(Happening::Lost { event: event.to_string(), reasons });
             // In whatever state they are: it answers nothing that was asked there.
-            let _giving = junction.giving();
-            for coordinator in junction.all() {
-                hub.taken(coordinator.deliver(Incoming::new(Class::Notice, event)));
-            }
+            junction.give(hub, junction.all(), Incoming::new(Class::Notice, event));
         }
         Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
         Progress::Recovered => {
@@ -348,10 +351,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         junction.tell_leaving(configurator, event);
         make_safe(hub, configurator, event, Class::Report);
     }
-    let _giving = junction.giving();
-    for coordinator in junction.all() {
-        hub.taken(coordinator.deliver(junction.incoming(Class::Report, event)));
-    }
+    junction.give(hub, junction.all(), junction.incoming(Class::Report, event));
 }
 
 /// What a safety event did that acted by itself.
