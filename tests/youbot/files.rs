@@ -110,6 +110,7 @@ fn every_deployment_is_followed_within_the_bounds() {
             "2 frames of one configuration",
             "each round leaves a frame more",
             "where frames have been squashed",
+            "which frames are squashed",
         ];
         let named = |line: &String| bounds.iter().any(|bound| line.contains(bound));
         assert!(report.left.iter().all(named), "{name}: {:?}", report.left);
