@@ -1,18 +1,25 @@
-//! `davit explain CODE`
+//! `davit explain CODE|KEY`
 
 use super::exit::Exit;
-use super::output::{Style, Table};
+use super::output::{Output, Style, Table, text_columns, wrapped};
 use super::{Answer, Context, Failure, Run};
+use crate::lang::schema::{self, Entry};
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
 use crate::model::finding::did_you_mean;
 use serde::Serialize;
 
-/// Explain a finding: what happened, why it is refused, what to do.
+/// Explain a finding (what happened, why it is refused, what to do), or a key of the files (what it means, its form, its unit, its
+/// bounds, what holds without it, how it is written).
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The finding's code, as `conf::unknown_component` or `davit::conf::unknown_component`; without one, all codes are
+    /// The finding's code, as `conf::unknown_component` or `davit::conf::unknown_component`; a key, as `timeout` or
+    /// `configuration.timeout`; a table, as `configuration`; a word of the monitors' language, as `above`. Without one, all codes are
     /// listed.
-    code: Option<String>,
+    #[arg(value_name = "CODE|KEY")]
+    what: Option<String>,
+    /// List all keys, tables and words instead of the codes.
+    #[arg(long, conflicts_with = "what")]
+    keys: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -34,59 +41,106 @@ impl From<&'static Page> for View {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let out = &context.out;
-        let Some(code) = self.code else {
-            if self.json {
-                out.json(&PAGES.iter().map(View::from).collect::<Vec<_>>());
-            } else {
-                let mut table = Table::new(0);
-                for page in PAGES {
-                    table.row([out.paint(Style::Name, page.code), page.title.to_owned()]);
-                }
-                out.text(table.to_string());
-            }
-            return Ok(Exit::Done);
-        };
-        let Some(page) = codes::page(&code) else {
-            let name = code.strip_prefix("davit::").unwrap_or(&code);
-            return Err(Failure::no(
-                CLI_UNKNOWN_CODE,
-                format!("there is no finding with the code `{code}`"),
-                format!(
-                    "{}; `davit explain` lists all codes",
-                    did_you_mean(name, "codes", PAGES.iter().map(|p| p.code.0))
-                ),
-            )
-            .as_json(self.json));
-        };
-        if self.json {
-            out.json(&View::from(page));
-        } else {
-            out.line(format!("{}: {}\n", out.paint(Style::Name, page.code), out.paint(Style::Bold, page.title)));
-            out.text(wrap(page.text, 100));
+        match (self.what, self.keys) {
+            (Some(what), _) => one(out, &what, self.json)?,
+            (None, true) => keys(out, self.json),
+            (None, false) => all(out, self.json),
         }
         Ok(Exit::Done)
     }
 }
 
-/// `text` in lines of at most `columns` characters; its own line breaks stay.
-fn wrap(text: &str, columns: usize) -> String {
-    let mut out = String::new();
-    for line in text.lines() {
-        let mut used = 0;
-        for word in line.split_whitespace() {
-            let long = word.chars().count();
-            if used > 0 && used + 1 + long > columns {
-                out.push('\n');
-                used = 0;
-            }
-            if used > 0 {
-                out.push(' ');
-                used += 1;
-            }
-            out.push_str(word);
-            used += long;
-        }
-        out.push('\n');
+fn all(out: &Output, json: bool) {
+    if json {
+        return out.json(&PAGES.iter().map(View::from).collect::<Vec<_>>());
     }
-    out
+    let mut table = Table::new(0);
+    for page in PAGES {
+        table.row([out.paint(Style::Name, page.code), page.title.to_owned()]);
+    }
+    out.text(table.to_string());
+}
+
+fn keys(out: &Output, json: bool) {
+    let entries: Vec<Entry> = schema::names().into_iter().flat_map(schema::about).collect();
+    if json {
+        return out.json(&entries);
+    }
+    let mut table = Table::new(0);
+    for entry in &entries {
+        table.row([out.paint(Style::Name, path(entry)), first_sentence(entry.doc).to_owned()]);
+    }
+    out.text(table.to_string());
+}
+
+/// What it is called where its name alone may mean several: `configuration.timeout`.
+fn path(entry: &Entry) -> String {
+    entry.of.map_or_else(|| entry.name.to_owned(), |of| format!("{of}.{}", entry.name))
+}
+
+fn first_sentence(text: &str) -> &str {
+    text.find(". ").map_or(text, |end| &text[..=end])
+}
+
+/// A code, else what can be written under that name.
+fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
+    if let Some(page) = codes::page(what) {
+        if json {
+            out.json(&View::from(page));
+        } else {
+            out.line(format!("{}: {}\n", out.paint(Style::Name, page.code), out.paint(Style::Bold, page.title)));
+            out.text(wrapped(page.text, text_columns(), 0));
+        }
+        return Ok(());
+    }
+    let entries = schema::about(what);
+    if entries.is_empty() {
+        return Err(unknown(what).as_json(json));
+    }
+    if json {
+        out.json(&entries);
+        return Ok(());
+    }
+    for (at, entry) in entries.iter().enumerate() {
+        if at > 0 {
+            out.line("");
+        }
+        out.text(shown(out, entry));
+    }
+    Ok(())
+}
+
+fn unknown(what: &str) -> Failure {
+    let name = what.strip_prefix("davit::").unwrap_or(what);
+    let (message, list) = match what.contains("::") {
+        true => (format!("there is no finding with the code `{what}`"), "`davit explain` lists all codes"),
+        false => (
+            format!("`{what}` is neither a code of a finding nor a key of a file"),
+            "`davit explain` lists all codes, `davit explain --keys` all keys",
+        ),
+    };
+    let known = PAGES.iter().map(|page| page.code.0).chain(schema::names());
+    Failure::no(CLI_UNKNOWN_CODE, message, format!("{}; {list}", did_you_mean(name, "codes and keys", known)))
+}
+
+/// What a key, a table or a word is, for people.
+fn shown(out: &Output, entry: &Entry) -> String {
+    let mark = if entry.required { " (required)" } else { "" };
+    let mut text = format!("{}{mark}\n", out.paint(Style::Name, path(entry)));
+    text.push_str(&wrapped(entry.doc, text_columns(), 2));
+    let mut line = |name: &str, value: &str| {
+        if !value.is_empty() {
+            let value = wrapped(value, text_columns(), 12);
+            text.push_str(&format!("  {:10}{}\n", format!("{name}:"), value.trim()));
+        }
+    };
+    line("form", &entry.form);
+    line("unit", entry.unit);
+    line("without", entry.default);
+    line("YAML", entry.example.yaml.as_deref().unwrap_or_default());
+    line("Lua", entry.example.lua.unwrap_or_default());
+    if let Some((refused, code)) = entry.refused {
+        line("refused", &format!("{refused}  ({code})"));
+    }
+    text
 }

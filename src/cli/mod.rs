@@ -33,6 +33,7 @@ mod remote;
 mod replay;
 mod request;
 mod run;
+mod schema;
 mod shutdown;
 mod signals;
 mod sim;
@@ -111,6 +112,7 @@ commands! {
     Drift = drift::Args,
     Recover = recover::Args,
     Commit = request::CommitArgs,
+    Schema = schema::Args,
     Explain = explain::Args,
     Completions = completions::Args,
 }

@@ -224,16 +224,64 @@ impl Display for Table {
         let widths: Vec<usize> = (0..columns)
             .map(|i| self.rows.iter().filter_map(|r| r.get(i)).map(|c| width(c)).max().unwrap_or(0))
             .collect();
+        let terminal = terminal_columns();
         for row in &self.rows {
             let mut line = " ".repeat(self.indent);
-            for (cell, wide) in row.iter().zip(&widths) {
-                line.push_str(cell);
-                line.push_str(&" ".repeat(wide - width(cell) + 2));
+            for (i, (cell, wide)) in row.iter().zip(&widths).enumerate() {
+                let at = width(&line);
+                let room = terminal.map_or(usize::MAX, |columns| columns.saturating_sub(at));
+                if i + 1 == row.len() && room >= LEAST_TEXT && width(cell) > room {
+                    // The last cell is a text: it goes on below itself.
+                    let inside = wrapped(cell, at + room, at);
+                    line.push_str(inside.trim());
+                } else {
+                    line.push_str(cell);
+                    line.push_str(&" ".repeat(wide - width(cell) + 2));
+                }
             }
             writeln!(f, "{}", line.trim_end())?;
         }
         Ok(())
     }
+}
+
+/// Fewest columns in which a text is still read.
+const LEAST_TEXT: usize = 16;
+
+/// How many columns the terminal has that is written to; none: it is no terminal.
+pub fn terminal_columns() -> Option<usize> {
+    terminal_size::terminal_size_of(io::stdout()).map(|(columns, _)| usize::from(columns.0)).filter(|n| *n > 0)
+}
+
+/// How long lines of text are: 100, or what the terminal has.
+pub fn text_columns() -> usize {
+    terminal_columns().map_or(100, |columns| columns.clamp(LEAST_TEXT, 100))
+}
+
+/// `text` in lines of at most `columns`, each behind `indent` blanks; its own line breaks stay.
+pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let mut used = 0;
+        for word in line.split_whitespace() {
+            let long = width(word);
+            if used > indent && used + 1 + long > columns {
+                out.push('\n');
+                used = 0;
+            }
+            if used == 0 {
+                out.push_str(&" ".repeat(indent));
+                used = indent;
+            } else {
+                out.push(' ');
+                used += 1;
+            }
+            out.push_str(word);
+            used += long;
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// Characters of `text` that a terminal shows.

@@ -109,13 +109,7 @@ impl Args {
 fn door(clock: &Clock) -> Door {
     let clock = clock.clone();
     Box::new(move |session| {
-        let words = |failure: Failure| {
-            let told = failure
-                .findings
-                .first()
-                .map(|found| format!("{}; {}", found.message, found.help.as_deref().unwrap_or_default()));
-            told.unwrap_or_else(|| "its control socket cannot be opened".to_owned())
-        };
+        let words = |failure: Failure| failure.message();
         let socket = super::deploy::open(session).map_err(words)?;
         session.hub().attach(socket.observer(&clock).map_err(super::deploy::short).map_err(words)?);
         Ok(Box::new(socket))

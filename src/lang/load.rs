@@ -2,11 +2,12 @@
 
 use super::concern;
 use super::files::{self, Sources};
+use super::grammar::{CONFIGURATIONS_FILE, COORDINATOR_FILE, MONITORS_FILE, Object};
 use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
 use super::params::Params;
 use super::scxml;
-use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::tree::{Cx, Entry, Fields, Kind, Node, Reading};
 use super::trusted::{self, Trust, Trusted};
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
@@ -201,11 +202,11 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params, options: &
                 return None;
             }
             if is("coordinator") {
-                (None, only_key(cx, node, reading, "coordinator", "a coordinator's file"), None)
+                (None, only_key(cx, node, reading, &COORDINATOR_FILE), None)
             } else if is("monitors") {
-                (None, None, only_key(cx, node, reading, "monitors", "a file of monitors"))
+                (None, None, only_key(cx, node, reading, &MONITORS_FILE))
             } else {
-                (only_key(cx, node, reading, "configurations", "a file of configurations"), None, None)
+                (only_key(cx, node, reading, &CONFIGURATIONS_FILE), None, None)
             }
         }
     };
@@ -283,7 +284,7 @@ fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
             let after = cx.findings.len();
-            let configurations = only_key(cx, node, reading, "configurations", "a file of configurations")?;
+            let configurations = only_key(cx, node, reading, &CONFIGURATIONS_FILE)?;
             // Of the file as a whole is what was found after it was read.
             let of_file = cx.findings.split_off(after);
             concern::by_place(cx, before, &configurations);
@@ -307,7 +308,7 @@ fn monitor_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, para
         Language::Scxml => only_charts(cx, reading, "monitors"),
         Language::Yaml => {
             let node = yaml::read(cx, reading)?;
-            only_key(cx, node, reading, "monitors", "a file of monitors")
+            only_key(cx, node, reading, &MONITORS_FILE)
         }
     }
 }
@@ -327,13 +328,13 @@ fn nothing(cx: &mut Cx, reading: Reading, what: &str, how: &str) {
 }
 
 /// The value of a file's one top-level key.
-fn only_key(cx: &mut Cx, node: Node, reading: Reading, key: &'static str, what: &'static str) -> Option<Node> {
+fn only_key(cx: &mut Cx, node: Node, reading: Reading, file: &'static Object) -> Option<Node> {
     let node = match node.kind {
         Kind::Null => Node::new(Kind::Map(Vec::new()), reading.whole),
         _ => node,
     };
-    let mut fields = super::tree::Fields::of(cx, node, what, &format!("{key}: …"))?;
-    let value = fields.required(cx, key, &format!("{key}: …"));
+    let mut fields = Fields::of(cx, node, file)?;
+    let value = fields.needed(cx, file.keys[0].name, |_, _| format!("add `{}`", file.example));
     fields.finish(cx);
     value
 }
@@ -387,7 +388,7 @@ fn coordinator(
         (Language::Scxml, _) => return scxml::read(cx, reading).map(|chart| (chart, None)),
         (Language::Yaml, _) => {
             let node = yaml::read(cx, reading)?;
-            only_key(cx, node, reading, "coordinator", "a coordinator's file")?
+            only_key(cx, node, reading, &COORDINATOR_FILE)?
         }
     };
     chart::statechart(cx, node).map(|chart| (chart, None))
@@ -413,7 +414,7 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
     let mut params = Params::new(cx, draft.with, &options.set);
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let mut configurations = Vec::new();
-    for (file, named_at) in draft.configurations.iter().flatten() {
+    for (file, named_at) in &draft.configurations {
         if let Some(node) = configuration_tree(cx, from, &folder.join(file), *named_at, &mut params) {
             let of_file = configuration::configurations(cx, node);
             if configurations.is_empty() {

@@ -8,12 +8,14 @@
 mod concern;
 mod convert;
 mod files;
+pub mod grammar;
 mod left_out;
 mod load;
 mod lower;
 mod lua;
 mod params;
 pub mod print;
+pub mod schema;
 mod scxml;
 mod slips;
 mod spelling;

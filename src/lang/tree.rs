@@ -1,5 +1,6 @@
 //! The loose tree both languages are read into: shapes and places, no meaning yet.
 
+use super::grammar::{Key, Languages, Object};
 use super::spelling::as_yaml;
 use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
@@ -154,10 +155,10 @@ impl Cx {
     }
 }
 
-/// The fields of a table while it is lowered: each is taken once, what remains is unknown.
+/// The fields of a table while it is lowered: each is taken once, what remains is unknown. What they are, their forms, bounds
+/// and examples are those of the table's rows ([`grammar`](super::grammar)).
 pub struct Fields {
-    /// What the table is, for messages: `a configuration`.
-    what: &'static str,
+    object: &'static Object,
     /// Its place.
     pub origin: Origin,
     entries: Vec<Option<Entry>>,
@@ -166,52 +167,68 @@ pub struct Fields {
 
 impl Fields {
     /// The fields of a table.
-    pub fn new(what: &'static str, origin: Origin, entries: Vec<Entry>) -> Self {
-        Self { what, origin, entries: entries.into_iter().map(Some).collect(), asked: Vec::new() }
+    pub fn new(object: &'static Object, origin: Origin, entries: Vec<Entry>) -> Self {
+        Self { object, origin, entries: entries.into_iter().map(Some).collect(), asked: Vec::new() }
     }
 
     /// The fields of a node, or a finding that it has none.
-    pub fn of(cx: &mut Cx, node: Node, what: &'static str, example: &str) -> Option<Self> {
+    pub fn of(cx: &mut Cx, node: Node, object: &'static Object) -> Option<Self> {
         match node.kind {
-            Kind::Map(entries) | Kind::Made(_, entries, _) => Some(Self::new(what, node.origin, entries)),
-            Kind::List(list) if list.is_empty() => Some(Self::new(what, node.origin, Vec::new())),
+            Kind::Map(entries) | Kind::Made(_, entries, _) => Some(Self::new(object, node.origin, entries)),
+            Kind::List(list) if list.is_empty() => Some(Self::new(object, node.origin, Vec::new())),
+            Kind::Null if object.may_be_empty => Some(Self::new(object, node.origin, Vec::new())),
             _ => {
-                cx.wrong(&node, what, "a table of named values", example);
+                cx.wrong(&node, object.what, "a table of named values", object.example);
                 None
             }
         }
     }
 
     /// What the table is.
-    pub fn what(&self) -> &'static str {
-        self.what
+    pub fn object(&self) -> &'static Object {
+        self.object
+    }
+
+    /// The row of a key.
+    pub fn row(&self, key: &str) -> &'static Key {
+        self.object.key(key).unwrap_or_else(|| panic!("the table of {} has no row `{key}`", self.object.what))
     }
 
     /// Takes a field with its name's place.
     pub fn take_entry(&mut self, key: &'static str) -> Option<Entry> {
+        debug_assert!(self.object.key(key).is_some(), "the table of {} has no row `{key}`", self.object.what);
         self.asked.push(key);
         self.entries.iter_mut().find(|e| e.as_ref().is_some_and(|e| e.key == key)).and_then(Option::take)
     }
 
-    /// Takes a field.
-    pub fn take(&mut self, key: &'static str) -> Option<Node> {
+    /// Where the name of a field stands that was not taken.
+    pub fn place(&self, key: &str) -> Option<Origin> {
+        self.entries.iter().flatten().find(|entry| entry.key == key).map(|entry| entry.origin)
+    }
+
+    /// Whether a field is there, and not taken.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.iter().flatten().any(|entry| entry.key == key)
+    }
+
+    /// Takes a field. One that must be there and is not gives a finding.
+    pub fn take(&mut self, cx: &mut Cx, key: &'static str) -> Option<Node> {
+        let row = self.row(key);
+        if row.required {
+            return self.needed(cx, key, |cx, origin| format!("add `{}`", cx.spelt(origin, row.example)));
+        }
         self.take_entry(key).map(|entry| entry.value)
     }
 
-    /// Takes a field that must be there; a finding where it is not.
-    pub fn required(&mut self, cx: &mut Cx, key: &'static str, example: &str) -> Option<Node> {
-        self.needed(cx, key, |cx, origin| format!("add `{}`", cx.spelt(origin, example)))
-    }
-
-    /// The same with the help that tells how it is written.
+    /// Takes a field that must be there, with the help that tells how it is written.
     pub fn needed(&mut self, cx: &mut Cx, key: &'static str, help: impl Fn(&Cx, Origin) -> String) -> Option<Node> {
-        let field = self.take(key);
+        let field = self.take_entry(key).map(|entry| entry.value);
         if field.is_none() {
             // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
             if !self.misspelt(key) {
                 let help = help(cx, self.origin);
                 cx.report(
-                    Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.what))
+                    Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.object.what))
                         .at(self.origin)
                         .labelled(format!("without `{key}`"))
                         .help(help),
@@ -226,25 +243,35 @@ impl Fields {
         self.entries
             .iter()
             .flatten()
-            .any(|e| !self.asked.contains(&&*e.key) && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8)
+            .any(|e| self.object.key(&e.key).is_none() && strsim::jaro_winkler(&e.key.to_lowercase(), key) > 0.8)
     }
 
     /// Reports what was not taken.
     pub fn finish(self, cx: &mut Cx) {
-        let Self { what, entries, asked, .. } = self;
+        let Self { object, entries, asked, .. } = self;
+        let untaken = |key: &&Key| key.language == Languages::All && !asked.contains(&key.name);
+        debug_assert!(
+            object.keys.iter().find(untaken).is_none(),
+            "{}: nobody reads `{:?}`",
+            object.what,
+            object.keys.iter().find(untaken)
+        );
         for entry in entries.into_iter().flatten().filter(|e| !matches!(e.value.kind, Kind::Poison)) {
             if asked.contains(&&*entry.key) {
                 cx.report(
-                    Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{}` stands twice in {what}", entry.key))
-                        .at(entry.origin)
-                        .help("keep one of them"),
+                    Finding::error(
+                        codes::TEXT_DUPLICATE_KEY,
+                        format!("`{}` stands twice in {}", entry.key, object.what),
+                    )
+                    .at(entry.origin)
+                    .help("keep one of them"),
                 );
                 continue;
             }
             let origin = cx.part(entry.origin, &entry.key);
-            let help = did_you_mean(&entry.key, "keys", asked.iter().copied());
+            let help = did_you_mean(&entry.key, "keys", object.names());
             cx.report(
-                Finding::error(codes::TEXT_UNKNOWN_KEY, format!("{what} has no `{}`", entry.key))
+                Finding::error(codes::TEXT_UNKNOWN_KEY, format!("{} has no `{}`", object.what, entry.key))
                     .at(origin)
                     .labelled("unknown key")
                     .help(help),

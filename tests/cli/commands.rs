@@ -39,7 +39,8 @@ fn usage_and_unreadable_input_are_status_2() {
 #[test]
 fn the_help_of_every_command_says_what_it_does() {
     let help = at_home(&["--help"]).out;
-    for command in ["check", "plan", "graph", "types", "convert", "sim", "monitor", "explain", "completions"] {
+    for command in ["check", "plan", "graph", "types", "convert", "sim", "monitor", "schema", "explain", "completions"]
+    {
         assert!(help.contains(command), "{help}");
         let own = at_home(&[command, "--help"]).out;
         assert!(own.contains("Usage: davit"), "{own}");
@@ -59,6 +60,41 @@ fn explain_lists_and_explains_every_code() {
     assert_eq!(unknown.code, 1);
     assert!(unknown.err.contains("coord::stuck"), "{}", unknown.err);
     assert_eq!(at_home(&["explain", "coord::stuck", "--json"]).json()["code"], "coord::stuck");
+}
+
+#[test]
+fn explain_tells_what_a_key_means() {
+    let timeout = at_home(&["explain", "timeout"]);
+    assert_eq!(timeout.code, 0, "{}", timeout.err);
+    for part in ["configuration.timeout", "in seconds", "timeout = 0.5", "timeout: 0.5", "text::bad_time"] {
+        assert!(timeout.out.contains(part), "{part}: {}", timeout.out);
+    }
+    let several = at_home(&["explain", "moves", "--json"]).json();
+    let of: Vec<_> = several.as_array().unwrap().iter().map(|entry| entry["of"].as_str().unwrap()).collect();
+    assert_eq!(of, ["type", "operation"]);
+    assert_eq!(at_home(&["explain", "operation.moves", "--json"]).json().as_array().unwrap().len(), 1);
+    assert!(at_home(&["explain", "for_at_least"]).out.contains("a condition"));
+    let unknown = at_home(&["explain", "timeut"]);
+    assert!(unknown.code == 1 && unknown.err.contains("did you mean `timeout`?"), "{}", unknown.err);
+    let keys = at_home(&["explain", "--keys"]);
+    assert!(keys.out.contains("deploy.within_s") && !keys.out.contains("durability"), "{}", keys.out);
+}
+
+#[test]
+fn schema_writes_what_editors_need() {
+    let demo = Demo::new();
+    for kind in ["deployment", "configurations", "coordinator", "monitors"] {
+        let ran = demo.run(&["schema", kind]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        assert!(ran.json()["properties"].is_object(), "{}", ran.out);
+        let page = demo.run(&["schema", kind, "--markdown"]);
+        assert!(page.out.starts_with(&format!("# Reference: {kind}\n")), "{}", page.out);
+    }
+    assert_eq!(demo.run(&["schema"]).json()["properties"]["platform"]["type"], "string");
+    assert_eq!(demo.run(&["schema", "lua", "-o", "davit.lua"]).code, 0);
+    assert!(demo.read("davit.lua").contains("function property_set(property, value) end"));
+    let unknown = demo.run(&["schema", "deploymnt"]);
+    assert!(unknown.code == 2 && unknown.err.contains("deployment"), "{}", unknown.err);
 }
 
 #[test]

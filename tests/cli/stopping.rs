@@ -434,7 +434,10 @@ fn a_scripts_deployment_has_its_name() {
             ran.err
         );
     }
-    assert_eq!(demo.run(&["apply", "fast", "--force"]).code, 0);
+    let raised = demo.run(&["event", "e_fast", "--wait", "fast.ok", "--within", "80"]);
+    assert_eq!(raised.code, 0, "{}{}", raised.out, raised.err);
+    let listed = demo.run(&["list"]);
+    assert!(listed.code == 0 && listed.out.contains("demo"), "{}{}", listed.out, listed.err);
     let ran = demo.run(&["shutdown"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
     assert_eq!(running.end().code(), Some(1), "{}", demo.read("err"));

@@ -4,5 +4,6 @@ mod helpers;
 mod hostile;
 mod listings;
 mod monitors;
+mod reference;
 mod round_trip;
 mod typos;

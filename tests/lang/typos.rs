@@ -89,7 +89,7 @@ fn deployment_keys_names_and_values() {
         ("step: \"start A\"", "stp: \"start A\"", "text::unknown_key 23:12", "`step`"),
         ("how: fail", "how: fial", "text::bad_value 23:34", "`fail`"),
         (", how: fail", "", "text::missing_key 23:10", "how: fail"),
-        ("times: 2", "times: 0", "text::bad_value 23:47", "times: 1"),
+        ("times: 2", "times: 0", "text::bad_value 23:47", "times: 2"),
         (
             "safety: [e_estop]",
             "durability: full",
@@ -309,7 +309,7 @@ fn examples_are_in_the_language_of_the_file() {
     let lua = [
         ("connect(\"A.y\", \"B.u\", { buffer = 8 })", "connect(\"A.y\")", "text::missing_key 6:5", "`connect(\"Kin."),
         ("\"Gain\",", "nil,", "text::missing_key 5:5", "`create("),
-        ("event = \"e_ok\", ", "", "text::missing_key 3:5", "`confirm = { event"),
+        ("event = \"e_ok\", ", "", "text::missing_key 3:5", "`event = \"e_aligned\"`"),
         ("within = 2.0", "within = true", "text::wrong_type 3:33", "`within = 2.0`"),
         ("'A:stopped'", "'A'", "conf::bad_state 4:24", "`{ 'compA:running'"),
     ];
@@ -328,7 +328,7 @@ fn examples_are_in_the_language_of_the_file() {
 ";
     let table = [
         ("timeout: 0.5", "timeout: half", "text::bad_time 3:14", "`timeout: 0.5`"),
-        ("event: e_ok, ", "", "text::missing_key 4:14", "`confirm: { event: e_aligned"),
+        ("event: e_ok, ", "", "text::missing_key 4:14", "`event: e_aligned`"),
         ("within: 2.0", "within: true", "text::wrong_type 4:37", "`within: 2.0`"),
         ("above: [A.y, 1.0]", "above: [A.y]", "monitor::arguments 5:14", "`{ above: [A.x, 2.0] }`"),
         ("holds: { above: [A.y, 1.0] }", "holds: 3", "text::wrong_type 5:12", "`{ above: [A.x, 2.0] }`"),
@@ -336,7 +336,7 @@ fn examples_are_in_the_language_of_the_file() {
         ("[\"A:stopped\"]", "{ A: stopped, B: stopped }", "conf::keyed_entries 6:21", "[\"A:stopped\", \"B:stopped\"]"),
         ("[\"A:stopped\"]", "3", "text::wrong_type 6:21", "[\"compA:running\""),
         (", to: B.u", "", "text::missing_key 8:18", "`to: Dynamics.jacobian`"),
-        ("buffer: 8", "buffer: 0", "text::bad_value 8:58", "`{ buffer: 64 }`"),
+        ("buffer: 8", "buffer: 0", "text::bad_value 8:58", "`buffer: 64`"),
         (
             "- create: { component: A, type: Gain, properties: { k: 1.0 } }",
             "- 3",

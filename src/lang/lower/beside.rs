@@ -3,8 +3,9 @@
 //! A state is written `STATE`, or `COORDINATOR:STATE` where there are several coordinators. A state without a coordinator's
 //! name is meant of every coordinator that is not named with one of its own.
 
-use super::deployment::{DEPLOY, SHUTDOWN, names};
-use super::{Unit, name, one_or_more, text, time};
+use super::deployment::names;
+use super::{name, text};
+use crate::lang::grammar::{DEPLOY, SHUTDOWN};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
@@ -36,34 +37,36 @@ pub struct Fall {
     rest: Vec<(ConfigId, Origin)>,
 }
 
-const ONE: &str = "coordinator: coordinator.lua";
-const SEVERAL: &str = "coordinators: { arm: arm.lua, gripper: gripper.lua }";
-
 /// `coordinator` and `coordinators`.
 pub fn coordinators(cx: &mut Cx, fields: &mut Fields) -> Vec<(Option<Ident>, String, Origin)> {
     let mut out: Vec<(Option<Ident>, String, Origin)> = Vec::new();
-    let several = fields.take("coordinators");
-    let one = if several.is_some() { fields.take("coordinator") } else { fields.required(cx, "coordinator", ONE) };
+    let (one_row, several_row) = (fields.row("coordinator"), fields.row("coordinators"));
+    let several = fields.take(cx, "coordinators");
+    let one = if several.is_some() {
+        fields.take(cx, "coordinator")
+    } else {
+        fields.needed(cx, "coordinator", |_, _| format!("add `{}`", one_row.example))
+    };
     if let Some(node) = one
-        && let Some(path) = text(cx, &node, "`coordinator`", ONE)
+        && let Some(path) = text(cx, &node, "`coordinator`", one_row.example)
     {
         out.push((None, path, node.origin));
     }
     let Some(several) = several else { return out };
     let Kind::Map(entries) = several.kind else {
-        cx.wrong(&several, "`coordinators`", "a table of files by name", SEVERAL);
+        cx.wrong(&several, "`coordinators`", "a table of files by name", several_row.example);
         return out;
     };
     for entry in entries {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let ident = name::<Ident>(cx, &key, "a coordinator", SEVERAL);
-        if let (Some(ident), Some(path)) = (ident, text(cx, &entry.value, "a coordinator", SEVERAL)) {
+        let ident = name::<Ident>(cx, &key, "a coordinator", several_row.example);
+        if let (Some(ident), Some(path)) = (ident, text(cx, &entry.value, "a coordinator", several_row.example)) {
             out.push((Some(ident), path, entry.origin));
         }
     }
     if out.is_empty() && !crate::model::finding::has_errors(&cx.findings) {
         let finding = Finding::error(codes::TEXT_BAD_VALUE, "`coordinators` names none").at(several.origin);
-        cx.report(finding.help(format!("write at least one: `{SEVERAL}`")));
+        cx.report(finding.help(format!("write at least one: `{}`", several_row.example)));
     }
     out
 }
@@ -85,39 +88,32 @@ fn state(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<Named> {
     Some(Named { coordinator, state: state.to_owned(), origin: node.origin })
 }
 
-fn states(cx: &mut Cx, node: Option<Node>, what: &str, example: &str) -> Vec<Named> {
-    let nodes = node.map(one_or_more).unwrap_or_default();
-    nodes.iter().filter_map(|node| state(cx, node, what, example)).collect()
+fn states(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<Named> {
+    let what = format!("`{}.{key}`", fields.object().name);
+    let nodes = fields.several(cx, key);
+    nodes.iter().filter_map(|node| state(cx, node, &what, fields.row(key).example)).collect()
 }
 
 /// `deploy`
 pub fn rise(cx: &mut Cx, node: Node) -> Option<Rise> {
-    let mut fields = Fields::of(cx, node, "`deploy`", DEPLOY)?;
-    let event = fields.required(cx, "event", "event: e_start");
-    let event = event.and_then(|node| name::<EventName>(cx, &node, "`deploy.event`", "event: e_start"));
-    let up = fields.required(cx, "up", "up: operational");
-    let up = states(cx, up, "`deploy.up`", "up: operational");
-    let failed = fields.take("failed");
-    let failed = states(cx, failed, "`deploy.failed`", "failed: [fault]");
-    let within = fields.required(cx, "within_s", "within_s: 20");
-    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
+    let mut fields = Fields::of(cx, node, &DEPLOY)?;
+    let event = fields.name(cx, "event");
+    let up = states(cx, &mut fields, "up");
+    let failed = states(cx, &mut fields, "failed");
+    let within = fields.time(cx, "within_s");
     fields.finish(cx);
     Some(Rise { event: event?, up, failed, within: within? })
 }
 
 /// `shutdown`
 pub fn fall(cx: &mut Cx, node: Node) -> Option<Fall> {
-    let mut fields = Fields::of(cx, node, "`shutdown`", SHUTDOWN)?;
-    let event = fields.required(cx, "event", "event: e_shutdown");
-    let event = event.and_then(|node| name::<EventName>(cx, &node, "`shutdown.event`", "event: e_shutdown"));
-    let down = fields.required(cx, "down", "down: idle");
-    let down = states(cx, down, "`shutdown.down`", "down: idle");
-    let within = fields.required(cx, "within_s", "within_s: 20");
-    let within = within.and_then(|node| time(cx, &node, "`within_s`", Unit::Seconds, "within_s: 20"));
-    let rest = fields.take("rest");
-    let rest = rest.map(|node| names(cx, node, "`shutdown.rest`", "a configuration", "rest: [park]"));
+    let mut fields = Fields::of(cx, node, &SHUTDOWN)?;
+    let event = fields.name(cx, "event");
+    let down = states(cx, &mut fields, "down");
+    let within = fields.time(cx, "within_s");
+    let rest = names(cx, &mut fields, "rest", "`shutdown.rest`");
     fields.finish(cx);
-    Some(Fall { event: event?, down, within: within?, rest: rest.unwrap_or_default() })
+    Some(Fall { event: event?, down, within: within?, rest })
 }
 
 /// Gives each coordinator its states. `own` is the name of the deployment, and of a coordinator without one.

@@ -13,7 +13,8 @@
 //!     - { src: idle, tgt: copying, events: [e_aligned], effect: e_seen, pn: 1 }
 //! ```
 
-use super::{name, number, one_or_more, text, truth};
+use super::{name, text, truth};
+use crate::lang::grammar::{CONNECTOR, STATE, TRANSITION};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::limits;
 use crate::model::statechart::{self, Action, Connector, ROOT, State, Statechart, Transition, Trigger};
@@ -58,23 +59,17 @@ fn state(cx: &mut Cx, name: Ident, node: Node, depth: usize) -> Option<State> {
     out.transitions = transitions.into_iter().filter_map(|node| transition(cx, node)).collect();
     out.entry = actions(cx, &mut fields, "entry");
     out.exit = actions(cx, &mut fields, "exit");
-    if let Some(node) = fields.take("config") {
-        for node in one_or_more(node) {
-            let id = self::name::<ConfigId>(cx, &node, "`config`", "config = \"enable_copying\"");
-            let place = cx.place(&node);
-            out.config.extend(id.map(|id| (id, place)));
-        }
+    for node in fields.several(cx, "config") {
+        let id = self::name::<ConfigId>(cx, &node, "`config`", fields.row("config").example);
+        let place = cx.place(&node);
+        out.config.extend(id.map(|id| (id, place)));
     }
-    if let Some(node) = fields.take("doo") {
+    if let Some(node) = fields.take(cx, "doo") {
         function(cx, &node, "`doo`");
     }
-    out.doc = doc(cx, &mut fields);
+    out.doc = fields.text(cx, "doc");
     fields.finish(cx);
     Some(out)
-}
-
-fn doc(cx: &mut Cx, fields: &mut Fields) -> Option<String> {
-    fields.take("doc").and_then(|node| text(cx, &node, "`doc`", "doc = \"what it is for\""))
 }
 
 /// A Lua state: values made by `state` and `conn` are children whatever their key, by `trans` transitions whatever
@@ -104,31 +99,25 @@ fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root
             _ => others.push(entry),
         }
     }
-    Parts { fields: Fields::new("a state", origin, others), children, transitions }
+    Parts { fields: Fields::new(&STATE, origin, others), children, transitions }
 }
 
 fn of_yaml(cx: &mut Cx, node: Node) -> Option<Parts> {
-    const EXAMPLE: &str = "idle: { entry: e_idle }";
-    let node = match node.kind {
-        // `idle:` alone is a state with nothing in it.
-        Kind::Null => Node::new(Kind::Map(Vec::new()), node.origin),
-        _ => node,
-    };
-    let mut fields = Fields::of(cx, node, "a state", EXAMPLE)?;
-    let children = match fields.take("states").map(|node| (node.origin, node)) {
+    let mut fields = Fields::of(cx, node, &STATE)?;
+    let children = match fields.take(cx, "states").map(|node| (node.origin, node)) {
         None => Vec::new(),
         Some((_, Node { kind: Kind::Map(entries), .. })) => entries,
         Some((_, Node { kind: Kind::List(list), .. })) if list.is_empty() => Vec::new(),
         Some((_, node)) => {
-            cx.wrong(&node, "`states`", "a table of named values", "states: { idle: {}, busy: {} }");
+            cx.wrong(&node, "`states`", "a table of named values", fields.row("states").example);
             Vec::new()
         }
     };
-    let transitions = match fields.take("transitions") {
+    let transitions = match fields.take(cx, "transitions") {
         None => Vec::new(),
         Some(Node { kind: Kind::List(list), .. }) => list,
         Some(node) => {
-            cx.wrong(&node, "`transitions`", "a list", "transitions: [{ src: initial, tgt: idle }]");
+            cx.wrong(&node, "`transitions`", "a list", fields.row("transitions").example);
             Vec::new()
         }
     };
@@ -156,14 +145,14 @@ fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
     }
     let origin = value.origin;
     let node = if is_connector {
-        let mut fields = Fields::of(cx, value, "a connector", "choice: { connector: true }")?;
-        if let Some(node) = fields.take("connector")
-            && truth(cx, &node, "`connector`", "connector: true") == Some(false)
+        let mut fields = Fields::of(cx, value, &CONNECTOR)?;
+        if let Some(Entry { value: node, .. }) = fields.take_entry("connector")
+            && truth(cx, &node, "`connector`", fields.row("connector").example) == Some(false)
         {
             let finding = Finding::error(codes::TEXT_BAD_VALUE, "`connector` can only be true").at(node.origin);
             cx.report(finding.help("a state is written without this key"));
         }
-        let doc = doc(cx, &mut fields);
+        let doc = fields.text(cx, "doc");
         fields.finish(cx);
         ident.map(|name| statechart::Node::Connector(Connector { name, doc, origin }))
     } else {
@@ -176,7 +165,6 @@ fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
 }
 
 fn transition(cx: &mut Cx, node: Node) -> Option<Transition> {
-    const EXAMPLE: &str = "{ src: idle, tgt: busy, events: [e_go] }";
     let origin = node.origin;
     let mut fields = match node.kind {
         Kind::Made("trans", named, items) => {
@@ -184,55 +172,51 @@ fn transition(cx: &mut Cx, node: Node) -> Option<Transition> {
                 cx.wrong(item, "an element of a transition", "named", "src = \"a\", tgt = \"b\"");
             }
             let named = named.into_iter().filter(|e| !e.key.starts_with('_')).collect();
-            Fields::new("a transition", origin, named)
+            Fields::new(&TRANSITION, origin, named)
         }
-        _ => Fields::of(cx, node, "a transition", EXAMPLE)?,
+        _ => Fields::of(cx, node, &TRANSITION)?,
     };
     let mut out = Transition { origin, ..Transition::default() };
     out.src = reference(cx, &mut fields, "src");
     out.tgt = reference(cx, &mut fields, "tgt");
-    if let Some(node) = fields.take("events") {
-        for node in one_or_more(node) {
-            let place = cx.place(&node);
-            match &node.kind {
-                Kind::Str(text) => match Trigger::parse(text) {
-                    Ok(trigger) => out.events.push((trigger, place)),
-                    Err(error) => super::bad_name(cx, &node, &error, "events = { \"e_go\" }"),
-                },
-                Kind::Function => function(cx, &node, "a predicate in `events`"),
-                _ => cx.wrong(&node, "an event", "a name (a text)", "events = { \"e_go\" }"),
-            }
+    for node in fields.several(cx, "events") {
+        let (place, example) = (cx.place(&node), fields.row("events").example);
+        match &node.kind {
+            Kind::Str(text) => match Trigger::parse(text) {
+                Ok(trigger) => out.events.push((trigger, place)),
+                Err(error) => super::bad_name(cx, &node, &error, example),
+            },
+            Kind::Function => function(cx, &node, "a predicate in `events`"),
+            _ => cx.wrong(&node, "an event", "a name (a text)", example),
         }
     }
-    if let Some(node) = fields.take("guard") {
+    if let Some(node) = fields.take(cx, "guard") {
         function(cx, &node, "`guard`");
     }
     out.effect = actions(cx, &mut fields, "effect");
-    if let Some(node) = fields.take("pn") {
-        out.pn = number(cx, &node, "`pn`", "pn = 1").unwrap_or_default();
-    }
-    out.doc = doc(cx, &mut fields);
+    out.pn = fields.number(cx, "pn").unwrap_or_default();
+    out.doc = fields.text(cx, "doc");
     fields.finish(cx);
     Some(out)
 }
 
 fn reference(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<(String, Origin)> {
-    let node = fields.take(key)?;
+    // That it is missing is told where the chart is compiled, with what it would have to be.
+    let node = fields.take_entry(key)?.value;
     let place = cx.place(&node);
-    text(cx, &node, &format!("`{key}`"), "src = \"idle\"").map(|text| (text, place))
+    text(cx, &node, &format!("`{key}`"), fields.row(key).example).map(|text| (text, place))
 }
 
 /// Names to raise: one or a list.
 fn actions(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(Action, Origin)> {
-    let Some(node) = fields.take(key) else { return Vec::new() };
     let mut out = Vec::new();
-    for node in one_or_more(node) {
+    for node in fields.several(cx, key) {
         if matches!(node.kind, Kind::Function) {
             function(cx, &node, &format!("`{key}`"));
             continue;
         }
         let place = cx.place(&node);
-        let event = name::<EventName>(cx, &node, &format!("`{key}`"), &format!("{key} = \"e_ready\""));
+        let event = name::<EventName>(cx, &node, &format!("`{key}`"), fields.row(key).example);
         out.extend(event.map(|event| (Action::Raise(event), place)));
     }
     out

@@ -1,6 +1,7 @@
 //! Conditions and signals of monitors: what both spellings mean.
 
 use super::{Unit, choice, name, number, time};
+use crate::lang::grammar::COMPARISON;
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use crate::limits::MONITOR_DEPTH;
@@ -217,12 +218,11 @@ fn comparison(cx: &mut Cx, mut t: Term, op: Comparison, depth: usize) -> Option<
 }
 
 fn hysteresis(cx: &mut Cx, node: Node, op: Comparison) -> Option<f64> {
-    const EXAMPLE: &str = "above(\"A.x\", 8.0, { hysteresis = 0.5 })";
-    let mut fields = Fields::of(cx, node, "the options of a comparison", EXAMPLE)?;
-    let node = fields.required(cx, "hysteresis", EXAMPLE);
+    let mut fields = Fields::of(cx, node, &COMPARISON)?;
+    let node = fields.take(cx, "hysteresis");
     fields.finish(cx);
     let node = node?;
-    let v = number(cx, &node, "`hysteresis`", EXAMPLE)?;
+    let v = number(cx, &node, "`hysteresis`", COMPARISON.example)?;
     let wrong = if v < 0.0 {
         Some((
             format!("a hysteresis is 0 or more, this is {v}"),

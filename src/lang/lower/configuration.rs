@@ -1,40 +1,27 @@
 //! Configurations: what both spellings mean.
 
-use super::{Unit, choice, condition, name, text, time, truth, value, whole};
+use super::{choice, condition, name, value};
 use crate::lang::concern;
+use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, CONFIRM, UNDO, primitive as primitive_of};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{
-    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, DefaultTwice, EventName, Finding, Ident,
-    MemberRef, OnFailure, Origin, Policy, RunState, StateEntry, StateList, Target, TypeName, Value, Wanted, codes,
+    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, DefaultTwice, Finding, Ident, MemberRef,
+    OnFailure, Origin, Policy, RunState, StateEntry, StateList, Target, TypeName, Value, Wanted, codes,
 };
 use std::collections::BTreeMap;
 
-/// The seven primitives, as they are written.
-pub const VERBS: &[&str] =
-    &["create", "destroy", "connect", "disconnect", "property_set", "port_write", "operation_call"];
-
-/// How changes are written in Lua: what they need has no names there.
-const CALLS: [(&str, &str); 8] = [
-    ("create", "create(\"Dynamics\", \"youbot.Dynamics\")"),
-    ("destroy", "destroy(\"Dynamics\")"),
-    ("connect", "connect(\"Kin.jacobian\", \"Dynamics.jacobian\")"),
-    ("disconnect", "disconnect(\"Kin.jacobian\", \"Dynamics.jacobian\")"),
-    ("property_set", "property_set(\"Dynamics.force_gain\", 0.5)"),
-    ("port_write", "port_write(\"Cart_Impedance.ext_ref_mode\", true)"),
-    ("operation_call", "operation_call(\"youbot.setControlMode\", 6)"),
-    ("`undo`", "operation_call(\"youbot.setControlMode\", 6):undo(\"youbot.setControlMode\", 0)"),
-];
-
-/// What a change needs, with an example in YAML.
-fn required(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) -> Option<Node> {
-    let call = CALLS.iter().find(|(verb, _)| *verb == fields.what()).map_or("", |(_, call)| call);
-    let help = |cx: &Cx, origin| cx.either(origin, &format!("write it like `{call}`"), &format!("add `{example}`"));
-    fields.needed(cx, key, help)
+/// The words of the primitives.
+fn verbs() -> impl Iterator<Item = &'static str> {
+    CHANGES.iter().map(|change| change.object.name)
 }
 
-/// Longest FIFO of a connection.
-const LONGEST_BUFFER: i64 = 1_000_000;
+/// What a change needs; in Lua that has no name, so that the whole call is shown.
+fn required(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<Node> {
+    let (call, line) = (fields.object().example, fields.row(key).example);
+    let help = |cx: &Cx, origin| cx.either(origin, &format!("write it like `{call}`"), &format!("add `{line}`"));
+    fields.needed(cx, key, help)
+}
 
 /// A map of named configurations, in the order given.
 pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
@@ -81,20 +68,19 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
         Kind::Map(named) => (named, Vec::new()),
         Kind::List(list) if list.is_empty() => (Vec::new(), list),
         _ => {
-            let lua = "name = Configuration { property_set(\"A.k\", 1.0) }";
-            let yaml = "name: { changes: [{ property_set: { property: A.k, value: 1.0 } }] }";
-            cx.wrong(&node, "a configuration", "a table", &cx.either(origin, lua, yaml));
+            let example = cx.either(origin, CONFIGURATION.example, &CONFIGURATION.yaml());
+            cx.wrong(&node, "a configuration", "a table", &example);
             return None;
         }
     };
-    let mut fields = Fields::new("a configuration", origin, named);
+    let mut fields = Fields::new(&CONFIGURATION, origin, named);
     let mut c = Configuration::new(id);
     c.origin = origin;
     if let Some(entry) = fields.take_entry("pre_conf_state") {
         c.pre = states(cx, entry);
     }
     let mut changes = listed;
-    if let Some(node) = fields.take("changes") {
+    if let Some(node) = fields.take(cx, "changes") {
         match node.kind {
             Kind::List(list) => changes.extend(list),
             _ => {
@@ -109,20 +95,12 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     if let Some(entry) = fields.take_entry("post_conf_state") {
         c.post = states(cx, entry);
     }
-    if let Some(node) = fields.take("timeout") {
-        c.timeout = time(cx, &node, "`timeout`", Unit::Seconds, "timeout = 0.5");
-    }
-    if let Some(node) = fields.take("group") {
-        c.group = name::<Ident>(cx, &node, "`group`", "group = \"dof\"");
-    }
-    if let Some(node) = fields.take("safe") {
-        c.safe = truth(cx, &node, "`safe`", "safe = true").unwrap_or_default();
-    }
-    let on_failure = fields.take_entry("on_failure").map(|entry| {
-        let choices = [("rollback", OnFailure::Rollback), ("hold", OnFailure::Hold)];
-        c.on_failure = choice(cx, &entry.value, "`on_failure`", &choices).unwrap_or_default();
-        cx.part(entry.origin, "on_failure")
-    });
+    c.timeout = fields.time(cx, "timeout");
+    c.group = fields.name(cx, "group");
+    c.safe = fields.truth(cx, "safe").unwrap_or_default();
+    let on_failure = fields.place("on_failure").map(|origin| cx.part(origin, "on_failure"));
+    let choices = [("rollback", OnFailure::Rollback), ("hold", OnFailure::Hold)];
+    c.on_failure = fields.choice(cx, "on_failure", &choices).unwrap_or_default();
     if let Some(mut entry) = fields.take_entry("holds") {
         // Lua knows the place of the whole configuration only.
         if !matches!(entry.value.kind, Kind::Made(..) | Kind::Map(_)) {
@@ -135,12 +113,8 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
         cx.part(entry.origin, "confirm")
     });
     exclusive(cx, &c, on_failure, confirms);
-    if let Some(node) = fields.take("irreversible") {
-        c.irreversible = truth(cx, &node, "`irreversible`", "irreversible = true").unwrap_or_default();
-    }
-    if let Some(node) = fields.take("description") {
-        c.description = text(cx, &node, "`description`", "description = \"what it is for\"");
-    }
+    c.irreversible = fields.truth(cx, "irreversible").unwrap_or_default();
+    c.description = fields.text(cx, "description");
     fields.finish(cx);
     Some(c)
 }
@@ -172,12 +146,9 @@ fn exclusive(cx: &mut Cx, c: &Configuration, on_failure: Option<Origin>, confirm
 }
 
 fn confirm(cx: &mut Cx, node: Node) -> Option<Confirm> {
-    const EXAMPLE: &str = "confirm = { event = \"e_aligned\", within = 2.0 }";
-    let mut fields = Fields::of(cx, node, "`confirm`", EXAMPLE)?;
-    let event = fields.required(cx, "event", EXAMPLE);
-    let within = fields.required(cx, "within", EXAMPLE);
-    let event = event.and_then(|node| name::<EventName>(cx, &node, "`event`", "event = \"e_aligned\""));
-    let within = within.and_then(|node| time(cx, &node, "`within`", Unit::Seconds, "within = 2.0"));
+    let mut fields = Fields::of(cx, node, &CONFIRM)?;
+    let event = fields.name(cx, "event");
+    let within = fields.time(cx, "within");
     fields.finish(cx);
     Some(Confirm { event: event?, within: within? })
 }
@@ -287,18 +258,20 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
     const EXAMPLE: &str = "- property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] }";
     let origin = node.origin;
     let (verb, fields) = match node.kind {
-        Kind::Made(verb, entries, _) if VERBS.contains(&verb) => (verb, Fields::new(verb, origin, entries)),
+        Kind::Made(verb, entries, _) if primitive_of(verb).is_some() => {
+            (verb, Fields::new(primitive_of(verb)?.object, origin, entries))
+        }
         Kind::Map(mut entries) if entries.len() == 1 => {
             let Entry { key, origin: key_origin, value } = entries.pop()?;
-            let Some(verb) = VERBS.iter().find(|verb| ***verb == *key) else {
+            let Some(primitive) = primitive_of(&key) else {
                 cx.report(
                     Finding::error(codes::CONF_UNKNOWN_CHANGE, format!("there is no change `{key}`"))
                         .at(key_origin)
-                        .help(did_you_mean(&key, "changes", VERBS.iter().copied())),
+                        .help(did_you_mean(&key, "changes", verbs())),
                 );
                 return None;
             };
-            (*verb, Fields::of(cx, value, verb, EXAMPLE)?)
+            (primitive.object.name, Fields::of(cx, value, primitive.object)?)
         }
         Kind::Map(entries) if entries.len() > 1 => {
             cx.report(
@@ -318,53 +291,51 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
             return None;
         }
     };
-    Some(Change { kind: primitive(cx, verb, fields)?, origin })
+    Some(Change { kind: kind(cx, verb, fields)?, origin })
 }
 
-fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKind> {
+fn kind(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKind> {
     let kind = match verb {
         "create" => {
             let component = component(cx, &mut fields);
-            let ty = required(cx, &mut fields, "type", "type: youbot.Dynamics");
+            let ty = required(cx, &mut fields, "type");
             let ty = ty.and_then(|node| name::<TypeName>(cx, &node, "a component type", "youbot.Dynamics"));
-            let activity = fields
-                .take("activity")
-                .and_then(|node| name::<Ident>(cx, &node, "`activity`", "activity = \"control\""));
-            let properties = fields.take("properties").map(|node| properties(cx, node, component)).unwrap_or_default();
+            let activity = fields.name(cx, "activity");
+            let properties = fields.take(cx, "properties");
+            let properties = properties.map(|node| properties_of(cx, node, component)).unwrap_or_default();
             component.zip(ty).map(|(component, ty)| ChangeKind::Create { component, ty, activity, properties })
         }
         "destroy" => component(cx, &mut fields).map(|component| ChangeKind::Destroy { component }),
         "connect" | "disconnect" => {
-            let from = member(cx, &mut fields, "from", "Kin.jacobian");
-            let to = member(cx, &mut fields, "to", "Dynamics.jacobian");
+            let from = member(cx, &mut fields, "from");
+            let to = member(cx, &mut fields, "to");
             if verb == "disconnect" {
                 from.zip(to).map(|(from, to)| ChangeKind::Disconnect { from, to })
             } else {
-                let policy = fields.take("policy").map_or(Some(Policy::Data), |node| policy(cx, node));
+                let policy = fields.take(cx, "policy").map_or(Some(Policy::Data), |node| policy(cx, node));
                 from.zip(to).zip(policy).map(|((from, to), policy)| ChangeKind::Connect { from, to, policy })
             }
         }
         "property_set" => {
-            let property = member(cx, &mut fields, "property", "Dynamics.force_gain");
+            let property = member(cx, &mut fields, "property");
             let value = required_value(cx, &mut fields, property, "a property's value");
             property.zip(value).map(|(property, value)| ChangeKind::PropertySet { property, value })
         }
         "port_write" => {
-            let port = member(cx, &mut fields, "port", "Cart_Impedance.ext_ref_mode");
+            let port = member(cx, &mut fields, "port");
             let value = required_value(cx, &mut fields, port, "a port's value");
             port.zip(value).map(|(port, value)| ChangeKind::PortWrite { port, value })
         }
         _ => {
-            let undo = fields.take("undo");
+            let undo = fields.take(cx, "undo");
             let call = call(cx, &mut fields);
             let undo = match undo {
                 None => Some(None),
-                Some(node) => Fields::of(cx, node, "`undo`", "undo: { operation: youbot.setControlMode, args: [0] }")
-                    .and_then(|mut fields| {
-                        let undo = self::call(cx, &mut fields);
-                        fields.finish(cx);
-                        undo.map(Some)
-                    }),
+                Some(node) => Fields::of(cx, node, &UNDO).and_then(|mut fields| {
+                    let undo = self::call(cx, &mut fields);
+                    fields.finish(cx);
+                    undo.map(Some)
+                }),
             };
             call.zip(undo).map(|(call, undo)| ChangeKind::OperationCall { call, undo })
         }
@@ -374,18 +345,19 @@ fn primitive(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<Chan
 }
 
 fn component(cx: &mut Cx, fields: &mut Fields) -> Option<ComponentName> {
-    let node = required(cx, fields, "component", "component: Dynamics")?;
+    let node = required(cx, fields, "component")?;
     name(cx, &node, "a component", "Dynamics")
 }
 
-fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str, example: &str) -> Option<MemberRef> {
-    let node = required(cx, fields, key, &format!("{key}: {example}"))?;
-    name(cx, &node, key, example)
+fn member(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<MemberRef> {
+    let node = required(cx, fields, key)?;
+    let line = fields.row(key).example;
+    name(cx, &node, key, line.split_once(": ").map_or(line, |(_, example)| example))
 }
 
 /// The value of `slot`, which is called `what` where its name could not be read.
 fn required_value(cx: &mut Cx, fields: &mut Fields, slot: Option<MemberRef>, what: &str) -> Option<Value> {
-    let node = required(cx, fields, "value", "value: 0.5")?;
+    let node = required(cx, fields, "value")?;
     match slot {
         Some(slot) => value(cx, node, &format!("`{slot}`")),
         None => value(cx, node, what),
@@ -393,8 +365,8 @@ fn required_value(cx: &mut Cx, fields: &mut Fields, slot: Option<MemberRef>, wha
 }
 
 fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
-    let operation = member(cx, fields, "operation", "youbot.setControlMode");
-    let args = match fields.take("args") {
+    let operation = member(cx, fields, "operation");
+    let args = match fields.take(cx, "args") {
         None => Some(Vec::new()),
         Some(Node { kind: Kind::List(list), .. }) => {
             let length = list.len();
@@ -403,7 +375,7 @@ fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
             (args.len() == length).then_some(args)
         }
         Some(node) => {
-            cx.wrong(&node, "`args`", "a list", "args: [6]");
+            cx.wrong(&node, "`args`", "a list", fields.row("args").example);
             None
         }
     };
@@ -411,18 +383,16 @@ fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
 }
 
 fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
-    const EXAMPLE: &str = "{ buffer = 64 }";
     if let Kind::Str(_) = node.kind {
         return choice(cx, &node, "the policy of a connection", &[("data", Policy::Data)]);
     }
-    let mut fields = Fields::of(cx, node, "the policy of a connection", EXAMPLE)?;
-    let length = fields.required(cx, "buffer", EXAMPLE);
-    let length = length.and_then(|node| whole(cx, &node, "the length of a buffer", 1..=LONGEST_BUFFER, EXAMPLE));
+    let mut fields = Fields::of(cx, node, &BUFFER)?;
+    let length = fields.whole(cx, "buffer");
     fields.finish(cx);
     u32::try_from(length?).ok().map(Policy::Buffer)
 }
 
-fn properties(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
+fn properties_of(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
     let Some(entries) = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }") else {
         return BTreeMap::new();
     };

@@ -1,7 +1,8 @@
 //! Deployment files: the keys of design §16. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
-use super::{Unit, name, one_or_more, simulated, text, time, types, whole};
+use super::{name, simulated, text, types};
+use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
@@ -24,8 +25,8 @@ pub struct Draft {
     pub types: Vec<ComponentType>,
     /// `activities`
     pub activities: BTreeMap<Ident, Activity>,
-    /// `configurations`: paths and where they are named; none when the key is missing.
-    pub configurations: Option<Vec<(String, Origin)>>,
+    /// `configurations`: paths and where they are named.
+    pub configurations: Vec<(String, Origin)>,
     /// `coordinator` and `coordinators`, in written order: names (none: called like the deployment), paths, and where.
     pub coordinators: Vec<(Option<Ident>, String, Origin)>,
     /// `monitors`: paths and where they are named.
@@ -86,8 +87,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     if let Kind::Map(entries) = &node.kind {
         note_keys(entries, "", &mut key_origins);
     }
-    let mut fields = Fields::of(cx, node, "a deployment", "davit: 1")?;
-    if let Some(node) = fields.required(cx, "davit", "davit: 1") {
+    let mut fields = Fields::of(cx, node, &DEPLOYMENT)?;
+    if let Some(node) = fields.take(cx, "davit") {
         match node.kind {
             Kind::Int(1) => {}
             Kind::Int(_) | Kind::Float(_) => cx.report(
@@ -96,64 +97,59 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
                     .labelled("another format")
                     .help("write `davit: 1`, or use the version of Davit that the file was written for"),
             ),
-            _ => cx.wrong(&node, "`davit`", "a whole number (the format's version)", "davit: 1"),
+            _ => cx.wrong(&node, "`davit`", "a whole number (the format's version)", DEPLOYMENT.example),
         }
     }
-    let deployment = fields
-        .required(cx, "name", &format!("name: {file_name}"))
-        .and_then(|node| name::<Ident>(cx, &node, "`name`", "name: youbot_arm"));
-    let platform = fields
-        .required(cx, "platform", "platform: embedded")
-        .and_then(|node| name::<Ident>(cx, &node, "`platform`", "platform: embedded"));
-    let libraries = fields.take("libraries").map(|node| libraries(cx, node));
-    let types = fields.take("types").map(|node| types::types(cx, node));
-    if libraries.is_none() && types.is_none() && !fields.misspelt("types") {
-        let _ = fields.required(cx, "libraries", "libraries: [standard]");
+    let deployment = fields.needed(cx, "name", |_, _| format!("add `name: {file_name}`"));
+    let deployment = deployment.and_then(|node| name::<Ident>(cx, &node, "`name`", fields.row("name").example));
+    let platform = fields.name(cx, "platform");
+    let named = fields.has("libraries");
+    let libraries = fields.names(cx, "libraries");
+    let types = fields.take(cx, "types").map(|node| types::types(cx, node));
+    if !named && types.is_none() && !fields.misspelt("types") {
+        let row = fields.row("libraries");
+        let _ = fields.needed(cx, "libraries", |_, _| format!("add `{}`", row.example));
     }
-    let activities = fields.take("activities").map(|node| activities(cx, node)).unwrap_or_default();
-    let configurations = fields
-        .required(cx, "configurations", "configurations: [configurations.lua]")
-        .map(|node| files(cx, node, "`configurations`", "configurations: [configurations.lua]"));
+    let activities = fields.take(cx, "activities").map(|node| activities(cx, node)).unwrap_or_default();
+    let configurations = files(cx, &mut fields, "configurations");
     let coordinators = beside::coordinators(cx, &mut fields);
-    let monitors = fields.take("monitors").map(|node| files(cx, node, "`monitors`", "monitors: [monitors.lua]"));
-    let trusted = fields.take("trusted").and_then(|node| trusted(cx, node));
-    let host_key = fields.take_entry("host");
-    if let (None, Some(entry)) = (trusted, &host_key) {
+    let monitors = files(cx, &mut fields, "monitors");
+    let trusted = fields.take(cx, "trusted").and_then(|node| trusted(cx, node));
+    if let (None, Some(origin)) = (trusted, fields.place("host")) {
         let finding = Finding::error(codes::TEXT_BAD_VALUE, "`host` is given to coordinators that are not trusted");
-        cx.report(finding.at(entry.origin).help("write `trusted: true` beside it, or leave it out"));
+        cx.report(finding.at(origin).help("write `trusted: true` beside it, or leave it out"));
     }
-    let host = host_key.map(|entry| files(cx, entry.value, "`host`", "host: [robot.lua]")).unwrap_or_default();
-    let with = match fields.take("with") {
+    let host = files(cx, &mut fields, "host");
+    let with = match fields.take(cx, "with") {
         None => Vec::new(),
         Some(Node { kind: Kind::Map(entries), .. }) => entries,
         Some(node) => {
-            cx.wrong(&node, "`with`", "a table of named values", "with: { gain: 0.5 }");
+            cx.wrong(&node, "`with`", "a table of named values", fields.row("with").example);
             Vec::new()
         }
     };
-    let emits = fields.take("emits").map(|node| emits(cx, node)).unwrap_or_default();
-    let safety = fields.take("safety");
-    let safety = safety.map(|node| names(cx, node, "`safety`", "an event", "safety: [e_estop]")).unwrap_or_default();
-    let operator = fields.take("operator").map(|node| operator(cx, node)).unwrap_or_default();
-    let deploy = fields.required(cx, "deploy", DEPLOY).and_then(|node| beside::rise(cx, node));
-    let shutdown = fields.required(cx, "shutdown", SHUTDOWN).and_then(|node| beside::fall(cx, node));
-    let limits = fields.take("limits").map(|node| limits(cx, node)).unwrap_or_default();
+    let emits = emits(cx, &mut fields);
+    let safety = names(cx, &mut fields, "safety", "`safety`");
+    let operator = operator(cx, &mut fields);
+    let deploy = fields.take(cx, "deploy").and_then(|node| beside::rise(cx, node));
+    let shutdown = fields.take(cx, "shutdown").and_then(|node| beside::fall(cx, node));
+    let limits = fields.take(cx, "limits").map(|node| limits(cx, node)).unwrap_or_default();
     if let Some(entry) = fields.take_entry("durability") {
         let finding = Finding::error(codes::DEPLOY_NO_JOURNAL, "`durability` says how a journal is kept");
         cx.report(finding.at(entry.origin).help("there is no journal yet; leave the key out"));
     }
-    let reactions = fields.take("simulated").map(|node| simulated::reactions(cx, node)).unwrap_or_default();
-    let faults = fields.take("faults").map(|node| simulated::faults(cx, node)).unwrap_or_default();
+    let reactions = fields.take(cx, "simulated").map(|node| simulated::reactions(cx, node)).unwrap_or_default();
+    let faults = fields.take(cx, "faults").map(|node| simulated::faults(cx, node)).unwrap_or_default();
     fields.finish(cx);
     Some(Draft {
         name: deployment,
         platform,
-        libraries: libraries.unwrap_or_default(),
+        libraries,
         types: types.unwrap_or_default(),
         activities,
         configurations,
         coordinators,
-        monitors: monitors.unwrap_or_default(),
+        monitors,
         trusted,
         host,
         with,
@@ -169,17 +165,10 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     })
 }
 
-pub(super) const DEPLOY: &str = "deploy: { event: e_start, up: operational, within_s: 20 }";
-pub(super) const SHUTDOWN: &str = "shutdown: { event: e_shutdown, down: idle, within_s: 20 }";
-
-fn libraries(cx: &mut Cx, node: Node) -> Vec<Ident> {
-    one_or_more(node).iter().filter_map(|node| name(cx, node, "a library", "libraries: [standard]")).collect()
-}
-
-fn files(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(String, Origin)> {
+fn files(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(String, Origin)> {
     let mut out: Vec<(String, Origin)> = Vec::new();
-    for node in one_or_more(node) {
-        let Some(path) = text(cx, &node, what, example) else { continue };
+    for node in fields.several(cx, key) {
+        let Some(path) = text(cx, &node, &format!("`{key}`"), fields.row(key).example) else { continue };
         if let Some((_, first)) = out.iter().find(|(p, _)| *p == path) {
             let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{path}` is named twice"));
             cx.report(finding.at(node.origin).also(*first, "first here").help("name each file once"));
@@ -192,14 +181,13 @@ fn files(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(String, Ori
 
 /// `trusted: true`, or `trusted: { open: [io] }`.
 fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
-    const EXAMPLE: &str = "trusted: { open: [io, os] }";
     if let Kind::Bool(yes) = node.kind {
         return yes.then(Openings::default);
     }
-    let mut fields = Fields::of(cx, node, "`trusted`", "trusted: true")?;
+    let mut fields = Fields::of(cx, node, &TRUSTED)?;
     let mut out = Openings::default();
-    for node in fields.take("open").map(one_or_more).unwrap_or_default() {
-        let Some(text) = text(cx, &node, "`open`", EXAMPLE) else { continue };
+    for node in fields.several(cx, "open") {
+        let Some(text) = text(cx, &node, "`open`", fields.row("open").example) else { continue };
         match text.as_str() {
             "io" => out.io = true,
             "os" => out.os = true,
@@ -213,22 +201,21 @@ fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
     Some(out)
 }
 
-fn emits(cx: &mut Cx, node: Node) -> Vec<(EventName, Origin)> {
-    one_or_more(node)
-        .iter()
-        .filter_map(|node| Some((name(cx, node, "an emitted event", "emits: [e_ready]")?, node.origin)))
-        .collect()
+fn emits(cx: &mut Cx, fields: &mut Fields) -> Vec<(EventName, Origin)> {
+    let nodes = fields.several(cx, "emits");
+    let example = fields.row("emits").example;
+    nodes.iter().filter_map(|node| Some((name(cx, node, "an emitted event", example)?, node.origin))).collect()
 }
 
-/// A list of names, each of them once; `key` is where they stand, `what` what each of them is.
-pub(super) fn names<T>(cx: &mut Cx, node: Node, key: &str, what: &str, example: &str) -> Vec<(T, Origin)>
+/// A list of names, each of them once; `path` is the key's, for messages.
+pub(super) fn names<T>(cx: &mut Cx, fields: &mut Fields, key: &'static str, path: &str) -> Vec<(T, Origin)>
 where
     T: FromStr<Err = NameError> + PartialEq + std::fmt::Display,
 {
     let mut out: Vec<(T, Origin)> = Vec::new();
-    for node in one_or_more(node) {
-        let Some(name) = name::<T>(cx, &node, what, example) else { continue };
-        once(cx, &mut out, name, node.origin, key);
+    for node in fields.several(cx, key) {
+        let Some(name) = name::<T>(cx, &node, path, fields.row(key).example) else { continue };
+        once(cx, &mut out, name, node.origin, path);
     }
     out
 }
@@ -244,15 +231,15 @@ fn once<T: PartialEq + std::fmt::Display>(cx: &mut Cx, out: &mut Vec<(T, Origin)
 }
 
 /// `operator`: configurations, and properties and in-ports as `Component.member`.
-fn operator(cx: &mut Cx, node: Node) -> Vec<(OperatorMay, Origin)> {
-    const EXAMPLE: &str = "operator: [profile_soft, Cart_Impedance.stiffness]";
+fn operator(cx: &mut Cx, fields: &mut Fields) -> Vec<(OperatorMay, Origin)> {
+    let example = fields.row("operator").example;
     let mut out = Vec::new();
-    for node in one_or_more(node) {
+    for node in fields.several(cx, "operator") {
         let is_member = matches!(&node.kind, Kind::Str(text) if text.contains('.'));
         let may = if is_member {
-            name::<MemberRef>(cx, &node, "a property or port", EXAMPLE).map(OperatorMay::Set)
+            name::<MemberRef>(cx, &node, "a property or port", example).map(OperatorMay::Set)
         } else {
-            name::<ConfigId>(cx, &node, "a configuration", EXAMPLE).map(OperatorMay::Apply)
+            name::<ConfigId>(cx, &node, "a configuration", example).map(OperatorMay::Apply)
         };
         if let Some(may) = may {
             once(cx, &mut out, may, node.origin, "`operator`");
@@ -262,28 +249,21 @@ fn operator(cx: &mut Cx, node: Node) -> Vec<(OperatorMay, Origin)> {
 }
 
 fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
-    const EXAMPLE: &str = "control: { period_ms: 1.0, priority: 80 }";
     let entries = match node.kind {
         Kind::Map(entries) => entries,
         _ => {
-            cx.wrong(&node, "`activities`", "a table of named values", EXAMPLE);
+            cx.wrong(&node, "`activities`", "a table of named values", ACTIVITY.example);
             return BTreeMap::new();
         }
     };
     let mut out = BTreeMap::new();
     for entry in entries {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let ident = name::<Ident>(cx, &key, "an activity", EXAMPLE);
-        let value = match entry.value.kind {
-            Kind::Null => Node::new(Kind::Map(Vec::new()), entry.origin),
-            _ => entry.value,
-        };
-        let Some(mut fields) = Fields::of(cx, value, "an activity", EXAMPLE) else { continue };
-        let period = fields
-            .take("period_ms")
-            .and_then(|node| time(cx, &node, "`period_ms`", Unit::Milliseconds, "period_ms: 1.0"));
-        let priority = fields.take("priority").and_then(|node| whole(cx, &node, "`priority`", 0..=99, "priority: 80"));
-        let cpu = fields.take("cpu").and_then(|node| whole(cx, &node, "`cpu`", 0..=4095, "cpu: 1"));
+        let ident = name::<Ident>(cx, &key, "an activity", ACTIVITY.example);
+        let Some(mut fields) = Fields::of(cx, entry.value, &ACTIVITY) else { continue };
+        let period = fields.time(cx, "period_ms");
+        let priority = fields.whole(cx, "priority");
+        let cpu = fields.whole(cx, "cpu");
         fields.finish(cx);
         if let Some(ident) = ident {
             let priority = priority.and_then(|p| u8::try_from(p).ok()).unwrap_or_default();
@@ -294,24 +274,13 @@ fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
     out
 }
 
-/// Fewest frames a deployment may ask for: the newest, and the one that all others are squashed into.
-const FEWEST_FRAMES: i64 = 2;
-/// Most frames a deployment may ask for: each holds its inverse in memory.
-const MOST_FRAMES: i64 = 100_000;
-
 fn limits(cx: &mut Cx, node: Node) -> DeploymentLimits {
     let mut out = DeploymentLimits::default();
-    let Some(mut fields) = Fields::of(cx, node, "`limits`", "limits: { stack: 64, step_timeout_s: 1.0 }") else {
-        return out;
-    };
-    if let Some(node) = fields.take("stack")
-        && let Some(v) = whole(cx, &node, "`stack`", FEWEST_FRAMES..=MOST_FRAMES, "stack: 64")
-    {
+    let Some(mut fields) = Fields::of(cx, node, &LIMITS) else { return out };
+    if let Some(v) = fields.whole(cx, "stack") {
         out.stack = usize::try_from(v).unwrap_or(out.stack);
     }
-    if let Some(node) = fields.take("step_timeout_s")
-        && let Some(v) = time(cx, &node, "`step_timeout_s`", Unit::Seconds, "step_timeout_s: 1.0")
-    {
+    if let Some(v) = fields.time(cx, "step_timeout_s") {
         out.step_timeout = v;
     }
     fields.finish(cx);

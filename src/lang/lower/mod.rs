@@ -5,6 +5,7 @@ pub mod chart;
 pub mod condition;
 pub mod configuration;
 pub mod deployment;
+mod fields;
 pub mod monitor;
 mod simulated;
 pub mod types;

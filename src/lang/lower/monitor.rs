@@ -1,12 +1,11 @@
 //! Monitors: what both spellings mean.
 
-use super::{Unit, condition, name, text, time, truth};
+use super::{condition, name};
+use crate::lang::grammar::MONITOR;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::monitor::Sampling;
 use crate::model::{EventName, Finding, Ident, Monitor, Origin, codes};
 use rustc_hash::FxHashMap;
-
-const EXAMPLE: &str = "name = monitor { when = above(\"A.x\", 2.0), event = \"e_high\" }";
 
 /// A map of named monitors, in the order given.
 pub fn monitors(cx: &mut Cx, node: Node) -> Vec<Monitor> {
@@ -14,7 +13,7 @@ pub fn monitors(cx: &mut Cx, node: Node) -> Vec<Monitor> {
         Kind::Map(entries) => entries,
         Kind::List(list) if list.is_empty() => Vec::new(),
         _ => {
-            cx.wrong(&node, "the list of monitors", "a table of named values", EXAMPLE);
+            cx.wrong(&node, "the list of monitors", "a table of named values", MONITOR.example);
             return Vec::new();
         }
     };
@@ -38,36 +37,29 @@ fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
         Kind::Map(named) => named,
         Kind::Made("monitor", _, list) => {
             let finding = Finding::error(codes::MONITOR_ARGUMENTS, "a monitor has named parts only");
-            cx.report(finding.at(list[0].origin).help(format!("write it like `{EXAMPLE}`")));
+            cx.report(finding.at(list[0].origin).help(format!("write it like `{}`", MONITOR.example)));
             return None;
         }
         _ => {
-            cx.wrong(&entry.value, "a monitor", "a table of named values", EXAMPLE);
+            cx.wrong(&entry.value, "a monitor", "a table of named values", MONITOR.example);
             return None;
         }
     };
-    let mut fields = Fields::new("a monitor", origin, entries);
-    let when = fields.required(cx, "when", "when = above(\"A.x\", 2.0)");
+    let mut fields = Fields::new(&MONITOR, origin, entries);
+    let when = fields.take(cx, "when");
     let when = when.and_then(|node| condition::condition(cx, node, 0));
-    let raise = fields.take("event");
-    let raise = raise.and_then(|node| name::<EventName>(cx, &node, "`event`", "event = \"e_high\""));
-    let cleared = fields.take("cleared");
-    let cleared = cleared.and_then(|node| name::<EventName>(cx, &node, "`cleared`", "cleared = \"e_calm\""));
-    let mut seconds = |cx: &mut Cx, key: &'static str, example: &str| {
-        let node = fields.take(key)?;
-        time(cx, &node, &format!("`{key}`"), Unit::Seconds, example)
-    };
-    let repeats = seconds(cx, "repeat_every", "repeat_every = 1.0");
+    let raise: Option<EventName> = fields.name(cx, "event");
+    let cleared = fields.name(cx, "cleared");
+    let repeats = fields.time(cx, "repeat_every");
     let repeat = repeats.filter(|_| raise.is_some());
     if repeats.is_some() && repeat.is_none() {
         let finding =
             Finding::warning(codes::MONITOR_NOTHING_REPEATED, "`repeat_every` repeats nothing: there is no `event`");
         cx.report(finding.at(origin).help("name the event that is to be repeated, or leave `repeat_every` out"));
     }
-    let every = seconds(cx, "every", "every = 0.01");
-    let enabled = fields.take("enabled").and_then(|node| truth(cx, &node, "`enabled`", "enabled = false"));
-    let description = fields.take("description");
-    let description = description.and_then(|node| text(cx, &node, "`description`", "description = \"what it is for\""));
+    let every = fields.time(cx, "every");
+    let enabled = fields.truth(cx, "enabled");
+    let description = fields.text(cx, "description");
     fields.finish(cx);
     Some(Monitor {
         name: id?,

@@ -1,21 +1,17 @@
 //! `simulated`: what the components of the simulated platform do by themselves; `faults`: what goes wrong on it.
 
-use super::{Unit, choice, name, text, time, whole};
+use super::text;
+use crate::lang::grammar::{FAULT, REACTION, SIMULATED};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
-use crate::limits;
-use crate::model::{ComponentName, EventName, FaultKind, Origin, SimulatedReaction, StepFault};
-
-const EXAMPLE: &str =
-    "simulated: { reactions: [{ after: start radio, delay_s: 0.5, raise: e_qos_ok, component: radio }] }";
-const REACTION: &str = "{ after: start radio, delay_s: 0.5, raise: e_qos_ok, component: radio }";
+use crate::model::{FaultKind, Origin, SimulatedReaction, StepFault};
 
 /// Lowers the key `simulated`.
 pub fn reactions(cx: &mut Cx, node: Node) -> Vec<SimulatedReaction> {
-    let Some(mut fields) = Fields::of(cx, node, "`simulated`", EXAMPLE) else { return Vec::new() };
-    let list = match fields.take("reactions") {
+    let Some(mut fields) = Fields::of(cx, node, &SIMULATED) else { return Vec::new() };
+    let list = match fields.take(cx, "reactions") {
         Some(Node { kind: Kind::List(list), .. }) => list,
         Some(node) => {
-            cx.wrong(&node, "`reactions`", "a list", EXAMPLE);
+            cx.wrong(&node, "`reactions`", "a list", SIMULATED.example);
             Vec::new()
         }
         None => Vec::new(),
@@ -26,14 +22,11 @@ pub fn reactions(cx: &mut Cx, node: Node) -> Vec<SimulatedReaction> {
 
 fn reaction(cx: &mut Cx, node: Node) -> Option<SimulatedReaction> {
     let origin = node.origin;
-    let mut fields = Fields::of(cx, node, "a reaction", REACTION)?;
-    let after = fields.required(cx, "after", "after: start radio");
-    let after = after.and_then(|node| step(cx, node, origin, "`after`", "after: start radio"));
-    let raise = fields.required(cx, "raise", "raise: e_qos_ok");
-    let raise = raise.and_then(|node| name::<EventName>(cx, &node, "`raise`", "raise: e_qos_ok"));
-    let component = fields.required(cx, "component", "component: radio");
-    let component = component.and_then(|node| name::<ComponentName>(cx, &node, "a component", "radio"));
-    let delay = fields.take("delay_s").map(|node| time(cx, &node, "`delay_s`", Unit::Seconds, "delay_s: 0.5"));
+    let mut fields = Fields::of(cx, node, &REACTION)?;
+    let after = step(cx, &mut fields, origin, "after");
+    let raise = fields.name(cx, "raise");
+    let component = fields.name(cx, "component");
+    let delay = fields.written(cx, "delay_s", Fields::time);
     fields.finish(cx);
     let (after, origin) = after?;
     Some(SimulatedReaction {
@@ -46,8 +39,9 @@ fn reaction(cx: &mut Cx, node: Node) -> Option<SimulatedReaction> {
 }
 
 /// The text of a step with its place; without one of its own, that of what it stands in.
-fn step(cx: &mut Cx, node: Node, around: Origin, what: &str, example: &str) -> Option<(String, Origin)> {
-    let step = text(cx, &node, what, example)?;
+fn step(cx: &mut Cx, fields: &mut Fields, around: Origin, key: &'static str) -> Option<(String, Origin)> {
+    let node = fields.take(cx, key)?;
+    let step = text(cx, &node, &format!("`{key}`"), fields.row(key).example)?;
     // One blank between words, as steps are printed.
     let step = step.split_whitespace().collect::<Vec<_>>().join(" ");
     Some((step, if cx.sources.is_exact(node.origin) { node.origin } else { around }))
@@ -55,9 +49,8 @@ fn step(cx: &mut Cx, node: Node, around: Origin, what: &str, example: &str) -> O
 
 /// Lowers the key `faults`.
 pub fn faults(cx: &mut Cx, node: Node) -> Vec<StepFault> {
-    const EXAMPLE: &str = "faults: [{ step: \"property_set a.k\", how: fail }]";
     let Kind::List(list) = node.kind else {
-        cx.wrong(&node, "`faults`", "a list", EXAMPLE);
+        cx.wrong(&node, "`faults`", "a list", "faults: [{ step: \"property_set a.k\", how: fail }]");
         return Vec::new();
     };
     list.into_iter().filter_map(|node| fault(cx, node)).collect()
@@ -65,21 +58,24 @@ pub fn faults(cx: &mut Cx, node: Node) -> Vec<StepFault> {
 
 fn fault(cx: &mut Cx, node: Node) -> Option<StepFault> {
     let origin = node.origin;
-    let mut fields = Fields::of(cx, node, "a fault", "{ step: \"property_set a.k\", how: fail, times: 1 }")?;
-    let step = fields.required(cx, "step", "step: \"property_set a.k\"");
-    let step = step.and_then(|node| self::step(cx, node, origin, "`step`", "step: \"property_set a.k\""));
-    let how = fields.required(cx, "how", "how: fail");
-    let how = how.and_then(|node| choice(cx, &node, "`how`", &FaultKind::NAMES));
-    let times =
-        fields.take("times").map(|node| whole(cx, &node, "`times`", 1..=i64::from(limits::FAULT_TIMES), "times: 1"));
-    let takes = match (how, fields.take("takes_s")) {
-        (_, Some(node)) if how.is_some_and(|how| how != FaultKind::Slow) => {
-            cx.wrong(&node, "`takes_s`", "nothing: only `slow` takes time", "how: slow, takes_s: 0.5");
+    let mut fields = Fields::of(cx, node, &FAULT)?;
+    let step = self::step(cx, &mut fields, origin, "step");
+    let how = fields.choice(cx, "how", &FaultKind::NAMES);
+    let times = fields.written(cx, "times", Fields::whole);
+    let takes = match (how, fields.has("takes_s")) {
+        (Some(how), true) if how != FaultKind::Slow => {
+            if let Some(node) = fields.take(cx, "takes_s") {
+                cx.wrong(&node, "`takes_s`", "nothing: only `slow` takes time", "how: slow, takes_s: 0.5");
+            }
             None
         }
-        (_, Some(node)) => time(cx, &node, "`takes_s`", Unit::Seconds, "takes_s: 0.5"),
-        (Some(FaultKind::Slow), None) => fields.required(cx, "takes_s", "takes_s: 0.5").and(None),
-        (_, None) => Some(std::time::Duration::ZERO),
+        (Some(FaultKind::Slow), false) => {
+            fields.needed(cx, "takes_s", |_, _| "add `takes_s: 0.5`".to_owned()).and(None)
+        }
+        (_, written) => {
+            let takes = fields.time(cx, "takes_s");
+            if written { takes } else { Some(std::time::Duration::ZERO) }
+        }
     };
     fields.finish(cx);
     let times = times.unwrap_or(Some(1)).and_then(|n| u32::try_from(n).ok());

@@ -1,6 +1,7 @@
 //! Component types declared in a deployment.
 
-use super::{choice, condition, name, number, one_or_more, text, truth, value};
+use super::{choice, condition, name, value};
+use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
     ComponentType, Direction, Effect, Finding, Ident, OperationType, PortType, PropertyType, Tunable, TypeName,
@@ -29,63 +30,40 @@ fn members(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<Entry> {
 fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
     let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
     let type_name = name::<TypeName>(cx, &key, "a component type", "Gain");
-    let value = match entry.value.kind {
-        // `Marker:` alone declares a type without members.
-        Kind::Null => Node::new(Kind::Map(Vec::new()), entry.origin),
-        _ => entry.value,
-    };
-    let mut fields = Fields::of(cx, value, "a component type", "Gain: { ports: {...}, properties: {...} }")?;
+    let mut fields = Fields::of(cx, entry.value, &TYPE)?;
     let mut ty = ComponentType::new(type_name.as_ref().map_or("unnamed", TypeName::as_str), "");
     ty.origin = entry.origin;
     ty.doc = doc(cx, &mut fields);
-    if let Some(node) = fields.take("ports") {
+    if let Some(node) = fields.take(cx, "ports") {
         ty.ports = named(cx, node, "`ports`", "u: { direction: in, type: float }", port);
     }
-    if let Some(node) = fields.take("properties") {
+    if let Some(node) = fields.take(cx, "properties") {
         ty.properties = named(cx, node, "`properties`", "k: { type: float, default: 1.0 }", property);
     }
-    if let Some(node) = fields.take("operations") {
+    if let Some(node) = fields.take(cx, "operations") {
         ty.operations = named(cx, node, "`operations`", "reset: { effect: none }", operation);
     }
-    ty.start_after = type_names(cx, &mut fields, "start_after");
-    ty.stop_before = type_names(cx, &mut fields, "stop_before");
-    if let Some(node) = fields.take("actuator") {
-        ty.actuator = truth(cx, &node, "`actuator`", "actuator: true").unwrap_or_default();
+    ty.start_after = fields.names(cx, "start_after");
+    ty.stop_before = fields.names(cx, "stop_before");
+    ty.actuator = fields.truth(cx, "actuator").unwrap_or_default();
+    for start in fields.choices(cx, "moves", &[("start", true), ("stop", false)]) {
+        let mark = if start { &mut ty.moves.start } else { &mut ty.moves.stop };
+        *mark = true;
     }
-    if let Some(node) = fields.take("moves") {
-        for node in one_or_more(node) {
-            match choice(cx, &node, "`moves`", &[("start", true), ("stop", false)]) {
-                Some(true) => ty.moves.start = true,
-                Some(false) => ty.moves.stop = true,
-                None => {}
-            }
-        }
-    }
-    if let Some(node) = fields.take("irreversible") {
-        for node in one_or_more(node) {
-            match choice(cx, &node, "`irreversible`", &[("configure", 0), ("stop", 1), ("destroy", 2)]) {
-                Some(0) => ty.irreversible.configure = true,
-                Some(1) => ty.irreversible.stop = true,
-                Some(_) => ty.irreversible.destroy = true,
-                None => {}
-            }
-        }
+    for which in fields.choices(cx, "irreversible", &[("configure", 0), ("stop", 1), ("destroy", 2)]) {
+        let lost = &mut ty.irreversible;
+        *[&mut lost.configure, &mut lost.stop, &mut lost.destroy][which] = true;
     }
     fields.finish(cx);
     type_name.map(|_| ty)
 }
 
 fn doc(cx: &mut Cx, fields: &mut Fields) -> String {
-    fields.take("doc").and_then(|node| text(cx, &node, "`doc`", "doc: multiplies its input")).unwrap_or_default()
+    fields.text(cx, "doc").unwrap_or_default()
 }
 
 fn unit(cx: &mut Cx, fields: &mut Fields) -> Option<Arc<str>> {
-    fields.take("unit").and_then(|node| text(cx, &node, "`unit`", "unit: N")).map(Arc::from)
-}
-
-fn type_names(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<TypeName> {
-    let Some(node) = fields.take(key) else { return Vec::new() };
-    one_or_more(node).iter().filter_map(|node| name(cx, node, "a component type", "Driver")).collect()
+    fields.text(cx, "unit").map(Arc::from)
 }
 
 /// A map of members, each lowered by `one`.
@@ -108,34 +86,25 @@ fn named<T>(
 }
 
 fn port(cx: &mut Cx, entry: Entry) -> Option<PortType> {
-    const EXAMPLE: &str = "{ direction: in, type: float, unit: N }";
-    let mut fields = Fields::of(cx, entry.value, "a port", EXAMPLE)?;
-    let direction = fields
-        .required(cx, "direction", "direction: in")
-        .and_then(|node| choice(cx, &node, "`direction`", &[("in", Direction::In), ("out", Direction::Out)]));
-    let ty = fields.required(cx, "type", "type: float").and_then(|node| value_type(cx, node));
+    let mut fields = Fields::of(cx, entry.value, &PORT)?;
+    let direction = fields.choice(cx, "direction", &[("in", Direction::In), ("out", Direction::Out)]);
+    let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let unit = unit(cx, &mut fields);
-    let buffered =
-        fields.take("buffered").and_then(|node| truth(cx, &node, "`buffered`", "buffered: true")).unwrap_or_default();
+    let buffered = fields.truth(cx, "buffered").unwrap_or_default();
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
     Some(PortType { direction: direction?, ty: ty?, unit, buffered, doc, origin: entry.origin })
 }
 
 fn property(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
-    const EXAMPLE: &str = "{ type: float, default: 1.0, min: 0.0, max: 10.0, tunable: stopped }";
-    let mut fields = Fields::of(cx, entry.value, "a property", EXAMPLE)?;
-    let ty = fields.required(cx, "type", "type: float").and_then(|node| value_type(cx, node));
-    let default = fields.take("default");
+    let mut fields = Fields::of(cx, entry.value, &PROPERTY)?;
+    let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
+    let default = fields.take(cx, "default");
     let default_origin = default.as_ref().map(|node| node.origin);
     let default = default.and_then(|node| value(cx, node, "`default`"));
-    let mut limit = |key| fields.take(key).and_then(|node| number(cx, &node, key, "0.5"));
-    let (min, max) = (limit("min"), limit("max"));
-    let tunable = fields.take("tunable").and_then(|node| {
-        let choices =
-            [("unconfigured", Tunable::Unconfigured), ("stopped", Tunable::Stopped), ("always", Tunable::Always)];
-        choice(cx, &node, "`tunable`", &choices)
-    });
+    let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
+    let when = [("unconfigured", Tunable::Unconfigured), ("stopped", Tunable::Stopped), ("always", Tunable::Always)];
+    let tunable = fields.choice(cx, "tunable", &when);
     let unit = unit(cx, &mut fields);
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
@@ -172,23 +141,18 @@ fn property(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
 }
 
 fn operation(cx: &mut Cx, entry: Entry) -> Option<OperationType> {
-    const EXAMPLE: &str = "{ args: [float], returns: bool, effect: none }";
-    let value = match entry.value.kind {
-        Kind::Null => Node::new(Kind::Map(Vec::new()), entry.origin),
-        _ => entry.value,
-    };
-    let mut fields = Fields::of(cx, value, "an operation", EXAMPLE)?;
+    let mut fields = Fields::of(cx, entry.value, &OPERATION)?;
     let mut args = Vec::new();
-    if let Some(node) = fields.take("args") {
+    if let Some(node) = fields.take(cx, "args") {
         match node.kind {
             Kind::List(list) => args.extend(list.into_iter().filter_map(|node| value_type(cx, node))),
-            _ => cx.wrong(&node, "`args`", "a list of types", "args: [float, int]"),
+            _ => cx.wrong(&node, "`args`", "a list of types", fields.row("args").example),
         }
     }
-    let returns = fields.take("returns").and_then(|node| value_type(cx, node));
-    let effect = fields.take("effect").and_then(|node| effect(cx, node)).unwrap_or(Effect::Irreversible);
-    let moves = fields.take("moves").and_then(|node| truth(cx, &node, "`moves`", "moves: true")).unwrap_or_default();
-    let settled_by = fields.take("settled_by").and_then(|node| condition::condition(cx, node, 0));
+    let returns = fields.take(cx, "returns").and_then(|node| value_type(cx, node));
+    let effect = fields.take(cx, "effect").and_then(|node| effect(cx, node)).unwrap_or(Effect::Irreversible);
+    let moves = fields.truth(cx, "moves").unwrap_or_default();
+    let settled_by = fields.take(cx, "settled_by").and_then(|node| condition::condition(cx, node, 0));
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
     Some(OperationType { args, returns, effect, moves, settled_by, doc, origin: entry.origin })
@@ -197,21 +161,20 @@ fn operation(cx: &mut Cx, entry: Entry) -> Option<OperationType> {
 /// `none`, `irreversible`, or `undo: OPERATION`: in a flow map `{…, effect: undo: park}` YAML allows no second colon, so
 /// the text `undo: park` in quotes and the map `{ undo: park }` are both taken.
 fn effect(cx: &mut Cx, node: Node) -> Option<Effect> {
-    const EXAMPLE: &str = "effect: { undo: park }";
     match &node.kind {
         Kind::Str(text) => {
             if let Some(operation) = text.strip_prefix("undo:") {
                 let node = Node::new(Kind::Str(operation.trim().into()), node.origin);
-                return name(cx, &node, "an operation", EXAMPLE).map(Effect::Undo);
+                return name(cx, &node, "an operation", EFFECT.example).map(Effect::Undo);
             }
             let choices = [("none", 0), ("irreversible", 1)];
             choice(cx, &node, "`effect`", &choices).map(|n| if n == 0 { Effect::None } else { Effect::Irreversible })
         }
         _ => {
-            let mut fields = Fields::of(cx, node, "`effect`", EXAMPLE)?;
-            let operation = fields.required(cx, "undo", EXAMPLE);
+            let mut fields = Fields::of(cx, node, &EFFECT)?;
+            let operation = fields.name(cx, "undo");
             fields.finish(cx);
-            operation.and_then(|node| name(cx, &node, "an operation", EXAMPLE)).map(Effect::Undo)
+            operation.map(Effect::Undo)
         }
     }
 }

@@ -2,22 +2,12 @@
 
 use super::recorder::{Classed, Shared};
 use super::{convert, sandbox};
+use crate::lang::grammar::CHANGES;
 use crate::lang::tree::{Entry, Kind, Node};
 use crate::model::finding::{are, count};
 use crate::model::{Code, Finding, Origin, codes};
 use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
 use std::borrow::Cow;
-
-/// The names of the arguments of each change, in order. What ends in `…` takes all that follow.
-const CHANGES: &[(&str, &[&str])] = &[
-    ("create", &["component", "type", "options"]),
-    ("destroy", &["component"]),
-    ("connect", &["from", "to", "policy"]),
-    ("disconnect", &["from", "to"]),
-    ("property_set", &["property", "value"]),
-    ("port_write", &["port", "value"]),
-    ("operation_call", &["operation", "args…"]),
-];
 
 /// rFSM's constructors with their other names.
 const CLASSES: &[(&str, &[&str])] = &[
@@ -32,8 +22,9 @@ fn entry(key: &'static str, origin: Origin, value: Node) -> Entry {
 
 /// Puts all constructors into the environment.
 pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
-    for (verb, names) in CHANGES {
-        env.raw_set(*verb, change(lua, shared, verb, names)?)?;
+    for primitive in CHANGES {
+        let verb = primitive.object.name;
+        env.raw_set(verb, change(lua, shared, verb, primitive.arguments)?)?;
     }
     env.raw_set("Configuration", of_a_table(lua, shared, "Configuration", None)?)?;
     // A list inside ConfiguratorConf has no names.

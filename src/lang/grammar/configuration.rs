@@ -1,0 +1,382 @@
+//! Configurations and the seven primitives.
+
+use super::{Form, Key, Names, Object, key};
+use crate::model::codes::{
+    CONF_BAD_STATE, CONF_UNKNOWN_CHANGE, MONITOR_UNKNOWN_WORD, TEXT_BAD_NAME, TEXT_BAD_TIME, TEXT_BAD_VALUE,
+    TEXT_NOT_FINITE, TEXT_UNKNOWN_KEY, TEXT_WRONG_TYPE,
+};
+
+/// A file of configurations in YAML.
+pub static CONFIGURATIONS_FILE: Object = Object {
+    name: "configurations_file",
+    what: "a file of configurations",
+    doc: "Configurations by name. In Lua: `ConfiguratorConf { name = Configuration { … } }`, as in the paper's listings.",
+    example: "configurations: …",
+    in_yaml: "",
+    may_be_empty: false,
+    keys: &[key(
+        "configurations",
+        Form::Named(&Form::Table(&CONFIGURATION)),
+        "The configurations.",
+        "configurations: { engage: { changes: [{ property_set: { property: A.k, value: 1.0 } }] } }",
+        ("configuratons: {}", TEXT_UNKNOWN_KEY),
+    )
+    .required()],
+};
+
+/// A configuration.
+pub static CONFIGURATION: Object = Object {
+    name: "configuration",
+    what: "a configuration",
+    doc: "A named change of the system: run states first, then an unordered set of changes, then run states. Applied whole or not at \
+          all, and undone by an inverse that is computed. In Lua: `Configuration { … }`, with its changes as elements.",
+    example: "name = Configuration { property_set(\"A.k\", 1.0) }",
+    in_yaml: "name: { changes: [{ property_set: { property: A.k, value: 1.0 } }] }",
+    may_be_empty: false,
+    keys: &[
+        key(
+            "pre_conf_state",
+            Form::States,
+            "Run states to bring components to first, in this order: `unconfigured`, `stopped` or `running` (the names of RTT, ROS 2, \
+             microblx and the paper are read too). `_default:STATE` stands for every component that the list does not name.",
+            "pre_conf_state = { 'youbot:running', '_default:stopped' }",
+            ("pre_conf_state: [\"youbot:runing\"]", CONF_BAD_STATE),
+        ),
+        key(
+            "changes",
+            Form::Changes,
+            "What is changed. It is a set: the order in which it is written means nothing, and what one change needs of another is \
+             worked out.",
+            "changes: [{ property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] } }]",
+            ("changes: [{ property_sett: {} }]", CONF_UNKNOWN_CHANGE),
+        ),
+        key(
+            "post_conf_state",
+            Form::States,
+            "Run states to bring components to last, in this order; written like `pre_conf_state`.",
+            "post_conf_state = { '_default:running' }",
+            ("post_conf_state: [\"youbot\"]", CONF_BAD_STATE),
+        ),
+        key(
+            "timeout",
+            Form::Seconds,
+            "How long all of it may take; what is done by then is undone.",
+            "timeout = 0.5",
+            ("timeout: -1", TEXT_BAD_TIME),
+        )
+        .without("each step has `limits.step_timeout_s`"),
+        key(
+            "group",
+            Form::Name(Names::Plain),
+            "Alternatives have the same one: applying one of them replaces the frame of the one in force.",
+            "group = \"dof\"",
+            ("group: \"d of\"", TEXT_BAD_NAME),
+        ),
+        key(
+            "safe",
+            Form::Truth,
+            "It makes the system safe: it may be applied at any time, goes before everything else, and each of its steps is tried \
+             whatever becomes of the others.",
+            "safe = true",
+            ("safe: yes", TEXT_WRONG_TYPE),
+        )
+        .without("`false`"),
+        key(
+            "on_failure",
+            Form::Choice(&["rollback", "hold"]),
+            "What is done when a step fails. `rollback`: what was done is undone, also where that moves hardware. `hold`: nothing is \
+             undone, the answer is *broken*, and the coordinator decides.",
+            "on_failure = \"rollback\"",
+            ("on_failure: stay", TEXT_BAD_VALUE),
+        )
+        .without("what was done is undone, as far as undoing it moves nothing"),
+        key(
+            "holds",
+            Form::Condition,
+            "What it stands for: true once it was applied, else it failed, and watched while it is in force. When it becomes false \
+             the coordinator hears `ID.lost`.",
+            "holds = in_state(\"Driver\", \"running\")",
+            ("holds: { runs: [Driver] }", MONITOR_UNKNOWN_WORD),
+        ),
+        key(
+            "confirm",
+            Form::Table(&CONFIRM),
+            "An event that must come, else it is undone again (`ID.reverted`).",
+            "confirm = { event = \"e_aligned\", within = 2.0 }",
+            ("confirm: e_aligned", TEXT_WRONG_TYPE),
+        ),
+        key(
+            "irreversible",
+            Form::Truth,
+            "That its author knows that something in it cannot be undone: `davit check` warns no more. An undo does not pass its frame.",
+            "irreversible = true",
+            ("irreversible: 1", TEXT_WRONG_TYPE),
+        )
+        .without("`false`"),
+        key(
+            "description",
+            Form::Text,
+            "What it is for.",
+            "description = \"what it is for\"",
+            ("description: 1", TEXT_WRONG_TYPE),
+        ),
+    ],
+};
+
+/// What must come after a configuration.
+pub static CONFIRM: Object = Object {
+    name: "confirm",
+    what: "`confirm`",
+    doc: "The event that lets a configuration stand.",
+    example: "confirm = { event = \"e_aligned\", within = 2.0 }",
+    in_yaml: "",
+    may_be_empty: false,
+    keys: &[
+        key(
+            "event",
+            Form::Name(Names::Event),
+            "The event.",
+            "event = \"e_aligned\"",
+            ("event: \"e a\"", TEXT_BAD_NAME),
+        )
+        .required(),
+        key("within", Form::Seconds, "How long it is waited for.", "within = 2.0", ("within: 0", TEXT_BAD_TIME))
+            .required(),
+    ],
+};
+
+/// One of the primitives.
+#[derive(Debug)]
+pub struct Primitive {
+    /// Its keys, under its word.
+    pub object: &'static Object,
+    /// The names of its arguments in Lua, in order. What ends in `…` takes all that follow; `options` is a table of the others.
+    pub arguments: &'static [&'static str],
+}
+
+/// The primitives, in the order of the reference.
+pub static CHANGES: &[Primitive] = &[
+    Primitive { object: &CREATE, arguments: &["component", "type", "options"] },
+    Primitive { object: &DESTROY, arguments: &["component"] },
+    Primitive { object: &CONNECT, arguments: &["from", "to", "policy"] },
+    Primitive { object: &DISCONNECT, arguments: &["from", "to"] },
+    Primitive { object: &PROPERTY_SET, arguments: &["property", "value"] },
+    Primitive { object: &PORT_WRITE, arguments: &["port", "value"] },
+    Primitive { object: &OPERATION_CALL, arguments: &["operation", "args…"] },
+];
+
+/// The primitive of that word.
+pub fn primitive(word: &str) -> Option<&'static Primitive> {
+    CHANGES.iter().find(|change| change.object.name == word)
+}
+
+const COMPONENT: Key = key(
+    "component",
+    Form::Name(Names::Component),
+    "The component.",
+    "component: Dynamics",
+    ("component: Dyna-mics", TEXT_BAD_NAME),
+)
+.required();
+
+const FROM: Key =
+    key("from", Form::Name(Names::Member), "The out-port.", "from: Kin.jacobian", ("from: Kin", TEXT_BAD_NAME))
+        .required();
+
+const TO: Key =
+    key("to", Form::Name(Names::Member), "The in-port.", "to: Dynamics.jacobian", ("to: 1", TEXT_WRONG_TYPE))
+        .required();
+
+const OPERATION: Key = key(
+    "operation",
+    Form::Name(Names::Member),
+    "The operation.",
+    "operation: youbot.setControlMode",
+    ("operation: setControlMode", TEXT_BAD_NAME),
+)
+.required();
+
+const ARGS: Key =
+    key("args", Form::List(&Form::Value), "Its arguments.", "args: [6]", ("args: 6", TEXT_WRONG_TYPE)).without("none");
+
+static CREATE: Object = Object {
+    name: "create",
+    what: "create",
+    doc: "Creates a component, unconfigured. Refused where there is one of that name.",
+    example: "create(\"Dynamics\", \"youbot.Dynamics\")",
+    in_yaml: "create: { component: Dynamics, type: youbot.Dynamics }",
+    may_be_empty: false,
+    keys: &[
+        COMPONENT,
+        key(
+            "type",
+            Form::Name(Names::Type),
+            "Its type.",
+            "type: youbot.Dynamics",
+            ("type: \"you bot\"", TEXT_BAD_NAME),
+        )
+        .required(),
+        key(
+            "activity",
+            Form::Name(Names::Plain),
+            "The activity it runs in; in Lua in the table behind the type.",
+            "activity = \"control\"",
+            ("activity: 1", TEXT_WRONG_TYPE),
+        )
+        .without("the activity `default`, with a period of 10 ms"),
+        key(
+            "properties",
+            Form::Named(&Form::Value),
+            "Initial values of properties; in Lua in the table behind the type. `tunable` does not bind them.",
+            "properties = { friction_comp = 0.9 }",
+            ("properties: [0.9]", TEXT_WRONG_TYPE),
+        )
+        .without("their defaults"),
+    ],
+};
+
+static DESTROY: Object = Object {
+    name: "destroy",
+    what: "destroy",
+    doc: "Destroys a component: it is stopped and cleaned up first. Refused while it has connections.",
+    example: "destroy(\"Dynamics\")",
+    in_yaml: "destroy: { component: Dynamics }",
+    may_be_empty: false,
+    keys: &[COMPONENT],
+};
+
+static CONNECT: Object = Object {
+    name: "connect",
+    what: "connect",
+    doc: "Connects an out-port to an in-port of the same type. Refused where they are connected.",
+    example: "connect(\"Kin.jacobian\", \"Dynamics.jacobian\")",
+    in_yaml: "connect: { from: Kin.jacobian, to: Dynamics.jacobian }",
+    may_be_empty: false,
+    keys: &[
+        FROM,
+        TO,
+        key(
+            "policy",
+            Form::Either(&[Form::Choice(&["data"]), Form::Table(&BUFFER)]),
+            "`data`: the newest value is there. A buffer: each sample is there once, in order. In Lua the third argument.",
+            "policy: { buffer: 64 }",
+            ("policy: fifo", TEXT_BAD_VALUE),
+        )
+        .without("`data`"),
+    ],
+};
+
+/// The policy of a queue.
+pub static BUFFER: Object = Object {
+    name: "buffer",
+    what: "the policy of a connection",
+    doc: "A connection that is a queue.",
+    example: "{ buffer = 64 }",
+    in_yaml: "",
+    may_be_empty: false,
+    keys: &[key(
+        "buffer",
+        Form::Whole { least: 1, most: 1_000_000 },
+        "How many samples it holds.",
+        "buffer = 64",
+        ("buffer: 0", TEXT_BAD_VALUE),
+    )
+    .unit("samples")
+    .required()],
+};
+
+static DISCONNECT: Object = Object {
+    name: "disconnect",
+    what: "disconnect",
+    doc: "Removes a connection. Refused where there is none.",
+    example: "disconnect(\"Kin.jacobian\", \"Dynamics.jacobian\")",
+    in_yaml: "disconnect: { from: Kin.jacobian, to: Dynamics.jacobian }",
+    may_be_empty: false,
+    keys: &[FROM, TO],
+};
+
+static PROPERTY_SET: Object = Object {
+    name: "property_set",
+    what: "property_set",
+    doc: "Sets a property. No step is needed where it has that value.",
+    example: "property_set(\"Dynamics.force_gain\", 0.5)",
+    in_yaml: "property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] }",
+    may_be_empty: false,
+    keys: &[
+        key(
+            "property",
+            Form::Name(Names::Member),
+            "The property.",
+            "property: Dynamics.force_gain",
+            ("property: force_gain", TEXT_BAD_NAME),
+        )
+        .required(),
+        key(
+            "value",
+            Form::Value,
+            "Its value: of its type, in its unit, within its bounds.",
+            "value: 0.5",
+            ("value: .nan", TEXT_NOT_FINITE),
+        )
+        .required(),
+    ],
+};
+
+static PORT_WRITE: Object = Object {
+    name: "port_write",
+    what: "port_write",
+    doc: "Writes a value to an in-port that nothing drives. No step is needed where that value was written.",
+    example: "port_write(\"Cart_Impedance.ext_ref_mode\", true)",
+    in_yaml: "port_write: { port: Cart_Impedance.ext_ref_mode, value: true }",
+    may_be_empty: false,
+    keys: &[
+        key(
+            "port",
+            Form::Name(Names::Member),
+            "The in-port.",
+            "port: Cart_Impedance.ext_ref_mode",
+            ("port: ext_ref_mode", TEXT_BAD_NAME),
+        )
+        .required(),
+        key(
+            "value",
+            Form::Value,
+            "The value: of the port's type and unit.",
+            "value: 0.5",
+            ("value: .inf", TEXT_NOT_FINITE),
+        )
+        .required(),
+    ],
+};
+
+static OPERATION_CALL: Object = Object {
+    name: "operation_call",
+    what: "operation_call",
+    doc: "Calls an operation and waits for it. Undone by `undo`, or by what the operation's type names.",
+    example: "operation_call(\"youbot.setControlMode\", 6)",
+    in_yaml: "operation_call: { operation: youbot.setControlMode, args: [6] }",
+    may_be_empty: false,
+    keys: &[
+        OPERATION,
+        ARGS,
+        key(
+            "undo",
+            Form::Table(&UNDO),
+            "The call that takes it back; in Lua `operation_call(…):undo(\"youbot.setControlMode\", 0)`.",
+            "undo: { operation: youbot.setControlMode, args: [0] }",
+            ("undo: setControlMode", TEXT_WRONG_TYPE),
+        )
+        .without("what the operation's `effect` says"),
+    ],
+};
+
+/// The call that takes another one back.
+pub static UNDO: Object = Object {
+    name: "undo",
+    what: "`undo`",
+    doc: "The call that takes another one back.",
+    example: "operation_call(\"youbot.setControlMode\", 6):undo(\"youbot.setControlMode\", 0)",
+    in_yaml: "undo: { operation: youbot.setControlMode, args: [0] }",
+    may_be_empty: false,
+    keys: &[OPERATION, ARGS],
+};

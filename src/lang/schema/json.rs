@@ -1,0 +1,169 @@
+//! JSON Schema (draft 7, which editors know best) of one kind of file in YAML.
+//!
+//! It is no more than a first look: what it refuses, reading refuses too (a test compares them); what it lets stand may still be
+//! refused for what stands in other places.
+
+use crate::lang::grammar::{CHANGES, File, Form, Key, Names, Object, Words};
+use crate::lang::words::{CONDITIONS, Word};
+use crate::model::RunState;
+use serde_json::{Map, Value, json};
+
+/// The schema of a kind of file.
+pub fn json_schema(file: &File) -> Value {
+    let mut definitions = Map::new();
+    for inner in file.objects().into_iter().skip(1) {
+        definitions.insert(inner.name.to_owned(), object(inner));
+    }
+    definitions.insert("value".to_owned(), any_value());
+    definitions.insert("value_type".to_owned(), value_type());
+    definitions.insert("condition".to_owned(), condition());
+    definitions.insert("change".to_owned(), change());
+    // What nothing refers to would only be noise.
+    let mut whole = object(file.object);
+    let mut used = vec![whole.clone()];
+    let mut kept = Map::new();
+    while let Some(from) = used.pop() {
+        for name in references(&from) {
+            if let Some(definition) = definitions.remove(&name) {
+                used.push(definition.clone());
+                kept.insert(name, definition);
+            }
+        }
+    }
+    if let Value::Object(whole) = &mut whole {
+        whole.insert("$schema".to_owned(), json!("http://json-schema.org/draft-07/schema#"));
+        whole.insert("title".to_owned(), json!(format!("Davit: {}", file.object.what)));
+        whole.insert("definitions".to_owned(), Value::Object(kept));
+    }
+    whole
+}
+
+/// The names of the definitions that a schema refers to.
+fn references(schema: &Value) -> Vec<String> {
+    match schema {
+        Value::Object(entries) => entries
+            .iter()
+            .flat_map(|(key, value)| match (key.as_str(), value) {
+                ("$ref", Value::String(path)) => path.rsplit('/').next().map(str::to_owned).into_iter().collect(),
+                _ => references(value),
+            })
+            .collect(),
+        Value::Array(list) => list.iter().flat_map(references).collect(),
+        _ => Vec::new(),
+    }
+}
+
+fn refer(name: &str) -> Value {
+    json!({ "$ref": format!("#/definitions/{name}") })
+}
+
+fn object(object: &Object) -> Value {
+    let properties: Map<String, Value> = object.yaml_keys().map(|key| (key.name.to_owned(), row(key))).collect();
+    let required: Vec<&str> = object.yaml_keys().filter(|key| key.required).map(|key| key.name).collect();
+    let kind = if object.may_be_empty { json!(["object", "null"]) } else { json!("object") };
+    let mut out = json!({
+        "type": kind, "description": object.doc, "properties": properties, "additionalProperties": false,
+    });
+    if !required.is_empty() {
+        out["required"] = json!(required);
+    }
+    out
+}
+
+/// A key with what an editor shows of it. What stands beside a reference is not looked at, so that goes around it.
+fn row(key: &Key) -> Value {
+    let mut out = match form(&key.form) {
+        Value::Object(entries) if !entries.contains_key("$ref") => Value::Object(entries),
+        reference => json!({ "allOf": [reference] }),
+    };
+    let mut text = key.doc.to_owned();
+    if !key.unit_of().is_empty() {
+        text.push_str(&format!(" Unit: {}.", key.unit_of()));
+    }
+    if !key.default.is_empty() {
+        text.push_str(&format!(" Without it: {}.", key.default));
+    }
+    out["description"] = json!(text);
+    out
+}
+
+fn text(pattern: &str) -> Value {
+    json!({ "type": "string", "pattern": pattern })
+}
+
+fn form(form: &Form) -> Value {
+    use self::form as of;
+    match form {
+        Form::Version => json!({ "const": 1 }),
+        Form::Truth => json!({ "type": "boolean" }),
+        Form::Text | Form::Path | Form::Step => json!({ "type": "string" }),
+        Form::Name(names) => text(names.pattern()),
+        Form::State => text("^([A-Za-z_][A-Za-z0-9_]*:)?[A-Za-z_][A-Za-z0-9_]*(\\.[A-Za-z_][A-Za-z0-9_]*)*$"),
+        Form::Trigger => {
+            text("^((?!e_(after|at)\\()\\S+|e_(after|at)\\(\\s*[-+0-9.eE]+\\s*(,\\s*[^\\s,()]+\\s*)?\\))$")
+        }
+        Form::Whole { least, most } => json!({ "type": "integer", "minimum": least, "maximum": most }),
+        Form::Number => json!({ "type": "number" }),
+        Form::Seconds => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": 86_400 }),
+        Form::Milliseconds => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": 86_400_000 }),
+        Form::Choice(words) => json!({ "type": "string", "enum": words }),
+        Form::Value => refer("value"),
+        Form::ValueType => refer("value_type"),
+        Form::Condition => refer("condition"),
+        Form::States => states(),
+        // Only Lua has functions.
+        Form::Function => json!(false),
+        Form::Changes => json!({ "type": "array", "items": refer("change") }),
+        Form::List(inner) => json!({ "type": "array", "items": of(inner) }),
+        Form::Several(inner) => json!({ "anyOf": [of(inner), { "type": "array", "items": of(inner) }] }),
+        Form::Named(inner) => json!({ "type": "object", "additionalProperties": of(inner) }),
+        Form::Table(inner) => refer(inner.name),
+        Form::Either(forms) => json!({ "anyOf": forms.iter().map(of).collect::<Vec<_>>() }),
+    }
+}
+
+fn states() -> Value {
+    let who = Names::Component.pattern().trim_matches(['^', '$']);
+    let demanded: Vec<&str> = RunState::NAMES
+        .iter()
+        .copied()
+        .filter(|name| RunState::from_name(name).and_then(RunState::wanted).is_some())
+        .collect();
+    json!({ "type": "array", "items": text(&format!("^\\s*{who}\\s*:\\s*({})\\s*$", demanded.join("|"))) })
+}
+
+fn any_value() -> Value {
+    json!({ "description": Form::Value.words(Words::Plain), "type": ["boolean", "number", "string", "array", "object"] })
+}
+
+fn value_type() -> Value {
+    json!({
+        "description": Form::ValueType.words(Words::Plain),
+        "anyOf": [
+            { "type": "string", "pattern": "^\\s*((bool|int|float|string|event)\\s*(\\[\\s*[0-9]*\\s*\\]\\s*)*|\\{.*\\}.*)$" },
+            { "type": "object", "minProperties": 1, "additionalProperties": refer("value_type") },
+        ],
+    })
+}
+
+/// One word with its arguments.
+fn condition() -> Value {
+    let one = |word: &Word| (word.name.to_owned(), json!({ "description": word.doc }));
+    let words: Map<String, Value> = CONDITIONS.iter().map(one).collect();
+    json!({
+        "description": "A condition: one word, with its argument or the list of its arguments.",
+        "type": "object", "minProperties": 1, "maxProperties": 1, "properties": words, "additionalProperties": false,
+    })
+}
+
+/// One change: its word, and its parts.
+fn change() -> Value {
+    let one = |object: &'static Object| {
+        (object.name.to_owned(), json!({ "allOf": [refer(object.name)], "description": object.doc }))
+    };
+    let words: Map<String, Value> = CHANGES.iter().map(|change| one(change.object)).collect();
+    json!({
+        "description": "A change: one word, with what it is about.",
+        "type": "object", "minProperties": 1, "maxProperties": 1, "properties": words, "additionalProperties": false,
+    })
+}

@@ -1,0 +1,396 @@
+//! The table of what can be written against reading: every row's example is read and its refused line refused, in both languages;
+//! the schema says what reading says; the pages of the reference are made of it.
+
+use davit::diagnostics::render;
+use davit::lang::grammar::{CHANGES, FILES, File, Form, Key, Languages, Object};
+use davit::lang::{self, LoadOptions, Loaded, Sources, schema};
+use davit::model::codes;
+use serde_yaml::{Mapping, Value};
+use std::path::Path;
+
+/// Files that examples name.
+const BESIDE: &[(&str, &str)] = &[
+    ("configurations.lua", "ConfiguratorConf { up = Configuration { create(\"A\", \"Gain\") } }"),
+    ("coordinator.lua", COORDINATOR),
+    ("arm.lua", COORDINATOR),
+    ("gripper.lua", COORDINATOR),
+    ("monitors.lua", "Monitors { high = monitor { when = above(\"A.x\", 2.0), event = \"e_high\" } }"),
+    ("robot.lua", ""),
+];
+const COORDINATOR: &str = "return state { idle = state {}, trans { src = \"initial\", tgt = \"idle\" } }";
+/// One that uses the parameter of the example of `with`.
+const WITH_GAIN: &str = "ConfiguratorConf { up = Configuration { property_set(\"A.k\", gain) } }";
+
+fn yaml(line: &str) -> Value {
+    serde_yaml::from_str(line).unwrap_or_else(|why| panic!("{line}: {why}"))
+}
+
+/// Puts the keys of `line` (`key: value`) into a table.
+fn put(table: &mut Mapping, line: &str) {
+    if line.is_empty() {
+        return;
+    }
+    let Value::Mapping(entries) = yaml(line) else { panic!("`{line}` is no key with a value") };
+    table.extend(entries);
+}
+
+/// A table with what it must have.
+fn least(object: &Object) -> Mapping {
+    let mut table = Mapping::new();
+    object.yaml_keys().filter(|key| key.required).for_each(|key| put(&mut table, &key.yaml()));
+    if object.name == "deployment" {
+        put(&mut table, "libraries: [standard]");
+        put(&mut table, "coordinator: coordinator.lua");
+    }
+    table
+}
+
+/// A table where a form has one.
+fn within(form: &Form, object: &Object, value: Value) -> Option<Value> {
+    let named = |name: &str, value| Value::Mapping([(Value::from(name), value)].into_iter().collect());
+    match form {
+        Form::Table(other) => std::ptr::eq(*other, object).then_some(value),
+        Form::List(inner) | Form::Several(inner) => Some(Value::Sequence(vec![within(inner, object, value)?])),
+        Form::Named(inner) => Some(named("a", within(inner, object, value)?)),
+        Form::Either(forms) => forms.iter().find_map(|form| within(form, object, value.clone())),
+        Form::Changes => {
+            let change = CHANGES.iter().find(|change| std::ptr::eq(change.object, object))?;
+            Some(Value::Sequence(vec![named(change.object.name, value)]))
+        }
+        Form::Condition if object.name == "comparison" => {
+            let Value::Mapping(mut above) = yaml("above: [A.x, 2.0]") else { unreachable!() };
+            above.values_mut().for_each(|args| args.as_sequence_mut().unwrap().push(value.clone()));
+            Some(Value::Mapping(above))
+        }
+        _ => None,
+    }
+}
+
+/// A whole file in which the table stands.
+fn around(file: &File, object: &Object, table: Mapping) -> Value {
+    let mut value = Value::Mapping(table);
+    let mut inner = object;
+    while !std::ptr::eq(inner, file.object) {
+        let holder = |outer: &&'static Object| !std::ptr::eq(*outer, inner) && holds(outer, inner).is_some();
+        let outer = file.objects().into_iter().find(holder).expect("a table that it stands in");
+        let key = holds(outer, inner).unwrap();
+        let mut table = least(outer);
+        table.insert(Value::from(key.name), within(&key.form, inner, value).unwrap());
+        (value, inner) = (Value::Mapping(table), outer);
+    }
+    value
+}
+
+/// The key of a table behind which another one may stand.
+fn holds(outer: &'static Object, inner: &Object) -> Option<&'static Key> {
+    outer.yaml_keys().find(|key| {
+        let mut found = false;
+        key.form.tables(&mut |table| found |= std::ptr::eq(table, inner));
+        found
+    })
+}
+
+/// Loads a file of that kind, in a deployment.
+fn load(file: &File, text: &str, name: &str) -> Loaded {
+    let gain = text.contains("with:") && text.contains("gain");
+    let deployment = match file.name {
+        "deployment" => text.to_owned(),
+        kind => {
+            let mut table = least(File::named("deployment").unwrap().object);
+            let named =
+                if kind == "coordinator" { Value::from(name) } else { Value::Sequence(vec![Value::from(name)]) };
+            table.insert(Value::from(kind), named);
+            if text.contains("function") {
+                put(&mut table, "trusted: true");
+            }
+            serde_yaml::to_string(&Value::Mapping(table)).unwrap()
+        }
+    };
+    let mut files = vec![("d.yaml", deployment.as_str()), (name, text)];
+    let other = |(name, text): &(&'static str, &'static str)| match *name {
+        "configurations.lua" if gain => ("configurations.lua", WITH_GAIN),
+        _ => (*name, *text),
+    };
+    files.extend(BESIDE.iter().map(other));
+    lang::load_from(&Sources::memory(files), Path::new("d.yaml"), &LoadOptions::default())
+}
+
+/// Whether reading refuses it, or the compiler of statecharts, which sees what a chart as a whole lacks.
+fn refused(loaded: &Loaded) -> bool {
+    let charts = || loaded.deployment.iter().flat_map(davit::model::Deployment::charts);
+    loaded.findings.iter().any(davit::model::Finding::is_error)
+        || charts().any(|chart| davit::statechart::compile(chart).0.is_none())
+}
+
+fn shown(loaded: &Loaded) -> String {
+    render(&loaded.findings, &loaded.sources, false)
+}
+
+/// Every row that YAML can have, with the file in which it stands: that with its example, and that with its refused line.
+fn rows() -> Vec<(&'static File, &'static Object, &'static Key, Value, Value)> {
+    let mut rows = Vec::new();
+    for file in FILES {
+        for object in file.objects() {
+            for key in object.keys.iter().filter(|key| key.language != Languages::Lua) {
+                let with = |line: &str| {
+                    let mut table = least(object);
+                    table.remove(Value::from(key.name));
+                    put(&mut table, key.beside);
+                    put(&mut table, line);
+                    around(file, object, table)
+                };
+                rows.push((file, object, key, with(&key.yaml()), with(key.refused)));
+            }
+        }
+    }
+    assert!(rows.len() > 100, "{}", rows.len());
+    rows
+}
+
+#[test]
+fn every_example_is_read_and_every_refused_line_is_refused_so() {
+    for (file, object, key, read, refused) in rows() {
+        let what = format!("{}.{}", object.name, key.name);
+        assert!(!key.doc.is_empty() || key.language == Languages::None, "{what} says nothing");
+        if key.language != Languages::None {
+            let text = serde_yaml::to_string(&read).unwrap();
+            let loaded = load(file, &text, "x.yaml");
+            assert!(loaded.findings.is_empty(), "{what}\n{text}\n{}", shown(&loaded));
+        }
+        let text = serde_yaml::to_string(&refused).unwrap();
+        let loaded = load(file, &text, "x.yaml");
+        let found: Vec<&str> = loaded.findings.iter().map(|finding| finding.code.0).collect();
+        assert!(found.contains(&key.code.0), "{what}: {} is not in {found:?}\n{text}\n{}", key.code.0, shown(&loaded));
+    }
+}
+
+#[test]
+fn every_example_in_lua_is_read() {
+    let mut read = 0;
+    for (object, around) in [
+        ("configuration", "ConfiguratorConf { c = Configuration { EXAMPLE } }"),
+        ("state", "return state { idle = state { EXAMPLE }, trans { src = \"initial\", tgt = \"idle\" } }"),
+        (
+            "transition",
+            "return state { idle = state {}, busy = state {}, trans { src = \"initial\", tgt = \"idle\" }, trans { EXAMPLE } }",
+        ),
+        ("monitor", "Monitors { m = monitor { EXAMPLE } }"),
+    ] {
+        let file = FILES.iter().find(|file| file.in_lua && file.objects().iter().any(|o| o.name == object)).unwrap();
+        let object = file.objects().into_iter().find(|o| o.name == object).unwrap();
+        for key in
+            object.keys.iter().filter(|key| key.language != Languages::Yaml && !matches!(key.form, Form::Changes))
+        {
+            let others = object.keys.iter().filter(|other| other.required && other.name != key.name);
+            let lines: Vec<&str> = others.map(|other| other.example).chain([key.example]).collect();
+            let text = around.replace("EXAMPLE", &lines.join(", "));
+            let loaded = load(file, &text, "x.lua");
+            let news: Vec<_> = loaded.findings.iter().filter(|f| f.code != codes::MONITOR_NOTHING_REPEATED).collect();
+            assert!(news.is_empty(), "{}.{}\n{text}\n{}", object.name, key.name, shown(&loaded));
+            read += 1;
+        }
+    }
+    assert!(read > 25, "{read}");
+}
+
+/// What no schema sees: files, numbers that are none, and what stands in several places.
+const BEYOND: &[davit::model::Code] = &[
+    codes::TEXT_NO_FILE,
+    codes::TYPE_BAD_DEFAULT,
+    codes::TEXT_DUPLICATE_KEY,
+    codes::TEXT_NOT_FINITE,
+    codes::MONITOR_BAD_HYSTERESIS,
+];
+
+fn validator(file: &File) -> jsonschema::Validator {
+    jsonschema::validator_for(&schema::json_schema(file)).unwrap_or_else(|why| panic!("{}: {why}", file.name))
+}
+
+fn as_json(value: &Value) -> serde_json::Value {
+    serde_json::to_value(value).unwrap()
+}
+
+#[test]
+fn the_schema_says_what_reading_says() {
+    for file in FILES {
+        let validator = validator(file);
+        for (of, object, key, read, refused) in rows() {
+            if !std::ptr::eq(of, file) {
+                continue;
+            }
+            let what = format!("{}.{}", object.name, key.name);
+            if key.language != Languages::None {
+                assert!(validator.is_valid(&as_json(&read)), "{what}: {read:?}");
+            }
+            let beyond = BEYOND.contains(&key.code) || (object.name == "property" && key.refused == "type: event");
+            // What is inside a condition it does not look at; a connector that is none is a state to it.
+            let unseen = matches!(object.name, "comparison" | "connector");
+            if !beyond && !unseen {
+                assert!(!validator.is_valid(&as_json(&refused)), "{what}: `{}` passes the schema", key.refused);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_shipped_file_passes_its_schema() {
+    let mut seen = 0;
+    for entry in ignore_targets("deployments").chain(ignore_targets("configs")).chain(ignore_targets("examples")) {
+        let text = std::fs::read_to_string(&entry).unwrap();
+        let Ok(value) = serde_yaml::from_str::<Value>(&text) else { continue };
+        let Some(table) = value.as_mapping() else { continue };
+        let kind = if table.contains_key("davit") {
+            "deployment"
+        } else if let Some(file) = FILES.iter().find(|file| table.contains_key(file.name)) {
+            file.name
+        } else {
+            continue;
+        };
+        let errors: Vec<String> =
+            validator(File::named(kind).unwrap()).iter_errors(&as_json(&value)).map(|why| format!("{why}")).collect();
+        assert!(errors.is_empty(), "{}: {errors:#?}", entry.display());
+        seen += 1;
+    }
+    assert!(seen >= 7, "{seen}");
+}
+
+/// The YAML files below a folder.
+fn ignore_targets(folder: &str) -> impl Iterator<Item = std::path::PathBuf> {
+    fn walk(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, found);
+            } else if path.extension().is_some_and(|e| e == "yaml" || e == "yml") {
+                found.push(path);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk(Path::new(folder), &mut found);
+    found.sort();
+    found.into_iter()
+}
+
+/// An editor that underlines what is right is worse than none: what the schema refuses, reading refuses.
+#[test]
+fn what_the_schema_refuses_is_refused() {
+    let mut random = Random(1);
+    let (mut cases, mut by_schema) = (0, 0);
+    let validators: Vec<_> = FILES.iter().map(validator).collect();
+    for (file, object, key, read, _) in rows().into_iter().filter(|(_, _, key, ..)| key.language != Languages::None) {
+        let validator = &validators[FILES.iter().position(|other| std::ptr::eq(other, file)).unwrap()];
+        for _ in 0..25 {
+            let mut value = read.clone();
+            mutate(&mut value, &mut random);
+            cases += 1;
+            if validator.is_valid(&as_json(&value)) {
+                continue;
+            }
+            by_schema += 1;
+            let text = serde_yaml::to_string(&value).unwrap();
+            let loaded = load(file, &text, "x.yaml");
+            assert!(refused(&loaded), "{}.{}: only the schema refuses\n{text}", object.name, key.name);
+        }
+    }
+    assert!(cases > 2_000 && by_schema > cases / 4, "{by_schema} of {cases}");
+}
+
+/// A small generator: the same numbers every time.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(self.0 >> 33).unwrap() % n
+    }
+}
+
+/// Another value somewhere, another name of a key, or one key less.
+fn mutate(value: &mut Value, random: &mut Random) {
+    let inner = match value {
+        Value::Mapping(table) if !table.is_empty() => {
+            let keys: Vec<Value> = table.keys().cloned().collect();
+            let key = keys[random.below(keys.len())].clone();
+            match random.below(6) {
+                0 => {
+                    table.remove(&key);
+                    return;
+                }
+                1 => {
+                    let entry = table.remove(&key).unwrap();
+                    table.insert(Value::from("misspelt"), entry);
+                    return;
+                }
+                _ => table.get_mut(&key),
+            }
+        }
+        Value::Sequence(list) if !list.is_empty() => {
+            let at = random.below(list.len());
+            list.get_mut(at)
+        }
+        _ => None,
+    };
+    match inner {
+        Some(inner) if random.below(4) > 0 => mutate(inner, random),
+        _ => {
+            let others = ["true", "7", "-1", "0.5", "x y", "\"\"", "[a]", "[1]", "{ k: 1 }", "1e9", "9z"];
+            *value = yaml(others[random.below(others.len())]);
+        }
+    }
+}
+
+#[test]
+fn the_annotations_are_lua_and_name_every_constructor() {
+    let text = schema::annotations();
+    let lua = mlua::Lua::new();
+    lua.load(&text).exec().unwrap_or_else(|why| panic!("{why}\n{text}"));
+    let words = CHANGES.iter().map(|change| change.object.name);
+    for name in
+        words.chain(["Configuration", "ConfiguratorConf", "state", "trans", "conn", "Monitors", "monitor", "above"])
+    {
+        assert!(lua.globals().get::<mlua::Function>(name).is_ok(), "{name}");
+    }
+    for (file, object, key, ..) in rows() {
+        let only_yaml = key.language != Languages::All || matches!(key.form, Form::Changes);
+        let is_field = file.in_lua && !std::ptr::eq(object, file.object) && !only_yaml;
+        let of_call =
+            CHANGES.iter().any(|change| std::ptr::eq(change.object, object)) && matches!(key.name, "args" | "undo");
+        if is_field && !of_call {
+            let named = [format!("@field {}", key.name), format!("@param {}", key.name)];
+            assert!(named.iter().any(|name| text.contains(name)), "{}.{}", object.name, key.name);
+        }
+    }
+}
+
+/// `DAVIT_WRITE_REFERENCE=1 cargo test --test lang reference` writes the pages anew.
+#[test]
+fn the_pages_are_those_of_the_table() {
+    let write = std::env::var_os("DAVIT_WRITE_REFERENCE").is_some();
+    for file in FILES {
+        let path = format!("docs/reference/{}.md", file.name);
+        let made = schema::markdown(file);
+        if write {
+            std::fs::create_dir_all("docs/reference").unwrap();
+            std::fs::write(&path, &made).unwrap();
+        }
+        let written = std::fs::read_to_string(&path).unwrap_or_default();
+        assert!(written == made, "{path} is not what the table says: write it anew (see this test)");
+    }
+}
+
+#[test]
+fn every_name_is_explained() {
+    let names = schema::names();
+    assert!(names.len() > 100, "{}", names.len());
+    for name in names {
+        let entries = schema::about(name);
+        assert!(!entries.is_empty(), "{name}");
+        for entry in entries {
+            assert!(entry.example.yaml.is_some() || entry.example.lua.is_some(), "{name}");
+            let path = entry.of.map(|of| format!("{of}.{name}"));
+            assert!(path.is_none_or(|path| schema::about(&path).len() == 1), "{name}");
+        }
+    }
+    assert!(schema::about("durability").is_empty() && schema::about("configuration.src").is_empty());
+}
