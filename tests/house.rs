@@ -338,6 +338,39 @@ fn nothing_is_left_undone_and_no_machine_is_named() {
     assert!(wrong.is_empty(), "unfinished code, or paths that exist on one machine only:\n{}", wrong.join("\n"));
 }
 
+/// What the code refers to for its meaning is in the repository: a section of `docs/semantics.md`, or another page of `docs`.
+#[test]
+fn what_is_referred_to_is_there() {
+    let pages = std::fs::read_to_string(root().join("docs/semantics.md")).expect("the semantics");
+    let sections: Vec<&str> = pages.lines().filter_map(|line| line.strip_prefix("## ")).collect();
+    let mut referred = 0;
+    for (file, text) in sources("src").into_iter().chain(sources("tests")) {
+        if file.ends_with("house.rs") {
+            continue;
+        }
+        assert!(!text.contains("design \u{a7}"), "{file} refers to a text that is not here");
+        for (at, _) in text.match_indices("(semantics:") {
+            let inside =
+                &text[at..at + text[at..].find(')').unwrap_or_else(|| panic!("{file}: a parenthesis is open"))];
+            for section in inside.split('*').skip(1).step_by(2) {
+                assert!(sections.contains(&section), "{file}: docs/semantics.md has no section `{section}`");
+                referred += 1;
+            }
+        }
+        for (at, _) in text.match_indices("docs/") {
+            let path: String = text[at..]
+                .chars()
+                .take_while(|c| c.is_ascii_alphanumeric() || matches!(c, '/' | '-' | '_' | '.'))
+                .collect();
+            if let Some(end) = path.find(".md") {
+                let path = &path[..end + 3];
+                assert!(path.contains('{') || root().join(path).exists(), "{file}: there is no {path}");
+            }
+        }
+    }
+    assert!(referred > 40, "{referred}");
+}
+
 #[test]
 fn time_is_read_in_one_room() {
     let mut wrong = Vec::new();

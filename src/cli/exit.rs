@@ -1,4 +1,4 @@
-//! Exit codes of every command (design §13).
+//! Exit codes of every command (docs/operating.md).
 
 use crate::session::Ended;
 use std::process::ExitCode;

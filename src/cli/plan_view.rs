@@ -1,4 +1,4 @@
-//! Plans as other programs see them (design §16).
+//! Plans as other programs see them.
 
 use super::plan::Planned;
 use crate::model::{Ask, Snapshot};

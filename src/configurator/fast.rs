@@ -1,4 +1,4 @@
-//! Prepared switches: the way of a request that plans nothing and allocates nothing (design §6).
+//! Prepared switches: the way of a request that plans nothing and allocates nothing (semantics: *Requests*).
 //!
 //! What was planned for a fixed configuration is kept, with its steps prepared on the platform as well. A lone request for
 //! it while all is as when it was planned, or for its undo while its frame is the top, goes this way: step by step, through

@@ -1,4 +1,4 @@
-//! Transactions over a platform: configurations are applied and undone on request, whole or not at all (design §6).
+//! Transactions over a platform: configurations are applied and undone on request, whole or not at all (semantics: *Requests*).
 //!
 //! Requests come in as events with a number, answers go out as status events; every request gets exactly one. The
 //! configurator runs on its own thread and knows no coordinator: who asks is a name. It decides nothing but whether a

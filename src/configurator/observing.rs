@@ -1,4 +1,4 @@
-//! A slow look at components that nothing is under way with (design §6): are they as the steps have left them? What differs (a
+//! A slow look at components that nothing is under way with (semantics: *What goes wrong*): are they as the steps have left them? What differs (a
 //! false *done*, a stranger's doing) is a residual like others, and who wrote it last is lost.
 
 use super::engine::Engine;

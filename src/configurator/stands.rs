@@ -1,4 +1,4 @@
-//! What configurations stand for (design §3, `holds`): asked before they count as applied, watched while they are in force.
+//! What configurations stand for (semantics: *Configurations*, `holds`): asked before they count as applied, watched while they are in force.
 
 use super::conditions::{Standing, Truth, Watch};
 use super::engine::Engine;

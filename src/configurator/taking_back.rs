@@ -1,4 +1,4 @@
-//! The second stage of stopping: nobody leads any more, and what is in force is taken back (design §6).
+//! The second stage of stopping: nobody leads any more, and what is in force is taken back (semantics: *Stopping*).
 //!
 //! What is under way is given up as by a rollback that nobody asked for. Frames are popped, newest first, compensations
 //! included: but those that came since stopping began, those of safe configurations, and what these block. What was put to

@@ -1,4 +1,4 @@
-//! The third stage of stopping: by force, to nothing (design §6).
+//! The third stage of stopping: by force, to nothing (semantics: *Stopping*).
 
 use super::control::{InTurn, TakenDown};
 use super::engine::{Engine, Force};

@@ -26,7 +26,7 @@ impl From<Raised> for Tag {
 /// Who hears of what a coordinator does. It is called from the coordinator's thread and must not wait.
 pub trait Listener {
     /// One step raised these names, in this order. What a step raises belongs together: an undo and a push of one batch
-    /// are one transaction (design §5).
+    /// are one transaction (semantics: *The stack*).
     fn raised(&mut self, chart: &Chart, batch: &[Raised]);
 
     /// A transition was taken (or the chart was entered). `active` are the states active now, from the root inwards. Called

@@ -1,4 +1,4 @@
-//! Runs a statechart: events in, names out (design §7).
+//! Runs a statechart: events in, names out (semantics: *Coordinators*).
 //!
 //! A [`Coordinator`] is a thread of its own that takes events from its inbox, one at a time, and lets the chart react to
 //! each until it comes to rest; the names that a step raises go to a [`Listener`] as one batch. [`Core`] is the same

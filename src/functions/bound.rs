@@ -223,7 +223,7 @@ impl Bound {
         Ok(table)
     }
 
-    /// Puts the active leaf where rFSM has it (`rfsm.md` §5): only when it is another one than was seen last.
+    /// Puts the active leaf where rFSM has it (`docs/rfsm.md` §5): only when it is another one than was seen last.
     pub fn show_leaf(&self, leaf: Option<NodeId>) {
         if self.shown_leaf.replace(leaf) == leaf {
             return;

@@ -1,4 +1,4 @@
-//! What a model adds to a machine that runs (`rfsm.md` §8, `fsm_merge`).
+//! What a model adds to a machine that runs (`docs/rfsm.md` §8, `fsm_merge`).
 //!
 //! The Lua part has put the tables in their places and asks here for the chart. Questions are answered by the chart as it
 //! is from then on; a step that is under way goes on with the one it began with.

@@ -185,7 +185,7 @@ fn asking(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     })
 }
 
-/// What a model looks for among the transitions, and adds to them (`rfsm.md` §8).
+/// What a model looks for among the transitions, and adds to them (`docs/rfsm.md` §8).
 fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     shared(lua, host, "outgoing", |_, host, node: Table| {
         let (bound, id) = state_of(host, &node)?;

@@ -1,4 +1,4 @@
-//! Configurations: what is to be changed, as written (paper §"Modeling configuration"; design §3).
+//! Configurations: what is to be changed, as written (semantics: *Configurations*).
 
 use super::finding::Origin;
 use super::monitor::Condition;

@@ -1,4 +1,4 @@
-//! Requests to a configurator and its answers (design §6), as data.
+//! Requests to a configurator and its answers (semantics: *Requests*), as data.
 
 use super::names::{ConfigId, EventName};
 use serde::Serialize;
@@ -44,7 +44,7 @@ impl fmt::Display for Ask {
 /// What asks for an undo ends so.
 pub const UNDO: &str = ".undo";
 
-/// What a name means that a coordinator raises (design §7).
+/// What a name means that a coordinator raises (semantics: *Coordinators*).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Raise {
     /// A request: a configuration's ID, one with `.undo` behind it, or `undo`.

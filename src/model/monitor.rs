@@ -1,4 +1,4 @@
-//! Monitors, as written: conditions over signals and time, and the events they raise (design §8).
+//! Monitors, as written: conditions over signals and time, and the events they raise (docs/monitors.md).
 //!
 //! What a condition means, to the instant, is said in `docs/monitors.md` and done in `crate::monitor`.
 

@@ -4,7 +4,7 @@
 //! plan touch thousands of components without an allocation per name. Interned text is never freed; the text a
 //! deployment may bring in is bounded (see [`crate::limits`]), and so is what it can intern.
 //!
-//! Grammar (design §2): a plain name is `[A-Za-z_][A-Za-z0-9_]*`; subsystems are separated by `/`, a member by `.`:
+//! Grammar (semantics: *Words*): a plain name is `[A-Za-z_][A-Za-z0-9_]*`; subsystems are separated by `/`, a member by `.`:
 //! `left/Dynamics.force_gain`.
 
 use super::value::Value;

@@ -1,4 +1,4 @@
-//! Run states and their legal transitions (design §2, §3).
+//! Run states and their legal transitions (semantics: *Words*).
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -142,7 +142,7 @@ impl RunState {
         }
     }
 
-    /// The state a text names, in our words or the field's (RTT, ROS 2, microblx, the paper); design §2.
+    /// The state a text names, in our words or the field's (RTT, ROS 2, microblx, the paper).
     pub fn from_name(text: &str) -> Option<Self> {
         Some(match text {
             "unconfigured" | "PreOperational" | "preinit" => Self::Unconfigured,

@@ -1,4 +1,4 @@
-//! Statecharts, as written: what a coordinator is before it is compiled (design §7, the semantics of rFSM).
+//! Statecharts, as written: what a coordinator is before it is compiled (semantics: *Coordinators*, the semantics of rFSM).
 //!
 //! Nothing is resolved here. A transition keeps the texts of its source and target, in the scope in which it was written;
 //! `crate::statechart::compile` resolves them and says what is wrong. The order of things matters and is kept: of
@@ -24,7 +24,7 @@ impl Statechart {
         Self { root, plugins: Vec::new() }
     }
 
-    /// Whether nothing in it is a function (design §7: a *pure* coordinator).
+    /// Whether nothing in it is a function: a *pure* coordinator (semantics: *Coordinators*).
     pub fn is_pure(&self) -> bool {
         self.root.is_pure()
     }
@@ -71,7 +71,7 @@ pub struct State {
     /// What happens on exit, in this order.
     pub exit: Vec<(Action, Origin)>,
     /// Configurations in force while the state is active: pushed after `entry` in this order, popped before `exit` in the
-    /// reverse order (design §5).
+    /// reverse order (semantics: *The stack*).
     pub config: Vec<(ConfigId, Origin)>,
     /// The activity of a leaf: a function that may yield.
     pub doo: Option<(FunctionId, Origin)>,

@@ -1,4 +1,4 @@
-//! The changes of a configuration: from an unordered set to steps with the order that they need (design §3).
+//! The changes of a configuration: from an unordered set to steps with the order that they need (semantics: *Configurations*).
 //!
 //! The order is derived from what the changes touch, class by class: disconnect; destroy, on the legal path down; create;
 //! what concerns one component; connect. Inside a class everything commutes, so each check sees the same system whatever

@@ -1,4 +1,4 @@
-//! What a plan touches, slot by slot, so that frames can tell what they share (design §4).
+//! What a plan touches, slot by slot, so that frames can tell what they share (semantics: *Steps and plans*).
 //!
 //! What one step touches is said in [`crate::system::touch`].
 

@@ -1,4 +1,4 @@
-//! The embedded component runtime (design §11): components as Rust types in this process.
+//! The embedded component runtime (semantics: *Platforms*): components as Rust types in this process.
 //!
 //! For those who write components: [`Component`], [`Builder`], the ports [`In`], [`Out`], [`EventOut`], [`Prop`],
 //! [`Context`], [`Answer`]; [`record!`](crate::record) for structs that travel through ports; [`Library`] to give types to

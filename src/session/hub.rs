@@ -144,7 +144,7 @@ impl Hub {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a raised name means (design §7): a request if it is a configuration's ID or ends in `.undo` (or is `undo`);
+    /// What a raised name means (semantics: *Coordinators*): a request if it is a configuration's ID or ends in `.undo` (or is `undo`);
     /// else an event that the deployment declares as emitted; else nothing, which `check` refuses.
     pub fn meaning(&self, name: EventName) -> Meaning {
         match Raise::of(name, |id| self.configurations.contains(&id)) {

@@ -1,4 +1,4 @@
-//! The life of a deployment: brought up, served, down (design §6). How it is stopped: [`stopping`](super::stopping).
+//! The life of a deployment: brought up, served, down (semantics: *Stopping*). How it is stopped: [`stopping`](super::stopping).
 
 use super::log::{Happening, Phase};
 use super::stages::Stage;

@@ -1,4 +1,4 @@
-//! The way out of *broken* (design §6): what differs from what should be, going back, taking what is there.
+//! The way out of *broken* (semantics: *What goes wrong*): what differs from what should be, going back, taking what is there.
 
 use super::Session;
 use super::log::Happening;

@@ -1,4 +1,4 @@
-//! Which stage of stopping comes next (design §6). Pure: what happened in, what to do out.
+//! Which stage of stopping comes next (semantics: *Stopping*). Pure: what happened in, what to do out.
 
 use serde::{Deserialize, Serialize};
 

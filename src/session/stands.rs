@@ -1,5 +1,5 @@
-//! Evaluates the conditions that the configurator needs: what configurations stand for, and what settles calls (design §3,
-//! §6). By the monitors' own evaluator, without any component, on a thread of its own.
+//! Evaluates the conditions that the configurator needs: what configurations stand for, and what settles calls (semantics:
+//! *Configurations*, *What goes wrong*). By the monitors' own evaluator, without any component, on a thread of its own.
 //!
 //! Each condition has its own look at the platform, from when it is asked for: so it sees what is written from then on and
 //! nothing before.

@@ -1,4 +1,4 @@
-//! Stopping, stage by stage (design §6): what [`stages`](super::stages) decides is carried out.
+//! Stopping, stage by stage (semantics: *Stopping*): what [`stages`](super::stages) decides is carried out.
 
 use super::halt::StandsStill;
 use super::life::{Ended, UNSEEN, survived};

@@ -1,5 +1,5 @@
 //! The tap: whatever observes hangs on one (a terminal, a subscriber, a recording), and nothing that acts ever waits for it
-//! (design §7).
+//! (semantics: *Coordinators*).
 //!
 //! An observer has a thread of its own and a bounded queue before it. On the real clock what finds the queue full is
 //! dropped and counted, and the observer is told of the hole where it is: once it keeps up again, and at most once in

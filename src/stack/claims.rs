@@ -1,5 +1,5 @@
 //! What a request may touch, known from its text: requests that have nothing to do with each other are carried out at the
-//! same time (design §6, "Claims").
+//! same time (semantics: *Requests*).
 
 use super::request::Request;
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Ident, Target};

@@ -1,4 +1,4 @@
-//! Who waits for whom: batches that have come, in the order in which they begin (design §6, "Claims").
+//! Who waits for whom: batches that have come, in the order in which they begin (semantics: *Requests*).
 //!
 //! A batch begins when no earlier one, under way or waiting, claims anything of what it claims, and when the one before of
 //! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no circle of waits can

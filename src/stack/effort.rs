@@ -1,4 +1,4 @@
-//! What a safe configuration comes to: as much of it as can be done, whatever is in its way (design §6).
+//! What a safe configuration comes to: as much of it as can be done, whatever is in its way (semantics: *Safe configurations*).
 //!
 //! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
 //! there has nothing to be made safe, and is left out.

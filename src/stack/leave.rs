@@ -1,4 +1,4 @@
-//! What a coordinator that leads down takes along: frames of operators that stand in the way of what it undoes (design §6).
+//! What a coordinator that leads down takes along: frames of operators that stand in the way of what it undoes (semantics: *Stopping*).
 //!
 //! An operator may have put something on top of what a coordinator has applied; while everything is being stopped nobody is
 //! there who would take that away again. So it goes first, newest first, in one transaction with the undo that was asked for:

@@ -3,7 +3,7 @@
 //!
 //! Mended first and undone then, a component that is not running, though the platform had said so, would be started to be
 //! stopped at once: it would move, and nobody asked for that. So both are one net, from what is there to what the undo
-//! leads to (design §6).
+//! leads to (semantics: *What goes wrong*).
 
 use super::work::{Op, Planned, is_bound, transaction};
 use super::{Broken, Frame, FrameId, HandOver, Seen, World, net};

@@ -1,4 +1,4 @@
-//! What is in force: frames, how they are taken back, and what a batch of requests means (design §5, §6).
+//! What is in force: frames, how they are taken back, and what a batch of requests means (semantics: *The stack*, *Requests*).
 //!
 //! Pure: a stack never touches a platform, and it never changes by itself. [`transaction`] decides everything beforehand
 //! and gives the steps together with the edits of the stack; [`Stack::apply`] takes those over when the steps are done, and

@@ -1,4 +1,4 @@
-//! What is made permanent (design §5): frames that are given up, so that what they did stays.
+//! What is made permanent (semantics: *The stack*): frames that are given up, so that what they did stays.
 
 use super::{Frame, Requester, Stack};
 use crate::model::{Finding, codes};

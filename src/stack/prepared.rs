@@ -1,4 +1,4 @@
-//! Prepared switches: what the planner made of a fixed configuration, kept to be carried out again (design §6).
+//! Prepared switches: what the planner made of a fixed configuration, kept to be carried out again (semantics: *Requests*).
 //!
 //! A [`Switch`] is a frame that was planned in the ordinary way, with all that decided its steps: which components there
 //! were and in which run states, that nothing drove the ports, and which demands were true already. While that is so,

@@ -1,4 +1,4 @@
-//! What is asked of a configurator: requests, who makes them, and which belong together (design §6).
+//! What is asked of a configurator: requests, who makes them, and which belong together (semantics: *Requests*).
 
 use crate::model::{Ask, ComponentName, OPERATOR, RequestId};
 use smallvec::SmallVec;

@@ -1,4 +1,4 @@
-//! Whether a frame may be popped, which values it then hands over, and which calls stay (design §5).
+//! Whether a frame may be popped, which values it then hands over, and which calls stay (semantics: *The stack*).
 //!
 //! What a safe configuration has called stays while it is in force, whoever else called the same: nothing takes it back.
 

@@ -1,4 +1,4 @@
-//! Keeping each requester within its bound: its oldest frames become one, which is undone as one (design §5).
+//! Keeping each requester within its bound: its oldest frames become one, which is undone as one (semantics: *The stack*).
 
 use super::net::reduce;
 use super::{Frame, FrameId, Inverse, Requester, share};

@@ -1,4 +1,4 @@
-//! From a chart as written to tables: what rFSM's `init` does (`rfsm.md` §2), with all faults said at once.
+//! From a chart as written to tables: what rFSM's `init` does (`docs/rfsm.md` §2), with all faults said at once.
 //!
 //! What `init` rejects is an error here. What it only complains about is a warning. Beyond rFSM, circles of connectors
 //! (which overflow its stack) and transitions of the root (on which it trips) are refused.

@@ -1,4 +1,4 @@
-//! A chart that grows while it runs (`rfsm.md` §8, `fsm_merge`).
+//! A chart that grows while it runs (`docs/rfsm.md` §8, `fsm_merge`).
 //!
 //! Only models with functions do that. What there is keeps its number, so a machine goes on with what it had: a new state
 //! or transition stands at the end of its table. The outgoing transitions of a node stand side by side, so with a new one

@@ -1,4 +1,4 @@
-//! One run of a chart: rFSM's `step` and `run` (`rfsm.md` §5, §6, §7, §9).
+//! One run of a chart: rFSM's `step` and `run` (`docs/rfsm.md` §5, §6, §7, §9).
 
 use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};

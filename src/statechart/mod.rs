@@ -1,4 +1,4 @@
-//! Statecharts, compiled: flat tables and a step function with the semantics of rFSM (design §7).
+//! Statecharts, compiled: flat tables and a step function with the semantics of rFSM (docs/rfsm.md).
 //!
 //! [`compile`] turns a chart as written into a [`Chart`] (every reference resolved, every outgoing list in its final
 //! order) and says all that is wrong with it. A [`Machine`] is one run of a chart: [`Machine::step`] is what rFSM's

@@ -1,4 +1,4 @@
-//! What the text of a source or target means (`rfsm.md` §3).
+//! What the text of a source or target means (`docs/rfsm.md` §3).
 //!
 //! A text without a dot is a name of the scope in which the transition is written. One that begins with a dot is a path
 //! from that scope; any other is a path from the root, with or without the word `root` in front. rFSM also takes a

@@ -1,4 +1,4 @@
-//! A coordinator alone, stepped line by line: what `davit sim` does (design §16). Pure: lines in, observations out.
+//! A coordinator alone, stepped line by line: what `davit sim` does. Pure: lines in, observations out.
 
 use super::Machine;
 use super::chart::{Chart, NodeId};

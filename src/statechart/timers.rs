@@ -1,4 +1,4 @@
-//! Time events of a run (`rfsm.md` §9): begun on entry, looked at after every turn.
+//! Time events of a run (`docs/rfsm.md` §9): begun on entry, looked at after every turn.
 
 use super::chart::{Chart, NodeId, Timer};
 use super::hook::Hook;

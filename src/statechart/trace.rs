@@ -1,4 +1,4 @@
-//! What a model's own `dbg` printer is told while a machine steps (`rfsm.md` §8): rFSM's tags, in its order.
+//! What a model's own `dbg` printer is told while a machine steps (`docs/rfsm.md` §8): rFSM's tags, in its order.
 //!
 //! The engine only says what happens; the words are the hook's. A hook that does not want it ([`Hook::traces`]) costs
 //! nothing.

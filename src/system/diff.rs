@@ -1,5 +1,5 @@
 //! The steps from one system to another. One mechanism for repair of drift, a return to a saved system, forced teardown
-//! and the comparison of two systems (design §4).
+//! and the comparison of two systems (semantics: *Steps and plans*).
 
 use super::{Node, Overlay, System, View, step};
 use crate::model::{ComponentName, MemberRef, Policy, RunState, Step, Value, Wanted};

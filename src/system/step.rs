@@ -1,6 +1,6 @@
 //! What a step means: when it may happen, what it does to the picture of a system, and which steps undo it.
 //!
-//! The three stand together, one kind of step after the other, because each is the other two's specification (design §4).
+//! The three stand together, one kind of step after the other, because each is the other two's specification (semantics: *Steps and plans*).
 //! What it touches stands beside them, in [`touch`](super::touch).
 
 pub use super::touch::{absolute, components, touch_each, touches};

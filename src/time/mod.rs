@@ -1,4 +1,4 @@
-//! Time: one clock, real or simulated, for everything (design §11).
+//! Time: one clock, real or simulated, for everything (semantics: *Platforms*).
 //!
 //! What runs on a [`Clock`] never reads another one: no `Instant::now`, no `thread::sleep`, no other channel, anywhere
 //! else in the project. In return the same code runs in real time and, on [`Clock::simulated`], as fast as the machine and

@@ -1,4 +1,4 @@
-//! What the way back brings back goes on to where safe configurations want it (design §6).
+//! What the way back brings back goes on to where safe configurations want it (semantics: *Safe configurations*).
 
 use super::Transaction;
 use super::back::WayBack;

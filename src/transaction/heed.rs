@@ -1,4 +1,4 @@
-//! What safe configurations touched, and how the way back of what they interrupted heeds it (design §6): what they wrote is
+//! What safe configurations touched, and how the way back of what they interrupted heeds it (semantics: *Safe configurations*): what they wrote is
 //! never overwritten, and what is brought back comes back as they want it.
 
 use super::Transaction;

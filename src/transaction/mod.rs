@@ -1,4 +1,4 @@
-//! One transaction: a plan carried out whole, or taken back, or what remains is named (design §6).
+//! One transaction: a plan carried out whole, or taken back, or what remains is named (semantics: *Requests*).
 //!
 //! A pure machine without thread, clock or platform. [`Transaction::poll`] says what is to be done next: steps to begin,
 //! calls to cancel, components to read back; [`Transaction::on`] hears what came of it. The model of the system lies with

@@ -210,31 +210,44 @@ fn the_socket_and_the_scripts_are_documented() {
     }
 }
 
-/// `docs/promises.md` names, behind each promise, tests that are there.
+/// How many tests a cell names; panics at one that is not there.
+fn tests_named(cell: &str) -> usize {
+    let mut named = 0;
+    for test in cell.split('`').skip(1).step_by(2) {
+        let (binary, path) = test.split_once(' ').expect("a test binary and a test");
+        let (modules, name) = path.rsplit_once("::").unwrap_or(("", path));
+        let module = modules.replace("::", "/");
+        let places = match (binary, module.as_str()) {
+            ("lib", module) => [format!("src/{module}.rs"), format!("src/{module}/mod.rs")],
+            (binary, "") => [format!("tests/{binary}.rs"), format!("tests/{binary}/main.rs")],
+            (binary, module) => [format!("tests/{binary}/{module}.rs"), format!("tests/{binary}/{module}/mod.rs")],
+        };
+        let source: String =
+            places.iter().filter_map(|place| std::fs::read_to_string(root().join(place)).ok()).collect();
+        let found =
+            source.find(&format!("fn {name}(")).and_then(|at| source[..at].rfind("#[test]").map(|test| at - test));
+        assert!(found.is_some_and(|distance| distance < 200), "there is no test `{test}` ({places:?})");
+        named += 1;
+    }
+    named
+}
+
+/// `docs/promises.md` names, behind each promise, tests that are there; `docs/semantics.md` behind each law.
 #[test]
-fn each_promise_has_its_tests() {
+fn each_promise_and_each_law_has_its_tests() {
     let text = std::fs::read_to_string(root().join("docs/promises.md")).expect("the table of promises");
     let mut named = 0;
     for line in text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| promise")) {
-        let tests = line.split('|').nth(2).expect("promise, tests");
-        let before = named;
-        for test in tests.split('`').skip(1).step_by(2) {
-            let (binary, path) = test.split_once(' ').expect("a test binary and a test");
-            let (modules, name) = path.rsplit_once("::").unwrap_or(("", path));
-            let module = modules.replace("::", "/");
-            let places = match (binary, module.as_str()) {
-                ("lib", module) => [format!("src/{module}.rs"), format!("src/{module}/mod.rs")],
-                (binary, "") => [format!("tests/{binary}.rs"), format!("tests/{binary}/main.rs")],
-                (binary, module) => [format!("tests/{binary}/{module}.rs"), format!("tests/{binary}/{module}/mod.rs")],
-            };
-            let source: String =
-                places.iter().filter_map(|place| std::fs::read_to_string(root().join(place)).ok()).collect();
-            let found =
-                source.find(&format!("fn {name}(")).and_then(|at| source[..at].rfind("#[test]").map(|test| at - test));
-            assert!(found.is_some_and(|distance| distance < 200), "there is no test `{test}` ({places:?})");
-            named += 1;
-        }
-        assert!(named > before || line.starts_with("|---"), "no test behind: {line}");
+        let tests = tests_named(line.split('|').nth(2).expect("promise, tests"));
+        assert!(tests > 0 || line.starts_with("|---"), "no test behind: {line}");
+        named += tests;
     }
     assert!(named > 80, "{named}");
+    let text = std::fs::read_to_string(root().join("docs/semantics.md")).expect("the semantics");
+    let laws = text.lines().skip_while(|line| !line.starts_with("| law |")).skip(2);
+    let laws: Vec<&str> = laws.take_while(|line| line.starts_with('|')).collect();
+    assert!(laws.len() > 10, "{laws:?}");
+    for line in laws {
+        assert!(tests_named(line.split('|').nth(3).expect("law, statement, tests")) > 0, "no test behind: {line}");
+    }
 }

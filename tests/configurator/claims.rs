@@ -1,4 +1,4 @@
-//! The law of claims (design §4): requests that are carried out at the same time end in the same system, with the same
+//! The law of claims (semantics: *Laws*): requests that are carried out at the same time end in the same system, with the same
 //! answers, as one after the other in the order of their answers.
 
 use crate::rig::*;

@@ -1,4 +1,4 @@
-//! What a safe configuration has called stays while it is in force, whoever else called the same (design §6).
+//! What a safe configuration has called stays while it is in force, whoever else called the same (semantics: *Safe configurations*).
 
 use crate::rig::*;
 use davit::configurator::{Batch, Request, Requester};

@@ -1,4 +1,4 @@
-//! The configurator against design §6, on the simulated platform and in simulated time.
+//! The configurator against docs/semantics.md, on the simulated platform and in simulated time.
 
 mod atomicity;
 mod batches;

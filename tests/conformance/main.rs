@@ -1,4 +1,4 @@
-//! One contract for every platform (design §11): each test is a rule of the `Platform` trait, run on every platform.
+//! One contract for every platform (semantics: *Platforms*): each test is a rule of the `Platform` trait, run on every platform.
 //!
 //! A platform joins by a [`bed::Bed`]: how to make one with the test types of [`bed::types`], how to make a component of it
 //! fail, panic or hang in a hook, hang while it is made or dropped, work long in an operation and hear, or not, that it is

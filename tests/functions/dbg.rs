@@ -1,4 +1,4 @@
-//! What a model's own `dbg` printer is told: rFSM's tags in its order (rfsm.md §8).
+//! What a model's own `dbg` printer is told: rFSM's tags in its order (docs/rfsm.md §8).
 
 use super::support::Model;
 use davit::time::Clock;

@@ -316,7 +316,7 @@ fn nothing_that_is_told_has_an_address() {
     assert_eq!(seen.notes, ["error: ENTRY error executing entry of root.a: the error is a table and no text"]);
 }
 
-/// `rfsm.md` §5: set after the entry, away after the exit.
+/// `docs/rfsm.md` §5: set after the entry, away after the exit.
 #[test]
 fn the_active_leaf_is_found_in_the_machine() {
     let text = "local function show(where, fsm) print(where, fsm._act_leaf and fsm._act_leaf._fqn) end

@@ -99,7 +99,7 @@ fn a_file_that_runs_for_ever_or_eats_memory_is_ended() {
     assert!(finding.message.contains("__gc"), "{finding:?}");
 }
 
-/// What unmodified models of the years 2010 to 2013 need (rfsm.md §11.1).
+/// What unmodified models of the years 2010 to 2013 need (docs/rfsm.md §11.1).
 #[test]
 fn the_legacy_dialect_is_read() {
     let text = r#"

@@ -1,4 +1,4 @@
-//! `rfsm.md` §8: looking for paths in a machine that runs, adding to it, and leaving a part of it.
+//! `docs/rfsm.md` §8: looking for paths in a machine that runs, adding to it, and leaving a part of it.
 
 use super::deployed::said_by;
 use super::lab::run;

@@ -1,4 +1,4 @@
-//! That none of the tests which rFSM's authors named (rfsm.md §10) is missing from `rfsm.rs`.
+//! That none of the tests which rFSM's authors named (docs/rfsm.md §10) is missing from `rfsm.rs`.
 
 const NAMED: [(&str, &str); 8] = [
     (

@@ -1,4 +1,4 @@
-//! rFSM's own tests (rfsm.md §10) under their names, written anew, as Lua texts that step machines themselves. Those that
+//! rFSM's own tests (docs/rfsm.md §10) under their names, written anew, as Lua texts that step machines themselves. Those that
 //! say nothing of functions are in `tests/statechart/rfsm.rs` too, against the engine alone.
 
 use super::lab::{run, run_with};

@@ -1,4 +1,4 @@
-//! A plain second picture of a system, with nothing but ordered maps: the rules of design §3 written a second time, to
+//! A plain second picture of a system, with nothing but ordered maps: the rules of docs/semantics.md written a second time, to
 //! judge the first by.
 
 use davit::model::*;

@@ -1,4 +1,4 @@
-//! What waits for a coordinator waits in classes (design §7): each of them flooded, on a running deployment. How long
+//! What waits for a coordinator waits in classes (semantics: *Coordinators*): each of them flooded, on a running deployment. How long
 //! something waits is counted in turns of the coordinator, never in seconds.
 
 use davit::app;

@@ -1,4 +1,4 @@
-//! The tests that rFSM's authors named (`rfsm.md` §10), as far as they mean something without Lua, written anew.
+//! The tests that rFSM's authors named (`docs/rfsm.md` §10), as far as they mean something without Lua, written anew.
 
 use crate::scripted::*;
 use crate::support::*;
@@ -384,7 +384,7 @@ mod doo {
         assert_eq!(run.hook.take(), "doo1 doo1 doo1");
     }
 
-    /// `rfsm.md` §7: what each step sees when the activity yields once and then returns.
+    /// `docs/rfsm.md` §7: what each step sees when the activity yields once and then returns.
     #[test]
     fn event_sets_step_by_step() {
         let mut run = busy(yields(1, BUSY, FINISHED));

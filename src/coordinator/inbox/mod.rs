@@ -1,4 +1,4 @@
-//! Where events wait for the coordinator: in classes with room of their own (design §7), so that no flood of one kind
+//! Where events wait for the coordinator: in classes with room of their own (semantics: *Coordinators*), so that no flood of one kind
 //! displaces another, and each waits for a bounded number of turns.
 //!
 //! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most, of the latter two in the

@@ -1,4 +1,4 @@
--- What a model looks for among the transitions of a machine, and what it adds to it (rfsm.md §8).
+-- What a model looks for among the transitions of a machine, and what it adds to it (docs/rfsm.md §8).
 local native, rfsm = ...
 
 local kind, is_node, trans_text = native.kind, rfsm.is_node, rfsm.trans_text

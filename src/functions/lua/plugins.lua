@@ -1,4 +1,4 @@
--- rFSM's plugins and helpers, by the names under which models ask for them (rfsm.md §9, §11.1).
+-- rFSM's plugins and helpers, by the names under which models ask for them (docs/rfsm.md §9, §11.1).
 local native, rfsm = ...
 
 local modules = {}

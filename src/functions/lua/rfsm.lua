@@ -1,4 +1,4 @@
--- The module `rfsm`: constructors, `init`, and what a model's functions may call (rfsm.md §1-3, §6, §8).
+-- The module `rfsm`: constructors, `init`, and what a model's functions may call (docs/rfsm.md §1-3, §6, §8).
 --
 -- Stepping is not here: the engine of `crate::statechart` does it. `native` holds what it lends.
 local native, spots = ...

@@ -1,4 +1,4 @@
-//! Deployment files: the keys of design §16. The files they name are read by the caller.
+//! Deployment files: what their keys mean. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
 use super::{name, simulated, text, types};

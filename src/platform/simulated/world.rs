@@ -1,4 +1,4 @@
-//! The simulated platform's own bookkeeping: plain ordered maps and the rules of design §3, written out once more.
+//! The simulated platform's own bookkeeping: plain ordered maps and the rules of docs/semantics.md, written out once more.
 //!
 //! It uses nothing of `system` or `plan`, so that what it accepts and what it ends in is an independent word on what they
 //! accept and end in.

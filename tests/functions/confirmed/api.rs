@@ -1,4 +1,4 @@
-//! The other functions of the module `rfsm` (rfsm.md §1.1, §8).
+//! The other functions of the module `rfsm` (docs/rfsm.md §1.1, §8).
 
 use crate::lab::run;
 

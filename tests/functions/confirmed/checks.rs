@@ -1,4 +1,4 @@
-//! The early checks of `rfsm.init`, what fails and what only warns, and their words (rfsm.md §2.6 to §2.8).
+//! The early checks of `rfsm.init`, what fails and what only warns, and their words (docs/rfsm.md §2.6 to §2.8).
 
 use crate::lab::run;
 

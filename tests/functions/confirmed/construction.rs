@@ -1,4 +1,4 @@
-//! `rfsm.init`: what a model is, copies, printers, the default connector (rfsm.md §1.1, §1.2, §1.4, §2.1 to §2.5, §2.12).
+//! `rfsm.init`: what a model is, copies, printers, the default connector (docs/rfsm.md §1.1, §1.2, §1.4, §2.1 to §2.5, §2.12).
 
 use crate::lab::{run, run_with, told};
 

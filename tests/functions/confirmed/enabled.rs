@@ -1,4 +1,4 @@
-//! Events, guards, predicates, the search for a path, and conflicts, where functions decide (rfsm.md §4).
+//! Events, guards, predicates, the search for a path, and conflicts, where functions decide (docs/rfsm.md §4).
 
 use crate::lab::run;
 

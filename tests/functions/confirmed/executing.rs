@@ -1,4 +1,4 @@
-//! What functions are given and see while a transition is taken, and what becomes of their errors (rfsm.md §5).
+//! What functions are given and see while a transition is taken, and what becomes of their errors (docs/rfsm.md §5).
 
 use crate::lab::run;
 

@@ -1,4 +1,4 @@
-//! States that watch and states with machines in them, and what tells of a machine (rfsm.md §9).
+//! States that watch and states with machines in them, and what tells of a machine (docs/rfsm.md §9).
 
 use crate::lab::run;
 

@@ -1,4 +1,4 @@
-//! Plugins that count, wait for, watch and prepare (rfsm.md §9). Time events are in `timeevent.rs`, machines inside of states
+//! Plugins that count, wait for, watch and prepare (docs/rfsm.md §9). Time events are in `timeevent.rs`, machines inside of states
 //! in `ext.rs`.
 
 use crate::lab::run;

@@ -1,4 +1,4 @@
-//! References that lead nowhere: what `rfsm.init` says of them (rfsm.md §3).
+//! References that lead nowhere: what `rfsm.init` says of them (docs/rfsm.md §3).
 
 use crate::lab::run;
 

@@ -1,4 +1,4 @@
-//! `step`, `run`, `send_events`, `getevents`, hooks, and activities (rfsm.md §6, §7).
+//! `step`, `run`, `send_events`, `getevents`, hooks, and activities (docs/rfsm.md §6, §7).
 
 use crate::lab::{run, told};
 

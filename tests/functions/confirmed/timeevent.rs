@@ -1,4 +1,4 @@
-//! Time events (rfsm.md §9).
+//! Time events (docs/rfsm.md §9).
 
 use crate::lab::run;
 

@@ -1,4 +1,4 @@
-//! Guards and events, the search for a path, and which of several is taken (rfsm.md §4.2, §4.4, §4.5).
+//! Guards and events, the search for a path, and which of several is taken (docs/rfsm.md §4.2, §4.4, §4.5).
 
 use super::refused;
 use crate::scripted::*;

@@ -1,4 +1,4 @@
-//! Making a machine of a model: the connector `initial`, reserved names, missing ends (rfsm.md §1.2, §2).
+//! Making a machine of a model: the connector `initial`, reserved names, missing ends (docs/rfsm.md §1.2, §2).
 
 use super::{doubted, refused};
 use crate::scripted::*;

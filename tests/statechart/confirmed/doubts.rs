@@ -1,4 +1,4 @@
-//! What rFSM only warns of, or leaves unsaid, and is said here (rfsm.md §2.8 and the list of what it does not check).
+//! What rFSM only warns of, or leaves unsaid, and is said here (docs/rfsm.md §2.8 and the list of what it does not check).
 
 use super::doubted;
 use crate::support::*;

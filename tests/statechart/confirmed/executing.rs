@@ -1,4 +1,4 @@
-//! Taking a transition: what is left, done and entered, in which order, and what functions see of it (rfsm.md §5).
+//! Taking a transition: what is left, done and entered, in which order, and what functions see of it (docs/rfsm.md §5).
 
 use crate::scripted::*;
 use crate::support::*;

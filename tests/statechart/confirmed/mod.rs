@@ -1,4 +1,4 @@
-//! Every statement about pure charts that was confirmed by running rFSM (marked [P] in `rfsm.md`), and the gaps that its
+//! Every statement about pure charts that was confirmed by running rFSM (marked [P] in `docs/rfsm.md`), and the gaps that its
 //! own tests leave (§10), by theme. What functions and the API have to do with is in `tests/functions/confirmed`.
 
 mod choosing;

@@ -1,4 +1,4 @@
-//! The order of a node's outgoing transitions (rfsm.md §4.3).
+//! The order of a node's outgoing transitions (docs/rfsm.md §4.3).
 
 use crate::support::*;
 use davit::statechart::Sim;

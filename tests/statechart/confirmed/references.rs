@@ -1,4 +1,4 @@
-//! What the text of a source or target means, and what is said when it means nothing (rfsm.md §3).
+//! What the text of a source or target means, and what is said when it means nothing (docs/rfsm.md §3).
 
 use super::refused;
 use crate::support::*;

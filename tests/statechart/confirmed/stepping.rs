@@ -1,4 +1,4 @@
-//! The step loop, `e_done` and the first entry (rfsm.md §6, §7).
+//! The step loop, `e_done` and the first entry (docs/rfsm.md §6, §7).
 
 use super::doubted;
 use crate::scripted::*;
