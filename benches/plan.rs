@@ -24,6 +24,7 @@ fn catalogue() -> Arc<Catalogue> {
             ty: ValueType::Float,
             unit: None,
             buffered: false,
+            required: false,
             doc: String::new(),
             origin: Origin::NONE,
         };

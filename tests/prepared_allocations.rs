@@ -66,6 +66,7 @@ fn arm() -> System {
         ty: "float[2]".parse().unwrap(),
         unit: None,
         buffered: false,
+        required: false,
         doc: String::new(),
         origin: Origin::NONE,
     };

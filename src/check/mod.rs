@@ -58,6 +58,7 @@ mod told;
 mod trace;
 mod tried;
 mod types;
+mod undriven;
 mod unheard;
 mod universe;
 mod unknown;

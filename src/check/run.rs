@@ -10,7 +10,7 @@ use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
     alone, beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety,
-    settings, simulated, types, unheard, universe, unwatched, ways,
+    settings, simulated, types, undriven, unheard, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -38,6 +38,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
     findings.extend(declared::check(deployment, &universe));
     findings.extend(lets_go::check(deployment, &universe));
     findings.extend(alone::check(deployment));
+    findings.extend(undriven::check(deployment, &universe));
     let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;

@@ -76,6 +76,8 @@ pub const READ: &[(&str, &[Code])] = &[
             DEPLOY_EVENT_UNHEARD,
             DEPLOY_NO_REST,
             DEPLOY_ONE_EVENT,
+            DEPLOY_PORT_REQUIRED,
+            DEPLOY_PORT_UNDRIVEN,
             DEPLOY_UNWATCHED,
             MONITOR_EVENT_TAKEN,
             MONITOR_NOT_A_NUMBER,

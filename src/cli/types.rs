@@ -152,10 +152,11 @@ fn one(out: &Output, ty: &ComponentType) {
         let mut table = Table::new(2);
         for (name, port) in ty.ports.iter().filter(|(_, p)| p.direction == direction) {
             let buffered = if port.buffered { " (buffered)" } else { "" };
+            let required = if port.required { " (required)" } else { "" };
             let unit = port.unit.as_deref().unwrap_or_default();
             table.row([
                 out.paint(Style::Name, name),
-                format!("{}{buffered}", port.ty),
+                format!("{}{buffered}{required}", port.ty),
                 unit.to_owned(),
                 port.doc.clone(),
             ]);

@@ -203,6 +203,7 @@ mod tests {
                             ty: ValueType::Float,
                             unit: None,
                             buffered: false,
+                            required: false,
                             doc: String::new(),
                             origin: crate::model::Origin::NONE,
                         },

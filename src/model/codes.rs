@@ -514,6 +514,13 @@ codes! {
         "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
          everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \
          that, in their order. Name them, or see that it may stop where it is; this is only a note.";
+    DEPLOY_PORT_REQUIRED = "deploy::port_required", "nothing drives an in-port that its component needs",
+        "The component's type declares the in-port `required: true`: without samples the component cannot do what it is there for. No \
+         configuration of the deployment connects or writes it, and no operator may set it. Connect it to an out-port, or write it.";
+    DEPLOY_PORT_UNDRIVEN = "deploy::port_undriven", "nothing drives some in-ports",
+        "No configuration of the deployment connects or writes these in-ports, and no operator may set them: their components see \
+         them as never written. That is often meant (an input that this system does not use), and now and then a connection that was \
+         forgotten or misspelt. A type that cannot do without says `required: true` of its port: then it is a warning.";
     DEPLOY_UNWATCHED = "deploy::unwatched", "part of what commands an actuator may die unnoticed",
         "A component whose activity hangs, or that was stopped by hand, sends nothing any more; whoever receives its data goes on with \
          the last value. Where there is an actuator this is told of components that a configuration starts: those whose data reach it, over as \

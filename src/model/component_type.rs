@@ -81,6 +81,8 @@ pub struct PortType {
     pub unit: Option<Arc<str>>,
     /// An in-port that is read as a queue: takes only buffered connections, any number of them.
     pub buffered: bool,
+    /// An in-port that something has to drive while its component is there: a connection, or a value that is written.
+    pub required: bool,
     /// What it is.
     pub doc: String,
     /// Where it was declared.

@@ -8,7 +8,15 @@ use std::sync::Arc;
 
 fn port(direction: Direction, ty: &str, unit: Option<&str>, buffered: bool) -> PortType {
     let ty = ty.parse().unwrap();
-    PortType { direction, ty, unit: unit.map(Arc::from), buffered, doc: String::new(), origin: Origin(90) }
+    PortType {
+        direction,
+        ty,
+        unit: unit.map(Arc::from),
+        buffered,
+        required: false,
+        doc: String::new(),
+        origin: Origin(90),
+    }
 }
 
 fn property(ty: &str, default: Option<Value>, tunable: Tunable) -> PropertyType {

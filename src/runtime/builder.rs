@@ -75,6 +75,7 @@ pub(super) struct Words {
     pub(super) max: Option<f64>,
     pub(super) tunable: Tunable,
     pub(super) buffered: bool,
+    pub(super) required: bool,
     pub(super) effect: Option<Effect>,
     pub(super) moves: bool,
     pub(super) settled_by: Option<Condition>,
@@ -367,6 +368,7 @@ impl<C> Description<C> {
             ty,
             unit: words.unit,
             buffered: words.buffered,
+            required: words.required,
             doc: words.doc,
             origin: Origin::NONE,
         };

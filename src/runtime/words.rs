@@ -88,6 +88,11 @@ impl<C: Component> Builder<C> {
         self.words(|w| w.buffered = true)
     }
 
+    /// Something has to drive the in-port: where no configuration connects or writes it, `davit check` warns.
+    pub fn required(&mut self) -> &mut Self {
+        self.words(|w| w.required = true)
+    }
+
     /// The operation leaves nothing behind that would have to be undone.
     pub fn no_effect(&mut self) -> &mut Self {
         self.words(|w| w.effect = Some(Effect::None))

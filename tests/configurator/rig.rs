@@ -37,6 +37,7 @@ pub fn catalogue() -> Catalogue {
         ty: ty.parse().unwrap(),
         unit: None,
         buffered: false,
+        required: false,
         doc: String::new(),
         origin: Origin::NONE,
     };

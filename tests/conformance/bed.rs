@@ -58,6 +58,7 @@ fn port(direction: Direction, ty: &str, unit: Option<&str>, buffered: bool) -> P
         ty: ty.parse().unwrap(),
         unit: unit.map(Into::into),
         buffered,
+        required: false,
         doc: String::new(),
         origin: Origin::NONE,
     }

@@ -334,12 +334,13 @@ fn value_type() -> impl Strategy<Value = ValueType> {
 
 fn component_type() -> impl Strategy<Value = ComponentType> {
     let unit = || option::of(any_text().prop_map(std::sync::Arc::from));
-    let port = (any::<[bool; 2]>(), prop_oneof![4 => value_type(), 1 => Just(ValueType::Event)], unit(), any_text())
-        .prop_map(|([input, buffered], ty, unit, doc)| PortType {
+    let port = (any::<[bool; 3]>(), prop_oneof![4 => value_type(), 1 => Just(ValueType::Event)], unit(), any_text())
+        .prop_map(|([input, buffered, required], ty, unit, doc)| PortType {
             direction: if input { Direction::In } else { Direction::Out },
             ty,
             unit,
             buffered,
+            required: required && input,
             doc,
             origin: Origin::NONE,
         });

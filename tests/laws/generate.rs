@@ -96,6 +96,7 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
                 ty: if event { ValueType::Event } else { value_type(kind % 3 * 2) },
                 unit: [None, None, None, Some("N"), Some("m")][*more as usize % 5].map(Arc::from),
                 buffered: direction == Direction::In && !event && more % 4 == 3,
+                required: false,
                 doc: String::new(),
                 origin: Origin::NONE,
             };

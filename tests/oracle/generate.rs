@@ -92,6 +92,7 @@ fn catalogue() -> Catalogue {
         ty: ValueType::Float,
         unit: None,
         buffered: false,
+        required: false,
         doc: String::new(),
         origin: Origin::NONE,
     };

@@ -117,6 +117,14 @@ pub static PORT: Object = Object {
             ("buffered: 8", TEXT_WRONG_TYPE),
         )
         .without("`false`"),
+        key(
+            "required",
+            Form::Truth,
+            "Whether something has to drive the in-port: `davit check` warns where no configuration connects or writes it.",
+            "required: true",
+            ("required: yes", TEXT_WRONG_TYPE),
+        )
+        .without("`false`: it is a note where nothing does"),
         doc("doc: the force on the tool"),
     ],
 };

@@ -91,9 +91,16 @@ fn port(cx: &mut Cx, entry: Entry) -> Option<PortType> {
     let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let unit = unit(cx, &mut fields);
     let buffered = fields.truth(cx, "buffered").unwrap_or_default();
+    let required = fields.truth(cx, "required").unwrap_or_default();
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
-    Some(PortType { direction: direction?, ty: ty?, unit, buffered, doc, origin: entry.origin })
+    if required && direction == Some(Direction::Out) {
+        let finding = Finding::error(codes::TEXT_BAD_VALUE, "only an in-port can be required");
+        cx.report(
+            finding.at(entry.origin).help("leave `required` out: who needs the samples says so at its own in-port"),
+        );
+    }
+    Some(PortType { direction: direction?, ty: ty?, unit, buffered, required, doc, origin: entry.origin })
 }
 
 fn property(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {

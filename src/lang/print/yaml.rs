@@ -259,8 +259,13 @@ fn component_type(out: &mut String, ty: &ComponentType) {
             Direction::Out => "out",
         };
         let buffered = if port.buffered { ", buffered: true" } else { "" };
+        let required = if port.required { ", required: true" } else { "" };
         let (ty, unit, doc) = (text(&port.ty.to_string()), unit(&port.unit), doc(&port.doc));
-        _ = writeln!(body, "      {}: {{ direction: {direction}, type: {ty}{unit}{buffered}{doc} }}", t(name));
+        _ = writeln!(
+            body,
+            "      {}: {{ direction: {direction}, type: {ty}{unit}{buffered}{required}{doc} }}",
+            t(name)
+        );
     }
     if !ty.properties.is_empty() {
         body.push_str("    properties:\n");

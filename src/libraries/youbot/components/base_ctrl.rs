@@ -40,8 +40,8 @@ impl Component for BaseCtrl {
             },
         );
         Self {
-            base_twist: b.doc("Wanted motion, in the base's frame.").input("base_twist"),
-            odometry: b.doc("How the base moves.").input("odometry"),
+            base_twist: b.doc("Wanted motion, in the base's frame.").required().input("base_twist"),
+            odometry: b.doc("How the base moves.").required().input("odometry"),
             cmd_twist: b.doc("Commanded motion.").output("cmd_twist"),
             v_max: b.doc("Highest speed.").unit("m/s").range(0.0..=0.7).property("v_max", l.v_max),
             w_max: b.doc("Highest turning speed.").unit("rad/s").range(0.0..=0.7).property("w_max", l.w_max),

@@ -61,8 +61,8 @@ impl Component for DynamicsComponent {
             engaged: b
                 .doc("How much of the coupling is in force, as Cart_Impedance gives it. Not connected: none.")
                 .input("engaged"),
-            jointstate: b.doc("What the joints measure.").input("jointstate"),
-            jacobian: b.doc("As Arm_Kinematics gives it.").input("jacobian"),
+            jointstate: b.doc("What the joints measure.").required().input("jointstate"),
+            jacobian: b.doc("As Arm_Kinematics gives it.").required().input("jacobian"),
             odometry: b.doc("How the base moves.").input("odometry"),
             effort: b.doc("Torques.").unit("N m").output("joint_effort_command"),
             base_twist: b.doc("Wanted motion of the base, in its frame.").output("base_twist"),

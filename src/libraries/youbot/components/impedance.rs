@@ -68,9 +68,9 @@ impl Component for CartImpedance {
             Answer::Done(())
         });
         Self {
-            tool_pose: b.doc("Where this tool is.").input("tool_pose"),
-            tool_twist: b.doc("How it moves.").input("tool_twist"),
-            ext_ref: b.doc("Where the other tool was.").input("ext_ref"),
+            tool_pose: b.doc("Where this tool is.").required().input("tool_pose"),
+            tool_twist: b.doc("How it moves.").required().input("tool_twist"),
+            ext_ref: b.doc("Where the other tool was.").required().input("ext_ref"),
             ext_ref_mode: b.doc("Whether the force is put out. Never written: no.").input("ext_ref_mode"),
             f_des: b
                 .doc("Force wanted on the tool, in the world; zero 0.1 s after ext_ref_mode became false.")

@@ -30,7 +30,7 @@ impl Component for ArmKinematics {
                 Ok(())
             });
         Self {
-            jointstate: b.doc("What the joints measure.").input("jointstate"),
+            jointstate: b.doc("What the joints measure.").required().input("jointstate"),
             odometry: b.doc("Where the base is; without it, at the world's origin.").input("odometry"),
             tool_pose: b.doc("Where the tool is, in the world.").output("tool_pose"),
             tool_twist: b.doc("How it moves, in the world.").output("tool_twist"),

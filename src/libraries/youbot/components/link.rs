@@ -92,7 +92,7 @@ impl Component for LinkRx {
             Answer::Done(())
         });
         Self {
-            rx: b.doc("Packets.").buffered().input("rx"),
+            rx: b.doc("Packets.").buffered().required().input("rx"),
             ext_ref: b.doc("Where the other tool was.").output("ext_ref"),
             link_stats: b.doc("How good the link is.").output("link_stats"),
             peer_state: b.doc("What the other robot says of itself.").output("peer_state"),
