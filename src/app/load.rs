@@ -1,14 +1,15 @@
 //! From files to a checked deployment.
 
-use super::PLATFORMS;
+use super::platforms::{Extensions, PlatformMaker};
 use crate::check::{self, Report};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Loaded};
 use crate::libraries::monitors;
-use crate::model::codes::{DEPLOY_UNKNOWN_LIBRARY, DEPLOY_UNKNOWN_PLATFORM};
+use crate::model::codes::DEPLOY_UNKNOWN_LIBRARY;
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, Deployment, Finding, Findings};
+use crate::model::{Catalogue, Deployment, Finding, Findings, Ident};
 use crate::runtime::Libraries;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A deployment that was read, with all that it may use. Nothing is checked yet.
@@ -20,6 +21,8 @@ pub struct Read {
     pub catalogue: Catalogue,
     /// The libraries it names.
     pub libraries: Libraries,
+    /// The platform it names.
+    pub platform: PlatformMaker,
     /// Its texts.
     pub sources: SourceMap,
     /// What reading found; no errors among them, or (of [`read_but_for`]) only such as are about single configurations.
@@ -35,6 +38,8 @@ pub struct Checked {
     pub catalogue: Catalogue,
     /// The libraries it names.
     pub libraries: Libraries,
+    /// The platform it names.
+    pub platform: PlatformMaker,
     /// Its texts.
     pub sources: SourceMap,
     /// Warnings and what else reading and checking found.
@@ -56,8 +61,21 @@ pub struct Refused {
 ///
 /// # Errors
 /// [`Refused`] with what is wrong in its texts, or a library or platform that this program does not have.
-pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result<Read, Refused> {
-    read_loaded(lang::load(path, options), libraries)
+pub fn read(path: &Path, options: &LoadOptions, extensions: impl Into<Extensions>) -> Result<Read, Refused> {
+    read_loaded(lang::load(path, options), &extensions.into(), None)
+}
+
+/// The same on another platform of the program than the one that the deployment names.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_for(
+    path: &Path,
+    options: &LoadOptions,
+    extensions: impl Into<Extensions>,
+    platform: Option<Ident>,
+) -> Result<Read, Refused> {
+    read_loaded(lang::load(path, options), &extensions.into(), platform)
 }
 
 /// Reads a deployment for those who work with some of its configurations: what is wrong in the texts of single ones does
@@ -66,21 +84,21 @@ pub fn read(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result
 ///
 /// # Errors
 /// [`Refused`] with what else is wrong in its texts, or a library or platform that this program does not have.
-pub fn read_but_for(path: &Path, options: &LoadOptions, libraries: &Libraries) -> Result<Read, Refused> {
+pub fn read_but_for(path: &Path, options: &LoadOptions, extensions: impl Into<Extensions>) -> Result<Read, Refused> {
     let mut loaded = lang::load(path, options);
     loaded.deployment = loaded.deployment.or(loaded.but_for.take());
-    read_loaded(loaded, libraries)
+    read_loaded(loaded, &extensions.into(), None)
 }
 
-fn read_loaded(loaded: Loaded, libraries: &Libraries) -> Result<Read, Refused> {
+fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) -> Result<Read, Refused> {
     let mut findings = loaded.findings;
-    let Some(deployment) = loaded.deployment else {
+    let Some(mut deployment) = loaded.deployment else {
         return Err(Refused { findings, sources: loaded.sources, unreadable: loaded.unreadable });
     };
-    let libraries = match libraries.select(&deployment.libraries) {
+    let libraries = match extensions.libraries.select(&deployment.libraries) {
         Ok(libraries) => libraries,
         Err(name) => {
-            let known: Vec<&str> = libraries.iter().map(|l| l.name().as_str()).collect();
+            let known: Vec<&str> = extensions.libraries.iter().map(|l| l.name().as_str()).collect();
             findings.push(
                 Finding::error(DEPLOY_UNKNOWN_LIBRARY, format!("this program has no component library `{name}`"))
                     .at(deployment.key_origin("libraries"))
@@ -92,21 +110,22 @@ fn read_loaded(loaded: Loaded, libraries: &Libraries) -> Result<Read, Refused> {
     };
     // The monitors are a component type of this deployment.
     let libraries = monitors::added_to(libraries, &deployment.monitors);
-    let platform = deployment.platform.as_str();
-    if !PLATFORMS.contains(&platform) {
-        findings.push(
-            Finding::error(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{platform}`"))
-                .at(deployment.key_origin("platform"))
-                .path("platform")
-                .help(did_you_mean(platform, "platforms", PLATFORMS.iter().copied())),
-        );
-        return Err(Refused { findings, sources: loaded.sources, unreadable: false });
+    if let Some(other) = other.filter(|other| *other != deployment.platform) {
+        // Its options are those of the platform that it names.
+        (deployment.platform, deployment.platform_options) = (other, BTreeMap::new());
     }
+    let platform = match extensions.platform_of(&mut deployment) {
+        Ok(platform) => platform,
+        Err(wrong) => {
+            findings.extend(wrong);
+            return Err(Refused { findings, sources: loaded.sources, unreadable: false });
+        }
+    };
     let mut catalogue = libraries.catalogue();
     for ty in &deployment.types {
         catalogue.insert(ty.clone());
     }
-    Ok(Read { deployment, catalogue, libraries, sources: loaded.sources, findings })
+    Ok(Read { deployment, catalogue, libraries, platform, sources: loaded.sources, findings })
 }
 
 /// Checks a deployment that was read.
@@ -130,13 +149,13 @@ fn checked(
     read: Read,
     take: impl FnOnce(&mut Report) -> Option<check::Checked<crate::model::Deployment>>,
 ) -> Result<Checked, Refused> {
-    let Read { deployment, catalogue, libraries, sources, findings: before } = read;
+    let Read { deployment, catalogue, libraries, platform, sources, findings: before } = read;
     let mut report = check::run(deployment, &catalogue);
     let taken = take(&mut report);
     let mut findings = report.findings;
     findings.extend(before);
     match taken {
-        Some(deployment) => Ok(Checked { deployment, catalogue, libraries, sources, findings }),
+        Some(deployment) => Ok(Checked { deployment, catalogue, libraries, platform, sources, findings }),
         None => Err(Refused { findings, sources, unreadable: false }),
     }
 }

@@ -2,8 +2,10 @@
 //! what a program that embeds Davit calls.
 
 mod load;
+mod platforms;
 pub mod script;
 mod start;
 
-pub use load::{Checked, Read, Refused, check, check_to_replay, read, read_but_for};
-pub use start::{PLATFORMS, StartError, faults, reactions, start, start_on};
+pub use load::{Checked, Read, Refused, check, check_to_replay, read, read_but_for, read_for};
+pub use platforms::{Extensions, Making, PlatformMaker};
+pub use start::{StartError, faults, reactions, start, start_on};

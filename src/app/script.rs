@@ -12,13 +12,12 @@ mod sandbox;
 mod values;
 
 use super::start::Played;
-use super::{Refused, StartError};
+use super::{Extensions, Refused, StartError};
 use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, Ident};
-use crate::runtime::Libraries;
 use crate::session::tap::Hears;
 use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
@@ -38,11 +37,11 @@ use std::time::Duration;
 pub struct Options {
     /// The clock; the calling thread is made a participant.
     pub clock: Clock,
-    /// Component libraries.
-    pub libraries: Libraries,
+    /// Component libraries and platforms.
+    pub extensions: Extensions,
     /// Parameters for the deployments it loads (`--set`).
     pub load: LoadOptions,
-    /// The platform they run on, one of [`PLATFORMS`](super::PLATFORMS), instead of the one they name.
+    /// The platform they run on, instead of the one they name.
     pub platform: Option<Ident>,
     /// Hears everything that happens.
     pub observer: Option<Arc<dyn Hears>>,
@@ -308,16 +307,14 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
     let (path, checked) = {
         let host = host.borrow();
         let path = host.folder.join(file);
-        let read = super::read(&path, &host.options.load, &host.options.libraries);
-        let checked = read.and_then(|mut read| {
-            read.deployment.platform = host.options.platform.unwrap_or(read.deployment.platform);
-            if replay { super::check_to_replay(read) } else { super::check(read) }
-        });
+        let options = &host.options;
+        let read = super::read_for(&path, &options.load, &options.extensions, options.platform);
+        let checked = read.and_then(|read| if replay { super::check_to_replay(read) } else { super::check(read) });
         (path, checked)
     };
     if let Ok(checked) = &checked
         && replay
-        && (checked.deployment.platform.as_str() != "simulated" || !clock(host).is_simulated())
+        && (!checked.deployment.kind.imitates || !clock(host).is_simulated())
     {
         return Err(error("a way is replayed with `--platform simulated --clock simulated` only"));
     }

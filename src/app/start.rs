@@ -1,9 +1,9 @@
 //! From a checked deployment to one that is alive.
 
 use super::Checked;
+use super::platforms::{Make, Making};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::finding::did_you_mean;
 use crate::model::{Coordinator, Deployment, FaultKind, SimulatedReaction, StepFault};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
@@ -16,13 +16,13 @@ use std::sync::Arc;
 /// Why a checked deployment could not be started.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StartError {
-    /// This program has no such platform.
-    #[error("there is no platform `{name}`: {help}")]
-    UnknownPlatform {
-        /// The name.
+    /// The platform could not be made.
+    #[error("the platform `{name}` cannot be made: {why}")]
+    Platform {
+        /// Its name.
         name: String,
-        /// What was likely meant.
-        help: String,
+        /// Why, in its own words.
+        why: String,
     },
     /// The functions of the coordinator could not be opened.
     #[error("the coordinator's functions cannot be run: {why}")]
@@ -31,9 +31,6 @@ pub enum StartError {
         why: String,
     },
 }
-
-/// The platforms of this program.
-pub const PLATFORMS: &[&str] = &["embedded", "simulated"];
 
 /// What the deployment says that its components raise by themselves, for a simulated platform of one's own making.
 pub fn reactions(deployment: &Deployment) -> Vec<simulated::Reaction> {
@@ -67,7 +64,7 @@ pub(super) fn rule(fault: &StepFault) -> FaultRule {
 /// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
 ///
 /// # Errors
-/// When the deployment names a platform that this program does not have.
+/// When the platform cannot be made, or the functions of a coordinator cannot be run.
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
     start_open(checked, clock, Played::AsWritten).map(|(session, _)| session)
 }
@@ -94,9 +91,9 @@ pub(super) fn start_open(
     for opener in openers(checked).into_iter().flatten() {
         opener.open(None).map_err(|failure| StartError::Functions { why: failure.to_string() })?;
     }
-    let (platform, simulated): (Arc<dyn Platform>, _) = match deployment.platform.as_str() {
-        "embedded" => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
-        "simulated" => {
+    let (platform, simulated): (Arc<dyn Platform>, _) = match &checked.platform.make {
+        Make::Embedded => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
+        Make::Simulated => {
             let reactions = if played == Played::Replayed { Vec::new() } else { reactions(deployment) };
             let options = simulated::Options {
                 faults: faults(deployment),
@@ -107,11 +104,10 @@ pub(super) fn start_open(
             let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
             (Arc::new(platform.clone()), Some(platform))
         }
-        other => {
-            return Err(StartError::UnknownPlatform {
-                name: other.to_owned(),
-                help: did_you_mean(other, "platforms", PLATFORMS.iter().copied()),
-            });
+        Make::Own(make) => {
+            let making = Making { checked, clock, options: &deployment.platform_options };
+            let name = deployment.platform.to_string();
+            (make(&making).map_err(|why| StartError::Platform { name, why })?, None)
         }
     };
     Ok((start_on(checked, platform, clock), simulated))

@@ -84,7 +84,7 @@ impl Graph<'_, '_> {
         let deployment = self.product.deployment;
         let mut raising =
             deployment.monitors.iter().filter(|monitor| monitor.events().any(|event| event == name)).peekable();
-        if deployment.platform.as_str() == "simulated" || raising.peek().is_none() {
+        if deployment.kind.imitates || raising.peek().is_none() {
             return false;
         }
         // What is not known may be there.
@@ -116,7 +116,7 @@ impl Graph<'_, '_> {
         let names: Vec<EventName> = self.product.alike_to(u16::try_from(at).unwrap_or(u16::MAX)).collect();
         let in_time = deployment.reactions.iter().filter(|reaction| reaction.delay < deployment.shutdown.within);
         let raising: Vec<_> = in_time.filter(|reaction| names.contains(&reaction.raise)).collect();
-        if deployment.platform.as_str() != "simulated" || raising.is_empty() {
+        if !deployment.kind.imitates || raising.is_empty() {
             return comes;
         }
         let mut hears = Vec::with_capacity(self.states.len());

@@ -167,7 +167,7 @@ impl<'a> Meeting<'a> {
             raises.any(|site| self.charts[b].event(site.name) != EventId::OTHER)
         };
         // What a simulated component reports comes of who has it.
-        let simulated = self.deployment.platform.as_str() == "simulated";
+        let simulated = self.deployment.kind.imitates;
         let reactions = || self.deployment.reactions.iter().filter(|_| simulated);
         let has = |ids: &BTreeSet<ConfigId>, component| {
             let mut configurations = ids.iter().filter_map(|id| self.deployment.configuration(*id));

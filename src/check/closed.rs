@@ -88,7 +88,7 @@ impl Product<'_> {
 
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
-        let simulated = deployment.platform.as_str() == "simulated";
+        let simulated = deployment.kind.imitates;
         let reacts = simulated && deployment.reactions.iter().any(|reaction| reaction.raise == name);
         let watched = || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
         if deployment.stays_open(name.as_str()) {

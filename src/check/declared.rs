@@ -96,7 +96,7 @@ pub fn is_unseen(deployment: &Deployment, holds: &Condition) -> bool {
         use ConditionKind as K;
         values |= matches!(condition.kind, K::IsTrue(_) | K::Silent { .. } | K::Compare { .. });
     });
-    values && deployment.platform.as_str() == "simulated"
+    values && !deployment.kind.shows_values
 }
 
 /// That it does not show it.

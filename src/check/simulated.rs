@@ -37,7 +37,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         let wrong = self::fault(fault, deployment, universe);
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("faults[{i}]"))));
     }
-    if deployment.platform.as_str() != "simulated" && !deployment.faults.is_empty() {
+    if !deployment.kind.imitates && !deployment.faults.is_empty() {
         let message =
             format!("the platform is `{}`: faults are injected on the simulated one only", deployment.platform);
         findings.push(
@@ -47,7 +47,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
                 .help("`davit run --platform simulated` runs it there"),
         );
     }
-    if deployment.platform.as_str() != "simulated" && !deployment.reactions.is_empty() {
+    if !deployment.kind.imitates && !deployment.reactions.is_empty() {
         let message = format!("the platform is `{}`: what `simulated` says is not used", deployment.platform);
         findings.push(
             Finding::warning(SIMULATED_NOT_USED, message)

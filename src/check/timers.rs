@@ -184,7 +184,7 @@ impl<'a> Product<'a> {
 
     /// What simulated components report a time after a step.
     pub(super) fn delayed(&self) -> impl Iterator<Item = (usize, &'a SimulatedReaction)> + use<'a> {
-        let all = if self.deployment.platform.as_str() == "simulated" { &self.deployment.reactions[..] } else { &[] };
+        let all = if self.deployment.kind.imitates { &self.deployment.reactions[..] } else { &[] };
         all.iter().enumerate().filter(|(_, reaction)| !reaction.delay.is_zero())
     }
 

@@ -60,7 +60,7 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
 /// Declared types say what a component looks like, not what it does: only the simulated platform can make one.
 fn without_code(deployment: &Deployment) -> Findings {
     let mut findings = Vec::new();
-    if deployment.platform.as_str() != "embedded" {
+    if !deployment.kind.runs_libraries {
         return findings;
     }
     for configuration in &deployment.configurations {

@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::signals::Watch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
-use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_UNKNOWN_PLATFORM, FUNCTIONS_NOT_OPENED};
+use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED};
 use crate::model::finding::count;
 use crate::session::kept::Leave;
 use crate::session::place;
@@ -106,9 +106,11 @@ impl Args {
         let _participant = clock.enter();
         let (name, in_background) = (checked.deployment.name, self.in_background);
         let session = app::start(checked, clock).map_err(|error| match error {
-            StartError::UnknownPlatform { name, help } => {
-                Failure::no(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
-            }
+            StartError::Platform { .. } => Failure::no(
+                DEPLOY_NO_PLATFORM,
+                error.to_string(),
+                "the words are the platform's own: look at what it needs, and at its options under `platform`",
+            ),
             StartError::Functions { why } => Failure::no(
                 FUNCTIONS_NOT_OPENED,
                 format!("the coordinator's functions cannot be run: {why}"),

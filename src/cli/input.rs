@@ -58,7 +58,7 @@ impl Input {
     /// # Errors
     /// What is wrong with its texts, or a library that this program does not have.
     pub fn read(&self, context: &Context) -> Result<Read, Failure> {
-        Ok(app::read(&self.file, &self.parameters.options()?, &context.libraries)?)
+        Ok(app::read(&self.file, &self.parameters.options()?, &context.extensions)?)
     }
 
     /// Reads the deployment to work with some of its configurations: a mistake in the text of another does not refuse it.
@@ -66,7 +66,7 @@ impl Input {
     /// # Errors
     /// What else is wrong with its texts, or a library that this program does not have.
     pub fn read_but_for(&self, context: &Context) -> Result<Read, Failure> {
-        Ok(app::read_but_for(&self.file, &self.parameters.options()?, &context.libraries)?)
+        Ok(app::read_but_for(&self.file, &self.parameters.options()?, &context.extensions)?)
     }
 
     /// Reads the deployment and checks it.

@@ -44,10 +44,10 @@ mod status;
 mod types;
 mod watch;
 
+use crate::app::Extensions;
 use crate::diagnostics::{SourceMap, to_json};
 use crate::model::codes::CLI_UNWRITABLE;
 use crate::model::{Code, Finding, Findings};
-use crate::runtime::Libraries;
 use clap::Parser;
 use exit::Exit;
 use output::{Color, Output};
@@ -122,8 +122,8 @@ commands! {
 pub struct Context {
     /// Its streams.
     pub out: Output,
-    /// The component libraries of this program.
-    pub libraries: Libraries,
+    /// The component libraries and platforms of this program.
+    pub extensions: Extensions,
 }
 
 /// A command.
@@ -208,8 +208,13 @@ pub fn command() -> clap::Command {
     <Cli as clap::CommandFactory>::command()
 }
 
-/// The whole command line, with the component libraries a program has: parses the arguments, runs the command, prints what it has to say.
-pub fn main(libraries: Libraries) -> ExitCode {
+/// The whole command line, with the component libraries and platforms that a program brings: parses the arguments, runs the command,
+/// prints what it has to say.
+pub fn main(extensions: impl Into<Extensions>) -> ExitCode {
+    run(extensions.into())
+}
+
+fn run(extensions: Extensions) -> ExitCode {
     signals::ignore_large_files();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -221,7 +226,7 @@ pub fn main(libraries: Libraries) -> ExitCode {
             return written(Output::new(Color::Auto), if error.use_stderr() { Exit::Usage } else { Exit::Done }).into();
         }
     };
-    let context = Context { out: Output::new(cli.color), libraries };
+    let context = Context { out: Output::new(cli.color), extensions };
     // They keep a robot up: nothing that cannot be written may hold them.
     if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
         && let Err(error) = last_words::prepare()

@@ -8,10 +8,11 @@ use super::output::Style;
 use super::progress::Progress;
 use super::signals::{self, Watch};
 use super::{Answer, Context, Failure, Run};
-use crate::app::PLATFORMS;
+use crate::app::Extensions;
 use crate::app::script::{self, Door, Interrupt, Options, ScriptFailure};
 use crate::model::Ident;
-use crate::model::codes::{SCRIPT_FAILED, SCRIPT_SYNTAX};
+use crate::model::codes::{DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_SYNTAX};
+use crate::model::finding::did_you_mean;
 use crate::time::Clock;
 use serde_json::json;
 use std::path::PathBuf;
@@ -32,9 +33,9 @@ pub struct Args {
     /// Which clock it runs on; simulated time passes as fast as the machine, and the same way every time.
     #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
     clock: ClockKind,
-    /// Run its deployments on this platform instead of the one they name. `simulated` needs no components and injects what
-    /// `faults:` and the script's `fault` say.
-    #[arg(long, value_name = "PLATFORM", value_parser = clap::builder::PossibleValuesParser::new(PLATFORMS))]
+    /// Run its deployments on this platform of the program instead of the one they name, without the options they give it. `simulated`
+    /// needs no components and injects what `faults:` and the script's `fault` say.
+    #[arg(long, value_name = "PLATFORM")]
     platform: Option<String>,
     #[command(flatten)]
     parameters: Parameters,
@@ -55,6 +56,7 @@ impl Run for Args {
 
 impl Args {
     fn story(self, context: &Context) -> Answer {
+        let platform = self.platform.as_deref().map(|name| known(name, &context.extensions)).transpose()?;
         let clock = self.clock.make(0.0);
         let progress = Progress::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
         let say = {
@@ -78,9 +80,9 @@ impl Args {
             &self.script,
             Options {
                 clock: clock.clone(),
-                libraries: context.libraries.clone(),
+                extensions: context.extensions.clone(),
                 load: self.parameters.options()?,
-                platform: self.platform.map(|name| Ident::new(&name).expect("the name of a platform is one")),
+                platform,
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
                 interrupt,
@@ -113,6 +115,15 @@ fn door(clock: &Clock) -> Door {
         let socket = super::deploy::open(session).map_err(words)?;
         session.hub().attach(socket.observer(&clock).map_err(super::deploy::short).map_err(words)?);
         Ok(Box::new(socket))
+    })
+}
+
+/// A platform of this program.
+fn known(name: &str, extensions: &Extensions) -> Result<Ident, Failure> {
+    let known = extensions.platforms().any(|known| known == name);
+    Ident::new(name).ok().filter(|_| known).ok_or_else(|| {
+        let help = did_you_mean(name, "platforms", extensions.platforms());
+        Failure::usage(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
     })
 }
 

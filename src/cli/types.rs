@@ -49,11 +49,12 @@ impl Args {
             (read.catalogue, self.ty)
         } else {
             let catalogue = match &self.library {
-                None => context.libraries.catalogue(),
+                None => context.extensions.libraries.catalogue(),
                 Some(name) => {
-                    let found = context.libraries.iter().find(|l| l.name().as_str() == name);
+                    let found = context.extensions.libraries.iter().find(|l| l.name().as_str() == name);
                     let Some(library) = found else {
-                        let known: Vec<String> = context.libraries.iter().map(|l| l.name().to_string()).collect();
+                        let known: Vec<String> =
+                            context.extensions.libraries.iter().map(|l| l.name().to_string()).collect();
                         return Err(Failure::no(
                             crate::model::codes::DEPLOY_UNKNOWN_LIBRARY,
                             format!("this program has no component library `{name}`"),

@@ -12,7 +12,7 @@ use super::trusted::{self, Trust, Trusted};
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
 use crate::model::{
-    ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, Program, Statechart, codes,
+    ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, PlatformKind, Program, Statechart, codes,
 };
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -457,6 +457,8 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
     Some(Deployment {
         name: draft.name?,
         platform: draft.platform?,
+        kind: PlatformKind::of(draft.platform?),
+        platform_options: draft.platform_options,
         libraries: draft.libraries,
         types: draft.types,
         activities: draft.activities,

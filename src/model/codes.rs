@@ -514,6 +514,12 @@ codes! {
         "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
          everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \
          that, in their order. Name them, or see that it may stop where it is; this is only a note.";
+    DEPLOY_NO_PLATFORM = "deploy::no_platform", "the platform cannot be made",
+        "The platform that the deployment names said that it cannot be had now: a device that is not there, a middleware that does \
+         not answer. The message has its own words. Nothing was brought up.";
+    DEPLOY_PLATFORM_OPTION = "deploy::platform_option", "an option of the platform is wrong",
+        "`platform: { NAME: { … } }` gives the platform options. Which ones there are, of which type, and which must be given, is \
+         what the program says that brings the platform. The built-in platforms have none.";
     DEPLOY_PORT_REQUIRED = "deploy::port_required", "nothing drives an in-port that its component needs",
         "The component's type declares the in-port `required: true`: without samples the component cannot do what it is there for. No \
          configuration of the deployment connects or writes it, and no operator may set it. Connect it to an out-port, or write it.";

@@ -6,8 +6,10 @@ use super::event::{Ask, UNDO, Verdict};
 use super::finding::Origin;
 use super::monitor::Monitor;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
+use super::platform_kind::PlatformKind;
 use super::program::Program;
 use super::statechart::{Statechart, is_internal};
+use super::value::Value;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -21,6 +23,10 @@ pub struct Deployment {
     pub name: Ident,
     /// The platform it runs on.
     pub platform: Ident,
+    /// What kind of platform that is.
+    pub kind: PlatformKind,
+    /// What the platform is given, under its own name.
+    pub platform_options: BTreeMap<Ident, Value>,
     /// Component libraries it uses.
     pub libraries: Vec<Ident>,
     /// Component types declared in the file.

@@ -77,7 +77,7 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
     /// The deployment, not checked.
     pub fn read(&self) -> davit::app::Read {
         let path = self.demo.path("small.yaml");
-        davit::app::read(&path, &LoadOptions::default(), &Libraries::default())
+        davit::app::read(&path, &LoadOptions::default(), Libraries::default())
             .unwrap_or_else(|_| panic!("it is readable"))
     }
 

@@ -140,7 +140,7 @@ fn a_coordinator_that_hangs_in_a_function_is_told() {
         .replace("rfsm.trans { src = 'fault'", "rfsm.trans { src = 'operational', tgt = 'operational', events = { 'e_hang' }, effect = wait }, rfsm.trans { src = 'fault'");
     std::fs::write(folder.path().join("coordinator.lua"), text).expect("a file");
     let read =
-        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
+        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), davit::runtime::Libraries::new()).unwrap();
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let clock = Clock::real();
     let _me = clock.enter();
@@ -205,7 +205,7 @@ fn a_deployment_with_functions_comes_up_and_goes_down() {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", COORDINATOR)];
     let folder = folder(&files);
     let read =
-        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &davit::runtime::Libraries::new()).unwrap();
+        app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), davit::runtime::Libraries::new()).unwrap();
     let checked = app::check(read).unwrap();
     assert!(checked.findings.iter().any(|f| f.code == davit::model::codes::COORD_NOT_PURE), "{:?}", checked.findings);
     assert_eq!(said_by(COORDINATOR, 1), ["info: effect make.ok", "info: five rounds"]);

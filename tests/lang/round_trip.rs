@@ -422,7 +422,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     let limits = (2_usize..=100_000, time()).prop_map(|(stack, step_timeout)| DeploymentLimits { stack, step_timeout });
     let may = prop_oneof![config_id().prop_map(OperatorMay::Apply), member().prop_map(OperatorMay::Set)];
     let watched = (btree_set(event(), 0..3).prop_map(placed), btree_set(may, 0..3).prop_map(placed));
-    let ends = (vec(reaction, 0..3), vec(fault, 0..3), watched);
+    let ends = (vec(reaction, 0..3), vec(fault, 0..3), watched, btree_map(ident(), value(), 0..3));
     let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, ends);
     let coordinator = (option::of(ident()), chart(), path(), vec(path(), 0..3), path());
     let coordinators = vec(coordinator, 1..4);
@@ -432,10 +432,20 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             configurations,
             coordinators,
             monitors,
-            (types, activities, emits, deploy, shutdown, limits, (reactions, faults, (safety, operator))),
+            (
+                types,
+                activities,
+                emits,
+                deploy,
+                shutdown,
+                limits,
+                (reactions, faults, (safety, operator), platform_options),
+            ),
         )| Deployment {
             name: names[0],
             platform: names[1],
+            kind: PlatformKind::of(names[1]),
+            platform_options,
             libraries: names[2..].to_vec(),
             types,
             activities,

@@ -480,6 +480,8 @@ pub fn make(chance: &mut Chance) -> Made {
     let deployment = Deployment {
         name: ident("oracle"),
         platform: ident("simulated"),
+        kind: davit::model::PlatformKind::SIMULATED,
+        platform_options: BTreeMap::new(),
         libraries: Vec::new(),
         types: Vec::new(),
         activities: BTreeMap::new(),

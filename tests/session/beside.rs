@@ -25,7 +25,7 @@ fn files(deployment: &str, others: &[(&str, &str)]) -> Result<Checked, Refused> 
     }
     let file = folder.path().join("two.yaml");
     std::fs::write(&file, format!("davit: 1\nname: two\nplatform: simulated\n{TYPES}{deployment}")).unwrap();
-    app::read(&file, &LoadOptions::default(), &libraries::builtin()).and_then(app::check)
+    app::read(&file, &LoadOptions::default(), libraries::builtin()).and_then(app::check)
 }
 
 fn accepted(deployment: &str, others: &[(&str, &str)]) -> Checked {

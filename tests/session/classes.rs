@@ -80,7 +80,7 @@ impl Crowd {
             std::fs::write(folder.path().join(name), text).unwrap();
         }
         // What it does under a flood is no business of `check`: it is started as it is written.
-        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin());
+        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
         let read = read.unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::real();
         let platform = Simulated::new(read.catalogue.clone(), clock.clone(), Options::default());

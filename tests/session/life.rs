@@ -24,7 +24,7 @@ pub fn checked(file: &str) -> Checked {
 
 fn check(file: &str) -> Checked {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-    app::read(&path, &LoadOptions::default(), &libraries::builtin())
+    app::read(&path, &LoadOptions::default(), libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{file} is refused: {:?}", refused.findings))
 }
@@ -118,7 +118,7 @@ fn runs(story: &str) {
         &path,
         Options {
             clock: clock.clone(),
-            libraries: libraries::builtin(),
+            extensions: libraries::builtin().into(),
             load: LoadOptions::default(),
             platform: None,
             observer: None,
@@ -144,7 +144,7 @@ fn run_text(text: &str) -> (Option<String>, Option<bool>) {
         &path,
         Options {
             clock: clock.clone(),
-            libraries: libraries::builtin(),
+            extensions: libraries::builtin().into(),
             load: LoadOptions::default(),
             platform: None,
             observer: None,

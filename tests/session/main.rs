@@ -9,6 +9,7 @@ mod doors;
 mod flood;
 mod hangs;
 mod life;
+mod platforms;
 mod settled;
 mod socket;
 mod stands;

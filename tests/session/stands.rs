@@ -314,7 +314,7 @@ fn where_no_values_can_be_seen_only_a_fault_speaks_against_it() {
     let clock = Clock::simulated();
     let _me = clock.enter();
     let folder = folder(DECLARED, CONFIGURATIONS);
-    let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin())
+    let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
     let warned = checked.findings.iter().filter(|finding| finding.code == codes::CONF_HOLDS_UNSEEN).count();
@@ -342,7 +342,7 @@ fn what_a_later_look_finds_different_is_lost_too_and_looking_keeps_no_clock_goin
     let clock = Clock::simulated();
     let me = clock.enter();
     let folder = folder(DECLARED, CONFIGURATIONS);
-    let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin())
+    let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
     let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default());

@@ -101,7 +101,7 @@ impl Small {
             std::fs::write(folder.path().join(name), text).unwrap();
         }
         // It is about a coordinator that does not do what `check` demands.
-        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries::builtin());
+        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
         let checked = read.and_then(app::check_to_replay).unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::simulated();
         let guard = clock.enter();

@@ -130,7 +130,7 @@ limits:   { stack: 64, step_timeout_s: 1.0 }
 "
         .to_owned(),
     );
-    let checked = app::read(&folder.path().join("two.yaml"), &LoadOptions::default(), &libraries::builtin())
+    let checked = app::read(&folder.path().join("two.yaml"), &LoadOptions::default(), libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
     let clock = Clock::simulated();

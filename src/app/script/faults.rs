@@ -121,7 +121,7 @@ fn whole(times: f64) -> mlua::Result<u32> {
 /// Whether the fault can happen in the deployment.
 fn fits(fault: &StepFault, checked: &Checked) -> mlua::Result<()> {
     let (deployment, step) = (&*checked.deployment, &fault.step);
-    if deployment.platform.as_str() != "simulated" {
+    if !deployment.kind.imitates {
         return Err(error(format!(
             "fault \"{step}\": the platform is `{}`, and only the simulated one does wrong what it is told to: run the \
              script with `--platform simulated`",

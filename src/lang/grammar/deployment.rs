@@ -34,9 +34,10 @@ pub static DEPLOYMENT: Object = Object {
         .required(),
         key(
             "platform",
-            Form::Name(Names::Plain),
+            Form::Either(&[Form::Name(Names::Plain), Form::Named(&Form::Named(&Form::Value))]),
             "Where its components live: `embedded` runs them in this process, `simulated` only keeps books of them and \
-             injects the faults that are asked for.",
+             injects the faults that are asked for; a program may bring others. Options of a platform stand under its name: \
+             `platform: { bus: { device: \"can0\" } }`.",
             "platform: embedded",
             ("platform: 1", TEXT_WRONG_TYPE),
         )

@@ -1,14 +1,14 @@
 //! Deployment files: what their keys mean. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
-use super::{name, simulated, text, types};
+use super::{name, simulated, text, types, value};
 use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
 use crate::model::{
     Activity, ComponentType, ConfigId, DeploymentLimits, EventName, Finding, Ident, MemberRef, Openings, OperatorMay,
-    Origin, SimulatedReaction, StepFault, codes,
+    Origin, SimulatedReaction, StepFault, Value, codes,
 };
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -19,6 +19,8 @@ pub struct Draft {
     pub name: Option<Ident>,
     /// `platform`
     pub platform: Option<Ident>,
+    /// What stands under the platform's name.
+    pub platform_options: BTreeMap<Ident, Value>,
     /// `libraries`
     pub libraries: Vec<Ident>,
     /// `types`
@@ -102,7 +104,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     }
     let deployment = fields.needed(cx, "name", |_, _| format!("add `name: {file_name}`"));
     let deployment = deployment.and_then(|node| name::<Ident>(cx, &node, "`name`", fields.row("name").example));
-    let platform = fields.name(cx, "platform");
+    let (platform, platform_options) = platform(cx, &mut fields).unzip();
     let named = fields.has("libraries");
     let libraries = fields.names(cx, "libraries");
     let types = fields.take(cx, "types").map(|node| types::types(cx, node));
@@ -144,6 +146,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     Some(Draft {
         name: deployment,
         platform,
+        platform_options: platform_options.unwrap_or_default(),
         libraries,
         types: types.unwrap_or_default(),
         activities,
@@ -163,6 +166,39 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         faults,
         key_origins,
     })
+}
+
+/// `platform: NAME`, or `platform: { NAME: { option: value } }`.
+fn platform(cx: &mut Cx, fields: &mut Fields) -> Option<(Ident, BTreeMap<Ident, Value>)> {
+    let node = fields.take(cx, "platform")?;
+    let example = fields.row("platform").example;
+    let Node { kind: Kind::Map(mut entries), origin } = node else {
+        return name(cx, &node, "`platform`", example).map(|name| (name, BTreeMap::new()));
+    };
+    let (Some(entry), true) = (entries.pop(), entries.is_empty()) else {
+        let finding =
+            Finding::error(codes::TEXT_BAD_VALUE, "`platform` names one platform, with its options under its name");
+        cx.report(
+            finding.at(origin).help(format!("write `{example}`, or `platform: {{ NAME: {{ option: value }} }}`")),
+        );
+        return None;
+    };
+    let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+    let platform = name::<Ident>(cx, &key, "a platform", example)?;
+    let mut options = BTreeMap::new();
+    match entry.value.kind {
+        Kind::Null => {}
+        Kind::Map(entries) => {
+            for entry in entries {
+                let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+                let option = name::<Ident>(cx, &key, "an option of a platform", "device: can0");
+                let value = value(cx, entry.value, "an option of a platform");
+                options.extend(option.zip(value));
+            }
+        }
+        _ => cx.wrong(&entry.value, "what a platform is given", "a table of named values", "{ device: can0 }"),
+    }
+    Some((platform, options))
 }
 
 fn files(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(String, Origin)> {

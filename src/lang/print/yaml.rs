@@ -337,7 +337,13 @@ pub fn deployment_yaml(
     monitors: Option<&str>,
     trusted: &str,
 ) -> String {
-    let mut out = format!("davit: 1\nname: {}\nplatform: {}\n", t(&d.name), t(&d.platform));
+    let options: Vec<String> =
+        d.platform_options.iter().map(|(name, v)| format!("{}: {}", t(name), value(v))).collect();
+    let platform = match options.is_empty() {
+        true => t(&d.platform),
+        false => format!("{{ {}: {{ {} }} }}", t(&d.platform), options.join(", ")),
+    };
+    let mut out = format!("davit: 1\nname: {}\nplatform: {platform}\n", t(&d.name));
     _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
     if !d.types.is_empty() {
         out.push_str("types:\n");

@@ -1,0 +1,7 @@
+deploy("deployment.yaml")
+raise("e_on")
+wait_answer("bright.ok", 1)
+assert(property("lamp.level") == 1.0)
+raise("e_off")
+wait_state("dim", 1)
+shutdown()
