@@ -32,6 +32,10 @@ local heard = no(silent(force, 0.2))
 local near  = all { heard, below(force, 2.0) }:for_at_least(0.3)
 local peer  = "Link_Rx.peer_state"
 
+-- The fastest joint, in rad/s.
+local fastest = max { abs("youbot.jointstate.vel[0]"), abs("youbot.jointstate.vel[1]"), abs("youbot.jointstate.vel[2]"),
+                      abs("youbot.jointstate.vel[3]"), abs("youbot.jointstate.vel[4]") }
+
 Monitors {
 
   link_lost     = monitor { when = no(settled), event = "e_link_lost", repeat_every = AGAIN },
@@ -62,9 +66,10 @@ Monitors {
 
   torque_saturated = monitor { when = above("Dynamics.tau_sat", 0):for_at_least(0.5),
     event = "e_torque_sat", repeat_every = AGAIN },
-  overspeed = monitor {
-    when = above(max { abs("youbot.jointstate.vel[0]"), abs("youbot.jointstate.vel[1]"), abs("youbot.jointstate.vel[2]"),
-                       abs("youbot.jointstate.vel[3]"), abs("youbot.jointstate.vel[4]") }, 1.5),
+  overspeed = monitor { when = above(fastest, 1.5), event = "e_overspeed", repeat_every = AGAIN },
+  -- No coupled motion is so fast for so long: the arm gives way to whoever pushes it, too slowly for the limit above.
+  carried_off = monitor { description = "an arm that takes torques is carried off",
+    when = all { equals("youbot.control_mode", 6), above(fastest, 0.8):for_at_least(0.05) },
     event = "e_overspeed", repeat_every = AGAIN },
   base_overspeed = monitor { when = above(norm { "youbot.odometry.vx", "youbot.odometry.vy" }, 0.6),
     event = "e_base_overspeed", repeat_every = AGAIN },

@@ -61,6 +61,8 @@ pub struct Session {
     /// What operators have set, as a configuration each.
     settings: Mutex<BTreeSet<ConfigId>>,
     commands: Mutex<Vec<Command>>,
+    /// Set by every command.
+    commanded: Mutex<Option<Arc<AtomicBool>>>,
     /// Somebody is there who may ask for force.
     pub(super) attended: AtomicBool,
     ended: Mutex<Option<Ended>>,
@@ -116,6 +118,7 @@ impl Session {
             evaluator,
             settings: Mutex::default(),
             commands: Mutex::new(Vec::new()),
+            commanded: Mutex::default(),
             attended: AtomicBool::new(true),
             ended: Mutex::new(None),
         })
@@ -218,15 +221,19 @@ impl Session {
         found.peek().is_some() && found.all(|(part, ids)| ids.iter().any(|id| part.coordinator.is_active(*id)))
     }
 
-    /// Whether a command waits for whoever drives the session.
-    pub fn is_commanded(&self) -> bool {
-        !lock(&self.commands).is_empty()
+    /// From now on `flag` is set by every command, also one that changes nothing any more: who drives several deployments one after
+    /// the other is asked to end, and not only this one.
+    pub fn flag_commands(&self, flag: &Arc<AtomicBool>) {
+        *lock(&self.commanded) = Some(flag.clone());
     }
 
     /// Leaves a command for whoever drives the session. Where it is being stopped already, to shut down raises the event
     /// again, and force is the next stage.
     pub fn command(&self, command: Command) {
         let Command::Shutdown { force } = command;
+        if let Some(flag) = &*lock(&self.commanded) {
+            flag.store(true, Ordering::Relaxed);
+        }
         if self.hub.is_stopping() && !force {
             if self.hub.halt().is_led() {
                 self.raise(self.deployment.shutdown.event, "operator");

@@ -449,3 +449,26 @@ fn a_scripts_deployment_has_its_name() {
     assert_eq!(demo.run(&["run", "story.lua", "--clock", "simulated"]).code, 0);
     drop(deployed);
 }
+
+/// Who asks its deployment to end ends the script: in a loop that catches everything, and while it shuts down by itself to deploy again.
+#[test]
+fn whoever_ends_its_deployment_ends_a_script_whatever_that_catches() {
+    for (story, phase) in [
+        ("deploy('deployment.yaml') while true do pcall(wait, 0.1) end", "up"),
+        ("while true do pcall(deploy, 'deployment.yaml') pcall(wait, 1000) pcall(shutdown) end", "up"),
+        ("deploy('deployment.yaml') while true do end", "up"),
+    ] {
+        let demo = Demo::new();
+        demo.write("story.lua", story);
+        let mut command = demo.command(&["run", "story.lua", "--color", "never"]);
+        let errors = File::create(demo.path("err")).unwrap();
+        command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::from(errors));
+        let running = Foreground::start(&mut command);
+        demo.until_phase(phase);
+        let ran = demo.run(&["shutdown"]);
+        assert_eq!(ran.code, 0, "{story}: {}{}", ran.out, ran.err);
+        assert_eq!(running.end().code(), Some(1), "{story}: {}", demo.read("err"));
+        assert!(demo.read("err").contains("interrupted"), "{story}: {}", demo.read("err"));
+        assert_eq!(demo.read("out").matches("root.operational").count(), 1, "{story}: {}", demo.read("out"));
+    }
+}

@@ -230,7 +230,8 @@ fn a_hard_push_ends_at_rest() {
 /// Up, down, towards the base, and obliquely away from it.
 #[test]
 fn a_hard_push_ends_at_rest_up_and_down_too() {
-    for direction in ["-40 0 0", "0 0 40", "0 0 -40", "28 0 28"] {
+    // To the last two the arm gives way at just less than the limit of its joints' speed.
+    for direction in ["-40 0 0", "0 0 40", "0 0 -40", "28 0 28", "28 0 -28", "20 20 -28"] {
         push("youbot_arm", direction);
     }
 }

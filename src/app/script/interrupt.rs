@@ -37,6 +37,8 @@ impl Interrupt {
 
     /// A deployment of the script's: commands go to it from now on, also one that came before.
     pub(super) fn up(&self, session: &Arc<Session>) {
+        // Also who asks the deployment to end (`davit shutdown`) ends the script: whatever it catches, and whatever it would do next.
+        session.flag_commands(&self.asked);
         let state = {
             let mut state = lock(&self.state);
             state.session = Arc::downgrade(session);
@@ -52,15 +54,9 @@ impl Interrupt {
         self.asked.clone()
     }
 
-    /// Also by who asks its deployment to end (`davit shutdown`).
-    fn is_asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
-            || lock(&self.state).session.upgrade().is_some_and(|session| session.is_commanded())
-    }
-
     /// Fails once it is asked for.
     pub(super) fn check(&self) -> mlua::Result<()> {
-        if self.is_asked() { Err(error(INTERRUPTED.to_string_lossy())) } else { Ok(()) }
+        if self.asked.load(Ordering::Relaxed) { Err(error(INTERRUPTED.to_string_lossy())) } else { Ok(()) }
     }
 
     /// Waits until then. In simulated time that takes no time.
