@@ -122,10 +122,12 @@ impl Args {
         let watch = watch(&session, progress, &leaving, in_background)?;
         let socket = open(&session)?;
         lock(&leaving).push(Box::new(socket.leave()));
+        // Before anything is kept of it: one that cannot be told of has not lived.
+        let observer = socket.observer(clock).map_err(short)?;
         let keep = Keep::begin(&session, &self.input.file, clock, in_background)?;
         lock(&leaving).extend(keep.leave());
         session.hub().attach(progress.observer());
-        session.hub().attach(socket.observer(clock).map_err(short)?);
+        session.hub().attach(observer);
         let driven = session.guarded(|| match session.bring_up() {
             Err(not_up) => {
                 progress.finish();

@@ -132,8 +132,17 @@ impl Cx {
 
     /// Which of two spellings is the file's in which something stands.
     pub fn either(&self, origin: Origin, lua: &str, yaml: &str) -> String {
-        let file = self.sources.extent(origin).map(|(file, _)| self.sources.file(file).language);
-        if file == Some(Language::Yaml) { yaml.to_owned() } else { lua.to_owned() }
+        if self.language(origin) == Some(Language::Yaml) { yaml.to_owned() } else { lua.to_owned() }
+    }
+
+    /// Whether it stands in a file of Lua, where `{}` is a list without elements and a table without keys.
+    pub fn is_lua(&self, origin: Origin) -> bool {
+        // Of a place that is only known by its line no text is kept.
+        self.language(origin) != Some(Language::Yaml)
+    }
+
+    fn language(&self, origin: Origin) -> Option<Language> {
+        self.sources.extent(origin).map(|(file, _)| self.sources.file(file).language)
     }
 
     /// Reports that a node is not of the kind wanted; `example` is a line as it should be.
@@ -143,7 +152,7 @@ impl Cx {
         }
         let origin = self.place(node);
         let message = format!("{what} must be {expected}, this is {}", node.describe());
-        let quoted = matches!(node.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_) | Kind::Null);
+        let quoted = matches!(node.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_));
         let hint = if quoted && expected.contains("text") { " (quotes make a text of it)" } else { "" };
         let example = self.spelt(node.origin, example);
         self.report(
@@ -175,10 +184,13 @@ impl Fields {
     pub fn of(cx: &mut Cx, node: Node, object: &'static Object) -> Option<Self> {
         match node.kind {
             Kind::Map(entries) | Kind::Made(_, entries, _) => Some(Self::new(object, node.origin, entries)),
-            Kind::List(list) if list.is_empty() => Some(Self::new(object, node.origin, Vec::new())),
+            Kind::List(ref list) if list.is_empty() && cx.is_lua(node.origin) => {
+                Some(Self::new(object, node.origin, Vec::new()))
+            }
             Kind::Null if object.may_be_empty => Some(Self::new(object, node.origin, Vec::new())),
             _ => {
-                cx.wrong(&node, object.what, "a table of named values", object.example);
+                let example = cx.either(node.origin, object.example, &object.yaml());
+                cx.wrong(&node, object.what, "a table of named values", &example);
                 None
             }
         }

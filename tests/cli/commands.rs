@@ -90,7 +90,7 @@ fn schema_writes_what_editors_need() {
         let page = demo.run(&["schema", kind, "--markdown"]);
         assert!(page.out.starts_with(&format!("# Reference: {kind}\n")), "{}", page.out);
     }
-    assert_eq!(demo.run(&["schema"]).json()["properties"]["platform"]["type"], "string");
+    assert_eq!(demo.run(&["schema"]).json()["properties"]["name"]["type"], "string");
     assert_eq!(demo.run(&["schema", "lua", "-o", "davit.lua"]).code, 0);
     assert!(demo.read("davit.lua").contains("function property_set(property, value) end"));
     let unknown = demo.run(&["schema", "deploymnt"]);

@@ -334,7 +334,7 @@ fn mutate(value: &mut Value, random: &mut Random) {
     match inner {
         Some(inner) if random.below(4) > 0 => mutate(inner, random),
         _ => {
-            let others = ["true", "7", "-1", "0.5", "x y", "\"\"", "[a]", "[1]", "{ k: 1 }", "1e9", "9z"];
+            let others = ["true", "[]", "7", "-1", "0.5", "x y", "\"\"", "[a]", "[1]", "{ k: 1 }", "1e9", "9z"];
             *value = yaml(others[random.below(others.len())]);
         }
     }

@@ -98,6 +98,11 @@ fn deployment_keys_names_and_values() {
         ),
         ("safety: [e_estop]", "monitors: [m.lua]", "text::no_file 21:12", "`c.lua`"),
         ("safety: [e_estop]", "with: { gain: 1 }", "text::unknown_parameter 21:9", "gain"),
+        // A list without elements is no table: `trusted: []` trusts nobody.
+        ("safety: [e_estop]", "trusted: []", "text::wrong_type 21:10", "true or false"),
+        ("safety: [e_estop]", "trusted: yes", "text::wrong_type 21:10", "true or false"),
+        ("{ stack: 32, step_timeout_s: 0.5 }", "[]", "text::wrong_type 20:9", "limits: {"),
+        ("effect: none", "effect: []", "text::wrong_type 12:54", "`none`, `irreversible`"),
     ];
     let mut answers = Answers::default();
     for (from, to, expected, hint) in table {
@@ -221,6 +226,18 @@ fn configurations_in_yaml() {
         ("on_failure: rollback", "safe: true", "conf::confirm_contradicted 11:5", "keep one"),
         ("confirm: { event: e_ok, within: 2.0 }", "safe: true", "conf::on_failure_safe 12:5", "leave"),
         ("on_failure: rollback", "holds: { abov: [A.y, 1.0] }", "monitor::unknown_word 12:14", "`above`"),
+        (
+            "[\"_default:running\"]\n    conf",
+            "{ _default: running }\n    conf",
+            "conf::keyed_entries 10:22",
+            "\"_default:running\"",
+        ),
+        (
+            "connect: { from: A.y, to: B.u, policy: { buffer: 8 } }",
+            "connect: [A.y, B.u]",
+            "text::wrong_type 8:18",
+            "connect: { from: Kin.jacobian",
+        ),
         (
             "[\"_default:running\"]\n    conf",
             "{ _default: running, A: stopped }\n    conf",

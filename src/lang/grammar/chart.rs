@@ -93,9 +93,15 @@ pub static CONNECTOR: Object = Object {
     in_yaml: "",
     may_be_empty: false,
     keys: &[
-        key("connector", Form::Truth, "That it is one.", "connector: true", ("connector: false", TEXT_BAD_VALUE))
-            .required()
-            .only(Languages::Yaml),
+        key(
+            "connector",
+            Form::Truth,
+            "That it is one; never `false`.",
+            "connector: true",
+            ("connector: false", TEXT_BAD_VALUE),
+        )
+        .required()
+        .only(Languages::Yaml),
         DOC,
     ],
 };

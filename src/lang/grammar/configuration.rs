@@ -85,7 +85,7 @@ pub static CONFIGURATION: Object = Object {
             "on_failure",
             Form::Choice(&["rollback", "hold"]),
             "What is done when a step fails. `rollback`: what was done is undone, also where that moves hardware. `hold`: nothing is \
-             undone, the answer is *broken*, and the coordinator decides.",
+             undone, the answer is *broken*, and the coordinator decides. Refused beside `safe`.",
             "on_failure = \"rollback\"",
             ("on_failure: stay", TEXT_BAD_VALUE),
         )
@@ -101,14 +101,14 @@ pub static CONFIGURATION: Object = Object {
         key(
             "confirm",
             Form::Table(&CONFIRM),
-            "An event that must come, else it is undone again (`ID.reverted`).",
+            "An event that must come, else it is undone again (`ID.reverted`). Refused beside `safe` and `on_failure: hold`.",
             "confirm = { event = \"e_aligned\", within = 2.0 }",
             ("confirm: e_aligned", TEXT_WRONG_TYPE),
         ),
         key(
             "irreversible",
             Form::Truth,
-            "That its author knows that something in it cannot be undone: `davit check` warns no more. An undo does not pass its frame.",
+            "That its author knows that something in it cannot be undone: `davit check` warns no more. Where something in it cannot, an undo does not pass its frame.",
             "irreversible = true",
             ("irreversible: 1", TEXT_WRONG_TYPE),
         )

@@ -96,7 +96,7 @@ pub static DEPLOYMENT: Object = Object {
         key(
             "trusted",
             Form::Either(&[Form::Truth, Form::Table(&TRUSTED)]),
-            "Whether the coordinators may have functions of their own, which run in this process.",
+            "Whether the coordinators may have functions of their own, which run in this process; a table means that they may, and what is open to them.",
             "trusted: true",
             ("trusted: { open: [net] }", TEXT_BAD_VALUE),
         )
@@ -104,7 +104,7 @@ pub static DEPLOYMENT: Object = Object {
         key(
             "host",
             FILES,
-            "Files of Lua that stand in for what the functions of trusted coordinators expect around them.",
+            "Files of Lua that stand in for what the functions of trusted coordinators expect around them; refused without `trusted`.",
             "host: [robot.lua]",
             ("host: 1", TEXT_WRONG_TYPE),
         )
@@ -112,7 +112,7 @@ pub static DEPLOYMENT: Object = Object {
         key(
             "with",
             Form::Named(&Form::Value),
-            "Parameters of the Lua files, where each is a global of that name; `--set gain=0.7` overrides it, and one that no file reads is refused.",
+            "Parameters of the Lua files, where each is a global of that name; `--set gain=0.7` overrides it, and one of these that no file reads is refused (here that is a warning).",
             "with: { gain: 0.5 }",
             ("with: 0.5", TEXT_WRONG_TYPE),
         ),
@@ -431,7 +431,7 @@ pub static FAULT: Object = Object {
             ("times: 0", TEXT_BAD_VALUE),
         )
         .without("1"),
-        key("takes_s", Form::Seconds, "How long a step takes that is `slow`.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME))
+        key("takes_s", Form::Seconds, "How long a step takes that is `slow`: required there, and refused of any other.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME))
             .beside("how: slow"),
     ],
 };

@@ -166,11 +166,11 @@ impl Names {
     /// What is named, with its article.
     pub fn what(self) -> &'static str {
         match self {
-            Self::Plain => "a name",
+            Self::Plain => "a name (letters, digits and `_`, no digit first)",
             Self::Component => "the name of a component",
             Self::Type => "the name of a component type",
             Self::Configuration => "the name of a configuration",
-            Self::Event => "the name of an event",
+            Self::Event => "the name of an event (a text without blanks)",
             Self::Member => "a member of a component, `Component.member`",
         }
     }
@@ -311,7 +311,7 @@ impl Form {
             Self::Function => "a function of Lua".to_owned(),
             Self::Changes => {
                 let one = |change: &Primitive| match links {
-                    Words::Linked => format!("[{0}](#{0})", change.object.name),
+                    Words::Linked => format!("[{0}](#table-{0})", change.object.name),
                     Words::Plain => change.object.name.to_owned(),
                 };
                 format!("a list of changes, each one of {}", CHANGES.iter().map(one).collect::<Vec<_>>().join(", "))
@@ -319,7 +319,7 @@ impl Form {
             Self::List(form) => format!("a list; each: {}", form.words(links)),
             Self::Several(form) => format!("{}; or a list of such", form.words(links)),
             Self::Named(form) => format!("by name; each: {}", form.words(links)),
-            Self::Table(object) if links == Words::Linked => format!("a table: [{}](#{})", object.name, object.name),
+            Self::Table(object) if links == Words::Linked => format!("a table: [{0}](#table-{0})", object.name),
             Self::Table(object) => format!("a table: {}", object.name),
             Self::Either(forms) => forms.iter().map(|form| form.words(links)).collect::<Vec<_>>().join("; or "),
         }

@@ -14,7 +14,7 @@ const fn doc(example: &'static str) -> Key {
 const UNIT: Key = key(
     "unit",
     Form::Text,
-    "The unit of its number, as a text. Two connected ports have the same one, or one of them has none.",
+    "The unit of its number, as a text. Two ports that are connected have the same one, or one of them has none.",
     "unit: N",
     ("unit: 1", TEXT_WRONG_TYPE),
 );
@@ -53,14 +53,14 @@ pub static TYPE: Object = Object {
         key(
             "start_after",
             Form::Several(&Form::Name(Names::Type)),
-            "Components of these types are started first, where one `_default` starts both.",
+            "Where one `_default` starts both and connections go round in a circle, components of these types are started first; else the flow of data decides.",
             "start_after: [Driver]",
             ("start_after: [\"my driver\"]", TEXT_BAD_NAME),
         ),
         key(
             "stop_before",
             Form::Several(&Form::Name(Names::Type)),
-            "It is stopped before components of these types, where one `_default` stops both.",
+            "Likewise: where connections go round in a circle, it is stopped before components of these types.",
             "stop_before: [Driver]",
             ("stop_before: [\"my driver\"]", TEXT_BAD_NAME),
         ),
@@ -150,7 +150,7 @@ pub static PROPERTY: Object = Object {
         key(
             "min",
             Form::Number,
-            "The least value: of each element, and of each number in a record.",
+            "The least number: of each element, and of each number in a record; says nothing of texts.",
             "min: 0.0",
             ("min: .inf", crate::model::codes::TEXT_NOT_FINITE),
         ),

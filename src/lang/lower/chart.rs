@@ -107,7 +107,6 @@ fn of_yaml(cx: &mut Cx, node: Node) -> Option<Parts> {
     let children = match fields.take(cx, "states").map(|node| (node.origin, node)) {
         None => Vec::new(),
         Some((_, Node { kind: Kind::Map(entries), .. })) => entries,
-        Some((_, Node { kind: Kind::List(list), .. })) if list.is_empty() => Vec::new(),
         Some((_, node)) => {
             cx.wrong(&node, "`states`", "a table of named values", fields.row("states").example);
             Vec::new()
@@ -225,7 +224,12 @@ fn actions(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(Action, 
 /// A function in a chart: its place is known, its meaning comes later.
 fn function(cx: &mut Cx, node: &Node, what: &str) {
     if !matches!(node.kind, Kind::Function) {
-        cx.wrong(node, what, "a function", "the name of an event under `entry`, `exit` or `effect`");
+        cx.wrong(
+            node,
+            what,
+            "a function (names of events stand in `entry`, `exit` and `effect`)",
+            "entry = \"e_ready\"",
+        );
         return;
     }
     let message = format!("{what} is a function, and a coordinator that is not trusted must be pure");

@@ -65,7 +65,7 @@ fn term(cx: &mut Cx, node: Node, wanted: Expected) -> Option<Term> {
             }
             _ => {
                 let example = cx.spelt(origin, wanted.example);
-                cx.wrong(&node, wanted.what, &format!("{}, such as `{example}`", wanted.what), &example);
+                cx.wrong(&node, "what stands here", &format!("{}, such as `{example}`", wanted.what), &example);
                 return None;
             }
         };

@@ -4,7 +4,7 @@ use super::{choice, condition, name, value};
 use crate::lang::concern;
 use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, CONFIRM, UNDO, primitive as primitive_of};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::finding::{did_you_mean, nearest};
+use crate::model::finding::{count, did_you_mean, nearest};
 use crate::model::{
     Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, DefaultTwice, Finding, Ident, MemberRef,
     OnFailure, Origin, Policy, RunState, StateEntry, StateList, Target, TypeName, Value, Wanted, codes,
@@ -53,7 +53,7 @@ fn unnamed() -> ConfigId {
 fn entries(cx: &mut Cx, node: Node, what: &str, example: &str) -> Option<Vec<Entry>> {
     match node.kind {
         Kind::Map(entries) => Some(entries),
-        Kind::List(list) if list.is_empty() => Some(Vec::new()),
+        Kind::List(list) if list.is_empty() && cx.is_lua(node.origin) => Some(Vec::new()),
         _ => {
             cx.wrong(&node, what, "a table of named values", example);
             None
@@ -66,7 +66,7 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     let (named, listed) = match node.kind {
         Kind::Made("Configuration", named, listed) => (named, listed),
         Kind::Map(named) => (named, Vec::new()),
-        Kind::List(list) if list.is_empty() => (Vec::new(), list),
+        Kind::List(list) if list.is_empty() && cx.is_lua(origin) => (Vec::new(), list),
         _ => {
             let example = cx.either(origin, CONFIGURATION.example, &CONFIGURATION.yaml());
             cx.wrong(&node, "a configuration", "a table", &example);
@@ -166,7 +166,8 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
             return StateList::default();
         }
     };
-    if keyed.len() > 1 {
+    // One key behind a list is the paper's, and Lua's alone.
+    if keyed.len() > 1 || (!keyed.is_empty() && !cx.is_lua(list_origin)) {
         let as_list: Vec<String> = keyed
             .iter()
             .map(|e| match &e.value.kind {
@@ -178,7 +179,7 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
         cx.report(
             Finding::error(
                 codes::CONF_KEYED_ENTRIES,
-                format!("`{}` has {} keyed entries, and keys have no order", entry.key, keyed.len()),
+                format!("`{}` has {}, and keys have no order", entry.key, count(keyed.len(), "keyed entry")),
             )
             .at(list_origin)
             .labelled("in which order?")

@@ -220,6 +220,10 @@ fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
     if let Kind::Bool(yes) = node.kind {
         return yes.then(Openings::default);
     }
+    if !matches!(node.kind, Kind::Map(_)) {
+        cx.wrong(&node, "`trusted`", "true or false, or a table with `open`", TRUSTED.example);
+        return None;
+    }
     let mut fields = Fields::of(cx, node, &TRUSTED)?;
     let mut out = Openings::default();
     for node in fields.several(cx, "open") {

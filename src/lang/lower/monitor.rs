@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 pub fn monitors(cx: &mut Cx, node: Node) -> Vec<Monitor> {
     let entries = match node.kind {
         Kind::Map(entries) => entries,
-        Kind::List(list) if list.is_empty() => Vec::new(),
+        Kind::List(list) if list.is_empty() && cx.is_lua(node.origin) => Vec::new(),
         _ => {
             cx.wrong(&node, "the list of monitors", "a table of named values", MONITOR.example);
             return Vec::new();

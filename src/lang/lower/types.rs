@@ -19,7 +19,6 @@ pub fn types(cx: &mut Cx, node: Node) -> Vec<ComponentType> {
 fn members(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<Entry> {
     match node.kind {
         Kind::Map(entries) => entries,
-        Kind::List(list) if list.is_empty() => Vec::new(),
         _ => {
             cx.wrong(&node, what, "a table of named values", example);
             Vec::new()
@@ -178,6 +177,10 @@ fn effect(cx: &mut Cx, node: Node) -> Option<Effect> {
             choice(cx, &node, "`effect`", &choices).map(|n| if n == 0 { Effect::None } else { Effect::Irreversible })
         }
         _ => {
+            if !matches!(node.kind, Kind::Map(_)) {
+                cx.wrong(&node, "`effect`", "`none`, `irreversible` or a table with `undo`", EFFECT.example);
+                return None;
+            }
             let mut fields = Fields::of(cx, node, &EFFECT)?;
             let operation = fields.name(cx, "undo");
             fields.finish(cx);

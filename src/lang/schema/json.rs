@@ -74,6 +74,12 @@ fn object(object: &Object) -> Value {
 fn row(key: &Key) -> Value {
     let mut out = match form(&key.form) {
         Value::Object(entries) if !entries.contains_key("$ref") => Value::Object(entries),
+        // Editors complete what they know to be a table with its colon.
+        reference
+            if matches!(key.form, Form::Table(inner) if !inner.may_be_empty) || matches!(key.form, Form::Condition) =>
+        {
+            json!({ "type": "object", "allOf": [reference] })
+        }
         reference => json!({ "allOf": [reference] }),
     };
     let mut text = key.doc.to_owned();
@@ -148,7 +154,8 @@ fn value_type() -> Value {
 
 /// One word with its arguments.
 fn condition() -> Value {
-    let one = |word: &Word| (word.name.to_owned(), json!({ "description": word.doc }));
+    let one =
+        |word: &Word| (word.name.to_owned(), json!({ "type": ["array", "string", "object"], "description": word.doc }));
     let words: Map<String, Value> = CONDITIONS.iter().map(one).collect();
     json!({
         "description": "A condition: one word, with its argument or the list of its arguments.",
@@ -159,7 +166,7 @@ fn condition() -> Value {
 /// One change: its word, and its parts.
 fn change() -> Value {
     let one = |object: &'static Object| {
-        (object.name.to_owned(), json!({ "allOf": [refer(object.name)], "description": object.doc }))
+        (object.name.to_owned(), json!({ "type": "object", "allOf": [refer(object.name)], "description": object.doc }))
     };
     let words: Map<String, Value> = CHANGES.iter().map(|change| one(change.object)).collect();
     json!({

@@ -152,7 +152,7 @@ pub fn markdown(file: &File) -> String {
 }
 
 fn table(out: &mut String, object: &Object) {
-    _ = write!(out, "\n## {}\n\n{}\n", object.name, object.doc);
+    _ = write!(out, "\n## Table `{}`\n\n{}\n", object.name, object.doc);
     if object.may_be_empty {
         out.push_str("\nNothing behind its name stands for one without keys.\n");
     }
