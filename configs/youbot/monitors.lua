@@ -67,7 +67,7 @@ Monitors {
   torque_saturated = monitor { when = above("Dynamics.tau_sat", 0):for_at_least(0.5),
     event = "e_torque_sat", repeat_every = AGAIN },
   overspeed = monitor { when = above(fastest, 1.5), event = "e_overspeed", repeat_every = AGAIN },
-  -- No coupled motion is so fast for so long: the arm gives way to whoever pushes it, too slowly for the limit above.
+  -- The acceptance motion is never so fast for so long: the arm gives way to whoever pushes it, too slowly for the limit above.
   carried_off = monitor { description = "an arm that takes torques is carried off",
     when = all { equals("youbot.control_mode", 6), above(fastest, 0.8):for_at_least(0.05) },
     event = "e_overspeed", repeat_every = AGAIN },

@@ -62,7 +62,7 @@ pub struct Refused {
 /// # Errors
 /// [`Refused`] with what is wrong in its texts, or a library or platform that this program does not have.
 pub fn read(path: &Path, options: &LoadOptions, extensions: impl Into<Extensions>) -> Result<Read, Refused> {
-    read_loaded(lang::load(path, options), &extensions.into(), None)
+    read_for(path, options, extensions, None)
 }
 
 /// The same on another platform of the program than the one that the deployment names.

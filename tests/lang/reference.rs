@@ -235,7 +235,7 @@ fn the_schema_says_what_reading_says() {
 #[test]
 fn every_shipped_file_passes_its_schema() {
     let mut seen = 0;
-    for entry in ignore_targets("deployments").chain(ignore_targets("configs")).chain(ignore_targets("examples")) {
+    for entry in yaml_files("deployments").chain(yaml_files("configs")).chain(yaml_files("examples")) {
         let text = std::fs::read_to_string(&entry).unwrap();
         let Ok(value) = serde_yaml::from_str::<Value>(&text) else { continue };
         let Some(table) = value.as_mapping() else { continue };
@@ -255,7 +255,7 @@ fn every_shipped_file_passes_its_schema() {
 }
 
 /// The YAML files below a folder.
-fn ignore_targets(folder: &str) -> impl Iterator<Item = std::path::PathBuf> {
+fn yaml_files(folder: &str) -> impl Iterator<Item = std::path::PathBuf> {
     fn walk(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
