@@ -1,5 +1,6 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
+use super::few::Few;
 use super::product::Product;
 use super::reactions::{Handed, Reaction};
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, bit, index};
@@ -142,7 +143,7 @@ impl Product<'_> {
         stops.extend(behind.iter().copied());
         let mut states = Vec::with_capacity(1);
         if self.races && self.meddles(&state, &batch) {
-            states.push(State { flight: vec![batch.clone()], ..state.clone() });
+            states.push(State { flight: Few::from_iter([batch.clone()]), ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
             // Given up alone and once, it is answered the same way at whatever time.
             let among = |turn: &Turn| {

@@ -25,6 +25,9 @@ pub enum Halt {
 pub struct Effort<'e> {
     /// So many transitions of coordinators that are followed together, at most.
     pub transitions: usize,
+    /// What failed undos leave is known one at a time where so many configurations may be left, at least ([`undo_failed`](super::undo_failed)); where
+    /// they are fewer, following every subset of them is less.
+    pub aside_from: usize,
     /// Told every few thousand states how far it is; an error ends it there, and what was left out is said.
     pub goes_on: &'e dyn Fn(Far) -> Result<(), Halt>,
 }
@@ -32,7 +35,7 @@ pub struct Effort<'e> {
 impl Default for Effort<'_> {
     /// [`limits::CHECK_TRANSITIONS`], and to the end.
     fn default() -> Self {
-        Self { transitions: limits::CHECK_TRANSITIONS, goes_on: &|_| Ok(()) }
+        Self { transitions: limits::CHECK_TRANSITIONS, aside_from: limits::CHECK_ASIDE, goes_on: &|_| Ok(()) }
     }
 }
 

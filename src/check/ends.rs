@@ -8,6 +8,10 @@ use crate::model::{Ask, Verdict};
 use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, settle};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
+use std::cmp::Ordering;
+
+/// Of so many undos of one batch that found nothing it is told apart whether they were about what is set aside.
+const SOME_ASIDE: usize = 4;
 
 /// How a group under way has ended: what it leads to, and the answers.
 struct End<'e> {
@@ -48,6 +52,9 @@ impl Product<'_> {
         for endings in comes.endings(Stopping::Not, self.tells_all) {
             let from = nexts.all.len();
             self.ends_so(state, number, &requests, &comes, &endings, nexts);
+            if state.aside {
+                self.ends_as_aside(state, number, &requests, &comes, &endings, nexts);
+            }
             if endings.iter().all(|ending| *ending == Ending::Done) {
                 let deep = (comes.done.deep, comes.done.left);
                 nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
@@ -66,6 +73,66 @@ impl Product<'_> {
         nexts: &mut Nexts,
     ) {
         let given = given(&settle(requests, &comes.group, endings, Stopped::Not));
+        self.ends_given(state, number, requests, comes, endings, given, nexts);
+    }
+
+    /// The same where some is set aside: an undo that found nothing may have been about that and have failed, and so may one that
+    /// has nothing to do, since something may be in its way.
+    fn ends_as_aside(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        endings: &[Ending],
+        nexts: &mut Nexts,
+    ) {
+        let told = given(&settle(requests, &comes.group, endings, Stopped::Not));
+        let of_parts = &comes.group.places;
+        let found_nothing =
+            told.iter().filter(|(place, verdict)| !of_parts.contains(place) && *verdict == Some(Verdict::Undone));
+        let found_nothing: SmallVec<[usize; 2]> = found_nothing.map(|(place, _)| *place).collect();
+        let may = self.may_be_aside(requests, &found_nothing);
+        for some in 1..1u32 << may.len().min(SOME_ASIDE) {
+            let fails = |place: usize| {
+                may.iter().position(|of| *of == place).is_some_and(|at| some & (1 << at.min(SOME_ASIDE - 1)) != 0)
+            };
+            let mut given = told.clone();
+            given
+                .iter_mut()
+                .filter(|(place, _)| fails(*place))
+                .for_each(|(_, verdict)| *verdict = Some(Verdict::UndoFailed));
+            let from = nexts.all.len();
+            self.ends_given(state, number, requests, comes, endings, given, nexts);
+            nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Undo));
+        }
+        let done = endings.iter().all(|ending| *ending == Ending::Done);
+        let idle =
+            |part: &usize| !comes.can_fail[*part] && self.may_be_in_the_way(&requests[comes.group.places[*part]]);
+        let idle: SmallVec<[usize; 2]> = (0..comes.can_fail.len()).filter(|part| done && idle(part)).collect();
+        for part in idle {
+            let of = |at: usize| match at.cmp(&part) {
+                Ordering::Less => Ending::Done,
+                Ordering::Equal => Ending::Failed,
+                Ordering::Greater => Ending::Anew,
+            };
+            let endings: SmallVec<[Ending; 2]> = (0..comes.can_fail.len()).map(of).collect();
+            self.ends_so(state, number, requests, comes, &endings, nexts);
+        }
+    }
+
+    /// They have ended so, and these are the answers.
+    #[expect(clippy::too_many_arguments, reason = "what a group under way is, and how it ended")]
+    fn ends_given(
+        &mut self,
+        state: &State,
+        number: u32,
+        requests: &[Request],
+        comes: &Comes,
+        endings: &[Ending],
+        given: SmallVec<[(usize, Option<Verdict>); 2]>,
+        nexts: &mut Nexts,
+    ) {
         let Some(went) = comes.went(endings) else { return self.broke(state, number, requests, given, nexts) };
         let class = match endings.iter().position(|ending| *ending == Ending::Failed) {
             Some(part) if comes.undoes(part, requests) => Failed::Undo,
@@ -121,6 +188,18 @@ impl Product<'_> {
             answers.push(request.as_told(verdict));
             answers.extend(gone.undone);
         }
+        let undo_failed = given
+            .iter()
+            .filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed))
+            .map(|(place, _)| requests[*place]);
+        let undo_failed: SmallVec<[Request; 2]> = undo_failed.collect();
+        for next in self.undos_failed(next, &undo_failed) {
+            self.goes_on_behind(next, number, answers.clone(), *class, nexts);
+        }
+    }
+
+    /// Requests of a batch under way are answered: the rest of it begins, and they are told.
+    fn goes_on_behind(&mut self, mut next: State, number: u32, answers: Answers, class: Failed, nexts: &mut Nexts) {
         // What was given up together with one before it is not taken up anew; where nothing is known it may have begun with it.
         while (!self.tells_all || self.worlds.top(next.world).is_none())
             && let Some(place) =
@@ -131,7 +210,7 @@ impl Product<'_> {
         // The rest of it begins before whatever waits.
         self.takes_place(&mut next, number);
         for next in self.lands(next) {
-            self.tell(next, answers.clone(), *class, nexts);
+            self.tell(next, answers.clone(), class, nexts);
         }
     }
 

@@ -254,7 +254,10 @@ impl Graph<'_, '_> {
         for (place, next) in nexts.all.into_iter().enumerate() {
             let place = u32::try_from(place).ok();
             if let Some(deep) = next.deep.0 {
-                self.deep.push((at, deep));
+                // Of what was set aside the same may be applied anew without its frame being one more.
+                if !state.aside {
+                    self.deep.push((at, deep));
+                }
                 self.ends.insert(at);
                 self.cut(Bound::Frames, so_far);
                 continue;
@@ -285,9 +288,10 @@ impl Graph<'_, '_> {
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let barred = state.stopping.then(|| self.product.barred(next.by)).flatten();
             let dropped = matches!(next.by, Move::Dropped(_));
-            let shown = shows.shows(self.product, &state, &next);
+            let shown = !next.state.aside && shows.shows(self.product, &state, &next);
             let by = next.by;
             let (mut next, class) = self.abstracted(next, so_far);
+            next.aside &= self.product.worlds.top(next.world).is_none();
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);

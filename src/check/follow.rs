@@ -7,6 +7,7 @@
 //! Here every frame counts, in its place, and all answers are given: what `check` may leave out, since nobody can tell the
 //! difference, is not left out.
 
+use super::aside::Aside;
 use super::beside;
 use super::product::Product;
 use super::shape::Undone;
@@ -89,6 +90,7 @@ impl<'a> Follower<'a> {
         let mut product = Product::new(deployment, &views, charts, &numbers, catalogue);
         product.worlds = Worlds::new(deployment, catalogue, Undone { in_order: true, ..Undone::default() });
         product.tells_all = true;
+        product.aside = Aside::default();
         product.most_waiting = usize::MAX;
         let state = product.start()?;
         Some(Self { product, may: vec![May { state, owed: Answers::new() }] })

@@ -75,7 +75,11 @@ impl Comes {
         match endings.iter().enumerate().find(|(_, ending)| **ending != Ending::Done) {
             None => Some(&self.done),
             Some((part, Ending::Cancelled)) => Some(&self.stopped[part].0),
-            Some((part, Ending::Failed)) => self.stopped[part].1.as_ref(),
+            // What cannot fail by itself is as if it had been given up.
+            Some((part, Ending::Failed)) => {
+                let (cancelled, failed) = &self.stopped[part];
+                Some(failed.as_ref().unwrap_or(cancelled))
+            }
             _ => None,
         }
     }

@@ -10,9 +10,11 @@
 //! in that one's inbox, and so does what another one emits ([`inbox`](super::inbox)). Answers go first. The next event from outside comes when all
 //! inboxes are empty.
 
+use super::aside::Aside;
 use super::beside;
 use super::coordinator::outside_events;
 use super::effort::{Effort, Left};
+use super::few::{Few, Shared};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Beside, Comes, EMPTY, Held, Went};
 use super::reactions::Asked;
@@ -20,7 +22,7 @@ use super::state::{Failed, Move, Next, Nexts, State, bit, index};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, RequestId, Verdict};
-use crate::stack::{Desk, FrameId, Request, Requester, Why};
+use crate::stack::{FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -78,6 +80,8 @@ pub struct Product<'a> {
     pub crosses: bool,
     /// So many frames of an operator are in force at once.
     pub by_hand: usize,
+    /// What is set aside where its undo fails.
+    pub(super) aside: Aside,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
 }
@@ -125,15 +129,25 @@ impl<'a> Product<'a> {
             unjudged: false,
             crosses: false,
             by_hand: 1,
+            aside: Aside::default(),
             effort: Effort::default().into(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
+        product.aside = Aside::of(deployment, &product.members, &product.losable);
         product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(deployment, &views[*number], charts[*number]);
             product.members[place].listen(deployment, &own);
         }
         product
+    }
+
+    /// So much of it is followed.
+    pub fn follow_with(&mut self, effort: Effort<'a>) {
+        self.effort = effort.into();
+        if self.aside.len() < effort.aside_from {
+            self.aside = Aside::default();
+        }
     }
 
     /// Nothing was followed in it yet, with so many batches of one coordinator that may wait; what was planned in its worlds
@@ -150,25 +164,26 @@ impl<'a> Product<'a> {
         let state = State {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
-            desk: Desk::default(),
-            interrupted: SmallVec::new(),
-            joined: SmallVec::new(),
-            placed: SmallVec::new(),
-            safe: SmallVec::new(),
-            due: SmallVec::new(),
-            telling: SmallVec::new(),
+            desk: Shared::default(),
+            interrupted: Few::new(),
+            joined: Few::new(),
+            placed: Few::new(),
+            safe: Few::new(),
+            due: Few::new(),
+            telling: Few::new(),
             stayed: false,
-            inbox: SmallVec::new(),
-            unconfirmed: SmallVec::new(),
-            lost: SmallVec::new(),
-            stands: Vec::new(),
-            over: SmallVec::new(),
+            inbox: Few::new(),
+            unconfirmed: Few::new(),
+            lost: Few::new(),
+            stands: Few::new(),
+            over: Few::new(),
+            aside: false,
             down: 0,
             stopping: false,
             leaving: false,
             moved: 0,
             across: false,
-            flight: Vec::new(),
+            flight: Few::new(),
         };
         let mut states = vec![state];
         for (by, reaction) in entered.iter().enumerate() {

@@ -106,7 +106,7 @@ fn follow(
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let all: Vec<usize> = (0..charts.len()).collect();
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
-    product.effort = effort.into();
+    product.follow_with(effort);
     let mut found = ways::ways(&mut product);
     if product.effort.halted().is_some() {
         // Where it ended says nothing of the ways.
@@ -134,7 +134,7 @@ fn follow(
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
         if let Some(apart) = &mut apart {
             apart.never_down = product.never_down;
-            apart.effort = effort.into();
+            apart.follow_with(effort);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
         let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);

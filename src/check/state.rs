@@ -1,5 +1,6 @@
 //! The states of the product, and the moves between them.
 
+use super::few::{Few, Shared};
 use super::outcome::WorldId;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
@@ -50,32 +51,34 @@ pub struct State {
     /// System and stack.
     pub world: WorldId,
     /// What waits and what is under way.
-    pub desk: Desk,
+    pub desk: Shared<Desk>,
     /// Batches under way that are interrupted.
-    pub interrupted: SmallVec<[Interrupted; 1]>,
+    pub interrupted: Few<Interrupted>,
     /// Batches under way that were begun as one, of which some requests were answered since.
-    pub joined: SmallVec<[u32; 1]>,
+    pub joined: Few<u32>,
     /// Batches under way whose pushes found their place only where frames can be squashed: what others hold on to since does
     /// not take it away.
-    pub placed: SmallVec<[u32; 1]>,
+    pub placed: Few<u32>,
     /// Safe configurations that are being applied, in their order.
-    pub safe: SmallVec<[Request; 1]>,
+    pub safe: Few<Request>,
     /// Answers on their way.
-    pub due: SmallVec<[(Request, Verdict); 1]>,
+    pub due: Few<(Request, Verdict)>,
     /// Answers that are given and not heard yet; where coordinators hear them at once, none in a state between moves.
-    pub telling: SmallVec<[(Request, Verdict); 2]>,
+    pub telling: Few<(Request, Verdict)>,
     /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
     pub stayed: bool,
     /// Events on their way to a coordinator, those of one in order.
-    pub inbox: SmallVec<[(u8, EventId); 2]>,
+    pub inbox: Few<(u8, EventId)>,
     /// Frames that wait for their confirmation.
-    pub unconfirmed: SmallVec<[Unconfirmed; 1]>,
+    pub unconfirmed: Few<Unconfirmed>,
     /// Configurations that were lost, and are not applied anew.
-    pub lost: SmallVec<[ConfigId; 1]>,
+    pub lost: Few<ConfigId>,
     /// Components that ran when something in force was applied, and that what it stands for looks at.
-    pub stands: Vec<(ConfigId, ComponentName)>,
+    pub stands: Few<(ConfigId, ComponentName)>,
     /// Configurations in force of which one of those was stopped since: what they stand for is watched no more.
-    pub over: SmallVec<[ConfigId; 1]>,
+    pub over: Few<ConfigId>,
+    /// Frames whose undo has failed were set aside: they may be there ([`undo_failed`](super::undo_failed)).
+    pub aside: bool,
     /// Coordinators that have come to *down* and asked for nothing since, by their bits.
     pub down: u64,
     /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.
@@ -88,7 +91,7 @@ pub struct State {
     /// One came meanwhile.
     pub across: bool,
     /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
-    pub flight: Vec<Batch>,
+    pub flight: Few<Batch>,
 }
 
 impl State {

@@ -58,6 +58,8 @@ pub struct Worlds<'a> {
     confirms: bool,
     worlds: Vec<Known>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
+    /// The first world with each system.
+    systems: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Held>,
@@ -89,6 +91,7 @@ impl<'a> Worlds<'a> {
             confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),
             worlds: Vec::new(),
             index: FxHashMap::default(),
+            systems: FxHashMap::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             helds: FxHashMap::default(),
@@ -338,9 +341,10 @@ impl<'a> Worlds<'a> {
         self.intern_shaped(world, counted, ids)
     }
 
-    fn intern_shaped(&mut self, world: World, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
+    fn intern_shaped(&mut self, mut world: World, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
         let mut hasher = FxHasher::default();
         hash_system(&world.system, &mut hasher);
+        let of_system = hasher.finish();
         counted.hash(&mut hasher);
         let hash = hasher.finish();
         let same = |id: &&WorldId| match &self.worlds[**id as usize] {
@@ -354,6 +358,16 @@ impl<'a> Worlds<'a> {
             return *id;
         }
         let id = self.next();
+        // Most worlds differ in their frames only.
+        let like = self.systems.entry(of_system).or_default();
+        let known = |id: &&WorldId| match &self.worlds[**id as usize] {
+            Known::Exact(exact) => same_system(&exact.world.system, &world.system),
+            Known::Top(_) => false,
+        };
+        match like.iter().find(known).map(|id| &self.worlds[*id as usize]) {
+            Some(Known::Exact(exact)) => world.system.share_with(&exact.world.system),
+            _ => like.push(id),
+        }
         self.worlds.push(Known::Exact(Box::new(Exact { world, counted, ids })));
         self.index.entry(hash).or_default().push(id);
         id

@@ -81,7 +81,11 @@ impl Run for Args {
             }
         };
         let following = Following::new(self.budget, self.json)?;
-        let effort = Effort { transitions: self.budget.transitions, goes_on: &|far| following.goes_on(far) };
+        let effort = Effort {
+            transitions: self.budget.transitions,
+            goes_on: &|far| following.goes_on(far),
+            ..Effort::default()
+        };
         let mut report = check::run_with(read.deployment.clone(), &read.catalogue, effort);
         let interrupted = following.over();
         report.verdict = report.verdict.with(&read.findings);

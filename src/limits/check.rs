@@ -44,6 +44,10 @@ pub const CHECK_PROBE: usize = 50_000;
 /// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
 pub const CHECK_LEAN: usize = 5_000;
 
+/// Configurations whose frames may be left by undos that failed, from which on that is known of one at a time: of fewer there are no more
+/// subsets than that needs states.
+pub const CHECK_ASIDE: usize = 5;
+
 /// Requests that wait at once and are followed no further: past [`CHECK_WAITING`] only answers add to them, and what
 /// adds more than it takes does so for ever. Several times as many as one step of a coordinator asks for.
 pub const CHECK_PILED: usize = 32;

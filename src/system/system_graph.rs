@@ -13,11 +13,19 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct System {
     types: Arc<Catalogue>,
+    /// Shared with the pictures that were copied from it, until one of them changes: whoever tries something on a copy, or keeps
+    /// thousands of them, pays for those that differ.
+    there: Arc<There>,
+    revision: u64,
+}
+
+/// What is there.
+#[derive(Debug, Clone, Default)]
+struct There {
     graph: StableDiGraph<Node, Link>,
     names: FxHashMap<ComponentName, NodeIndex>,
     links: FxHashMap<(MemberRef, MemberRef), EdgeIndex>,
     driven: FxHashMap<MemberRef, Driven>,
-    revision: u64,
 }
 
 /// A snapshot names a component type that the catalogue does not have.
@@ -33,14 +41,7 @@ pub struct UnknownType {
 impl System {
     /// A system without components.
     pub fn new(types: Arc<Catalogue>) -> Self {
-        Self {
-            types,
-            graph: StableDiGraph::default(),
-            names: FxHashMap::default(),
-            links: FxHashMap::default(),
-            driven: FxHashMap::default(),
-            revision: 0,
-        }
+        Self { types, there: Arc::default(), revision: 0 }
     }
 
     /// The system that a platform reports. Members the type does not have are left out; properties it does have and the
@@ -70,7 +71,7 @@ impl System {
             system.insert_component(node);
         }
         for ((from, to), policy) in &snapshot.connections {
-            if system.names.contains_key(&from.component) && system.names.contains_key(&to.component) {
+            if system.there.names.contains_key(&from.component) && system.there.names.contains_key(&to.component) {
                 system.insert_link(*from, *to, *policy);
             }
         }
@@ -112,10 +113,11 @@ impl System {
         let set: rustc_hash::FxHashSet<ComponentName> = names.iter().copied().collect();
         let concerns = |from: &MemberRef, to: &MemberRef| set.contains(&from.component) || set.contains(&to.component);
         let gone: Vec<(MemberRef, MemberRef)> = self
+            .there
             .links
             .iter()
             .filter(|((from, to), edge)| {
-                concerns(from, to) && seen.connections.get(&(*from, *to)) != Some(&self.graph[**edge].policy)
+                concerns(from, to) && seen.connections.get(&(*from, *to)) != Some(&self.there.graph[**edge].policy)
             })
             .map(|(ends, _)| *ends)
             .collect();
@@ -127,8 +129,8 @@ impl System {
             changed |= self.adopt_one(*name, ty, seen);
         }
         for ((from, to), policy) in seen.connections.iter().filter(|((from, to), _)| concerns(from, to)) {
-            let known = self.names.contains_key(&from.component) && self.names.contains_key(&to.component);
-            if known && !self.links.contains_key(&(*from, *to)) {
+            let known = self.there.names.contains_key(&from.component) && self.there.names.contains_key(&to.component);
+            if known && !self.there.links.contains_key(&(*from, *to)) {
                 self.insert_link(*from, *to, *policy);
                 changed = true;
             }
@@ -143,10 +145,15 @@ impl System {
         seen: &Snapshot,
     ) -> bool {
         let (Some(ty), Some(component)) = (ty, seen.components.get(&name)) else {
-            let there = self.names.contains_key(&name);
+            let there = self.there.names.contains_key(&name);
             if there {
-                let ends: Vec<_> =
-                    self.links.keys().filter(|(a, b)| a.component == name || b.component == name).copied().collect();
+                let ends: Vec<_> = self
+                    .there
+                    .links
+                    .keys()
+                    .filter(|(a, b)| a.component == name || b.component == name)
+                    .copied()
+                    .collect();
                 ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
                 self.remove_component(name);
             }
@@ -156,8 +163,13 @@ impl System {
         let another = present.is_none_or(|node| node.ty.name != component.ty || node.activity != component.activity);
         if another {
             if present.is_some() {
-                let ends: Vec<_> =
-                    self.links.keys().filter(|(a, b)| a.component == name || b.component == name).copied().collect();
+                let ends: Vec<_> = self
+                    .there
+                    .links
+                    .keys()
+                    .filter(|(a, b)| a.component == name || b.component == name)
+                    .copied()
+                    .collect();
                 ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
                 self.remove_component(name);
             }
@@ -199,9 +211,9 @@ impl System {
                 snapshot.ports.insert(node.name.member(port), value.clone());
             }
         }
-        for ((from, to), edge) in &self.links {
+        for ((from, to), edge) in &self.there.links {
             if set.contains(&from.component) || set.contains(&to.component) {
-                snapshot.connections.insert((*from, *to), self.graph[*edge].policy);
+                snapshot.connections.insert((*from, *to), self.there.graph[*edge].policy);
             }
         }
         snapshot
@@ -214,27 +226,27 @@ impl System {
 
     /// How many components there are.
     pub fn len(&self) -> usize {
-        self.graph.node_count()
+        self.there.graph.node_count()
     }
 
     /// Whether there is no component.
     pub fn is_empty(&self) -> bool {
-        self.graph.node_count() == 0
+        self.there.graph.node_count() == 0
     }
 
     /// The graph: components, and connections from the out-port's component to the in-port's.
     pub fn graph(&self) -> &StableDiGraph<Node, Link> {
-        &self.graph
+        &self.there.graph
     }
 
     /// The handle of a component, valid as long as it exists.
     pub fn index_of(&self, name: ComponentName) -> Option<NodeIndex> {
-        self.names.get(&name).copied()
+        self.there.names.get(&name).copied()
     }
 
     /// Records a run state that a component took by itself, as when it became faulted. False: there is no such component.
     pub fn set_state(&mut self, component: ComponentName, state: RunState) -> bool {
-        let known = self.names.contains_key(&component);
+        let known = self.there.names.contains_key(&component);
         if known {
             self.put_state(component, state);
         }
@@ -243,18 +255,28 @@ impl System {
 
     /// The component behind a handle.
     pub fn node_at(&self, index: NodeIndex) -> Option<&Node> {
-        self.graph.node_weight(index)
+        self.there.graph.node_weight(index)
+    }
+
+    fn change(&mut self) -> &mut There {
+        Arc::make_mut(&mut self.there)
+    }
+
+    /// Takes what is there from another picture of the same, so that both share it.
+    pub fn share_with(&mut self, other: &Self) {
+        self.there = other.there.clone();
+        self.revision = other.revision;
     }
 
     pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
         self.revision += 1;
-        let node = self.graph.node_weight_mut(index)?;
+        let node = Arc::make_mut(&mut self.there).graph.node_weight_mut(index)?;
         node.generation = self.revision;
         Some(node)
     }
 
     fn touch(&mut self, name: ComponentName) -> &mut Node {
-        self.touch_at(self.names[&name]).expect("names and nodes agree")
+        self.touch_at(self.there.names[&name]).expect("names and nodes agree")
     }
 }
 
@@ -264,26 +286,26 @@ impl View for System {
     }
 
     fn component(&self, name: ComponentName) -> Option<&Node> {
-        self.names.get(&name).map(|i| &self.graph[*i])
+        self.there.names.get(&name).map(|i| &self.there.graph[*i])
     }
 
     fn link(&self, from: MemberRef, to: MemberRef) -> Option<Policy> {
-        self.links.get(&(from, to)).map(|e| self.graph[*e].policy)
+        self.there.links.get(&(from, to)).map(|e| self.there.graph[*e].policy)
     }
 
     fn driven(&self, port: MemberRef) -> Driven {
-        self.driven.get(&port).copied().unwrap_or_default()
+        self.there.driven.get(&port).copied().unwrap_or_default()
     }
 
     fn for_each_component(&self, f: &mut dyn FnMut(&Node)) {
-        self.graph.node_weights().for_each(f);
+        self.there.graph.node_weights().for_each(f);
     }
 
     fn for_each_link(&self, f: &mut dyn FnMut(MemberRef, MemberRef, Policy)) {
-        for edge in self.graph.edge_references() {
+        for edge in self.there.graph.edge_references() {
             let link = edge.weight();
-            let from = self.graph[edge.source()].name.member(link.from);
-            f(from, self.graph[edge.target()].name.member(link.to), link.policy);
+            let from = self.there.graph[edge.source()].name.member(link.from);
+            f(from, self.there.graph[edge.target()].name.member(link.to), link.policy);
         }
     }
 }
@@ -294,14 +316,14 @@ impl ViewMut for System {
         node.born = self.revision;
         node.generation = self.revision;
         let name = node.name;
-        let index = self.graph.add_node(node);
-        self.names.insert(name, index);
+        let index = self.change().graph.add_node(node);
+        self.change().names.insert(name, index);
     }
 
     fn remove_component(&mut self, name: ComponentName) {
         self.revision += 1;
-        if let Some(index) = self.names.remove(&name) {
-            self.graph.remove_node(index);
+        if let Some(index) = self.change().names.remove(&name) {
+            self.change().graph.remove_node(index);
         }
     }
 
@@ -310,26 +332,27 @@ impl ViewMut for System {
         if from.component != to.component {
             self.touch(to.component).degree += 1;
         }
-        let (a, b) = (self.names[&from.component], self.names[&to.component]);
-        let edge = self.graph.add_edge(a, b, Link { from: from.member, to: to.member, policy });
-        self.links.insert((from, to), edge);
-        let driven = self.driven.entry(to).or_default();
+        let (a, b) = (self.there.names[&from.component], self.there.names[&to.component]);
+        let edge = self.change().graph.add_edge(a, b, Link { from: from.member, to: to.member, policy });
+        self.change().links.insert((from, to), edge);
+        let driven = self.change().driven.entry(to).or_default();
         driven.links += 1;
         driven.data += u32::from(policy == Policy::Data);
     }
 
     fn remove_link(&mut self, from: MemberRef, to: MemberRef) {
-        let Some(edge) = self.links.remove(&(from, to)) else { return };
+        let Some(edge) = self.change().links.remove(&(from, to)) else { return };
         self.touch(from.component).degree -= 1;
         if from.component != to.component {
             self.touch(to.component).degree -= 1;
         }
-        let data = self.graph.remove_edge(edge).is_some_and(|link| link.policy == Policy::Data);
-        if let Some(driven) = self.driven.get_mut(&to) {
+        let data = self.change().graph.remove_edge(edge).is_some_and(|link| link.policy == Policy::Data);
+        let ports = &mut self.change().driven;
+        if let Some(driven) = ports.get_mut(&to) {
             driven.links -= 1;
             driven.data -= u32::from(data);
             if driven.links == 0 {
-                self.driven.remove(&to);
+                ports.remove(&to);
             }
         }
     }

@@ -5,6 +5,7 @@
 mod demo;
 
 mod advice;
+mod aside;
 mod asked;
 mod beside;
 mod circles;

@@ -1,0 +1,159 @@
+//! What a state of the product has few of, and mostly none: a list of one pointer, shared by all states that have it of each
+//! other until one changes it.
+//!
+//! Of a hundred thousand states most differ in one or two things from the one that they come of; with the lists themselves in it
+//! a state would be a kilobyte, and copying them most of what following costs.
+
+use std::ops::{Deref, DerefMut};
+use std::rc::Rc;
+
+/// A list that costs nothing where it is empty, and nothing to copy.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub struct Few<T>(Option<Rc<Vec<T>>>);
+
+impl<T> Few<T> {
+    /// None.
+    pub const fn new() -> Self {
+        Self(None)
+    }
+
+    /// As a slice.
+    pub fn as_slice(&self) -> &[T] {
+        self.0.as_ref().map_or(&[], |list| list.as_slice())
+    }
+
+    /// None is left.
+    pub fn clear(&mut self) {
+        self.0 = None;
+    }
+}
+
+impl<T: Clone> Few<T> {
+    /// Lets something change them. An empty list stands as none, so that equal ones are equal.
+    fn change<R>(&mut self, with: impl FnOnce(&mut Vec<T>) -> R) -> R {
+        let list = Rc::make_mut(self.0.get_or_insert_default());
+        let answer = with(list);
+        if list.is_empty() {
+            self.0 = None;
+        }
+        answer
+    }
+
+    /// One more, at the end.
+    pub fn push(&mut self, one: T) {
+        self.change(|list| list.push(one));
+    }
+
+    /// Takes out the one at that place.
+    ///
+    /// # Panics
+    /// There is none.
+    pub fn remove(&mut self, at: usize) -> T {
+        self.change(|list| list.remove(at))
+    }
+
+    /// Only those of which this is true, asked in order and once of each. It may change them.
+    pub fn retain(&mut self, stays: impl FnMut(&mut T) -> bool) {
+        if !self.is_empty() {
+            self.change(|list| list.retain_mut(stays));
+        }
+    }
+
+    /// Of the same that follow each other one stays.
+    pub fn dedup(&mut self)
+    where
+        T: PartialEq,
+    {
+        if self.windows(2).any(|two| two[0] == two[1]) {
+            self.change(Vec::dedup);
+        }
+    }
+}
+
+impl<T> Clone for Few<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T> Default for Few<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T> Deref for Few<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        self.as_slice()
+    }
+}
+
+impl<T: Clone> DerefMut for Few<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match &mut self.0 {
+            Some(list) => Rc::make_mut(list).as_mut_slice(),
+            None => &mut [],
+        }
+    }
+}
+
+impl<T: Clone> Extend<T> for Few<T> {
+    fn extend<I: IntoIterator<Item = T>>(&mut self, more: I) {
+        let mut more = more.into_iter().peekable();
+        if more.peek().is_some() {
+            self.change(|list| list.extend(more));
+        }
+    }
+}
+
+impl<T: Clone> FromIterator<T> for Few<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(all: I) -> Self {
+        let mut few = Self::new();
+        few.extend(all);
+        few
+    }
+}
+
+impl<'a, T> IntoIterator for &'a Few<T> {
+    type Item = &'a T;
+    type IntoIter = std::slice::Iter<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<T: Clone> IntoIterator for Few<T> {
+    type Item = T;
+    type IntoIter = std::vec::IntoIter<T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.map(Rc::unwrap_or_clone).unwrap_or_default().into_iter()
+    }
+}
+
+/// Something larger, shared by the states that have the same until one changes it.
+#[derive(Debug, Default, PartialEq, Eq, Hash)]
+pub struct Shared<T>(Rc<T>);
+
+impl<T> Clone for Shared<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T> Deref for Shared<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T: Clone> DerefMut for Shared<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        Rc::make_mut(&mut self.0)
+    }
+}
