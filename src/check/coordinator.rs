@@ -6,9 +6,7 @@ use crate::model::codes::{
 };
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::statechart::is_internal;
-use crate::model::{
-    Ask, ChangeKind, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict,
-};
+use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
 use std::collections::BTreeSet;
 
@@ -162,10 +160,7 @@ fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
         .configurations
         .iter()
         .flat_map(|configuration| &configuration.changes)
-        .filter_map(|change| match &change.kind {
-            ChangeKind::Create { component, .. } => Some(component.as_str()),
-            _ => None,
-        })
+        .filter_map(|change| change.kind.makes().map(|(component, ..)| component.as_str()))
         .collect();
     (!created.contains(component)).then(|| {
         Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))

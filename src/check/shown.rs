@@ -37,6 +37,7 @@ pub const FOLLOWED: &[Code] = &[
     DATA_ALONE,
     NOT_TUNABLE,
     PORT_DRIVEN,
+    PORT_UNMAPPED,
     // The same, where a component is of one of several types then.
     UNKNOWN_PORT,
     UNKNOWN_PROPERTY,
@@ -44,6 +45,7 @@ pub const FOLLOWED: &[Code] = &[
     NOT_AN_OUT_PORT,
     NOT_AN_IN_PORT,
     PORT_TYPES,
+    PORT_UNLIKE,
     PORT_UNITS,
     NEEDS_BUFFER,
     BAD_VALUE,

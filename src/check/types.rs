@@ -2,7 +2,7 @@
 
 use crate::model::codes::{TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, ChangeKind, Deployment, Effect, Finding, Findings, Ident};
+use crate::model::{Catalogue, Deployment, Effect, Finding, Findings, Ident};
 
 /// What is wrong with the declared types: names of other types and of operations that are not there.
 pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
@@ -65,8 +65,8 @@ fn without_code(deployment: &Deployment) -> Findings {
     }
     for configuration in &deployment.configurations {
         for change in &configuration.changes {
-            let ChangeKind::Create { component, ty, .. } = &change.kind else { continue };
-            if let Some(declared) = deployment.types.iter().find(|d| d.name == *ty) {
+            let Some((component, ty, _)) = change.kind.makes() else { continue };
+            if let Some(declared) = deployment.types.iter().find(|d| d.name == ty) {
                 findings.push(
                     Finding::error(TYPE_WITHOUT_CODE, format!("`{component}` cannot be made: `{ty}` is only declared"))
                         .at(change.origin)

@@ -315,6 +315,10 @@ codes! {
         "A written value is the latest value of its port. A buffered port and an event port are queues and have none, so an undo could not take the sample back. Connect a component that sends it, or use an operation or a property.";
     BAD_ARGUMENTS = "conf::bad_arguments", "the operation takes other arguments",
         "The call's arguments differ from the operation's declaration in number or in type. `davit types TYPE` shows the operation with the types of its arguments. Correct the call; the same rule holds for the call that undoes it.";
+    PORT_UNLIKE = "conf::port_unlike", "a port cannot become that one where its component is replaced",
+        "The `map` of a replace says what a port of the old component is called on the new one, so that its connections go on there. The two are of different direction, type or unit: no connection of the one could be one of the other. Correct the map, or connect the new component by hand: disconnect, destroy, create and connect.";
+    PORT_UNMAPPED = "conf::port_unmapped", "a connected port has no counterpart on the component that replaces its own",
+        "A replace carries the connections of the old component over to the new one. This port is connected where the configuration is applied, and the type of the new component has no port of that name. Say in `map` what it is called there, or disconnect it in the same configuration if the connection is to end.";
     MISSING_PROPERTY = "conf::missing_property", "a property without a default is not given",
         "The type declares this property without a default, so a component cannot be created without a value for it. Give the value in the create itself; a property_set beside it comes too late, for the component would exist without one in between.";
     CLASH = "conf::clash", "two changes of one configuration do not commute",

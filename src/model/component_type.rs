@@ -69,6 +69,16 @@ pub enum Direction {
     Out,
 }
 
+impl Direction {
+    /// As it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::In => "in",
+            Self::Out => "out",
+        }
+    }
+}
+
 /// A port of a type. `type: event` makes an event port, `buffered: true` a port that only takes buffered connections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PortType {

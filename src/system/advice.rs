@@ -37,9 +37,15 @@ impl Violation {
                 let declared = types.iter().filter_map(|ty| view.types().get(*ty));
                 declared.map(|ty| (ty.origin, format!("{} is declared here", ty.name))).collect()
             }
-            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } => {
+            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } | Self::PortUnlike { from, to, .. } => {
                 [from, to].map(|(port, declared)| (*declared, format!("`{port}` is declared here"))).to_vec()
             }
+            Self::PortUnmapped { ty, .. } => view
+                .types()
+                .get(*ty)
+                .map(|ty| (ty.origin, format!("{} is declared here", ty.name)))
+                .into_iter()
+                .collect(),
             Self::MissingProperty { declared, .. } => here(declared, " without a default"),
             Self::NeedsBuffer { declared, .. } => here(declared, " as buffered"),
             Self::NotOut { declared, .. }
@@ -121,6 +127,18 @@ impl Violation {
             Self::ArgumentCount { operation, wanted, .. } | Self::Argument { operation, wanted, .. } => {
                 let wanted: Vec<String> = wanted.iter().map(ValueType::to_string).collect();
                 format!("call it as {operation}({})", wanted.join(", "))
+            }
+            Self::PortUnlike { .. } => {
+                "a port becomes one of the same direction, type and unit: correct the map, or put a component between them".to_owned()
+            }
+            Self::PortUnmapped { port, with, out, ty } => {
+                let (from, to) = if *out { (port, with) } else { (with, port) };
+                let known: Vec<&str> = view.types().get(*ty).map(|ty| Member::Port.of(ty)).unwrap_or_default();
+                format!(
+                    "say what it is called there, `map = {{ [\"{}\"] = \"…\" }}` ({}), or add disconnect(\"{from}\", \"{to}\")",
+                    port.member,
+                    did_you_mean(port.member.as_str(), "ports", known)
+                )
             }
             Self::Transition { .. }
             | Self::NotUnconfigured { .. }
