@@ -29,6 +29,7 @@ mod judge;
 mod lasts;
 mod late;
 mod lets_go;
+mod library;
 mod links;
 mod loss;
 mod members;

@@ -53,12 +53,12 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             }
         }
     }
-    findings.extend(without_code(deployment));
+    findings.extend(without_code(deployment, catalogue));
     findings
 }
 
-/// Declared types say what a component looks like, not what it does: only the simulated platform can make one.
-fn without_code(deployment: &Deployment) -> Findings {
+/// Declared types say what a component looks like, not what it does: only the simulated platform can make one that no library has.
+fn without_code(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     let mut findings = Vec::new();
     if !deployment.kind.runs_libraries {
         return findings;
@@ -66,7 +66,11 @@ fn without_code(deployment: &Deployment) -> Findings {
     for configuration in &deployment.configurations {
         for change in &configuration.changes {
             let Some((component, ty, _)) = change.kind.makes() else { continue };
-            if let Some(declared) = deployment.types.iter().find(|d| d.name == ty) {
+            if let Some(declared) = deployment
+                .types
+                .iter()
+                .find(|d| d.name == ty && catalogue.get(ty).is_none_or(|known| known.origin.is_some()))
+            {
                 findings.push(
                     Finding::error(TYPE_WITHOUT_CODE, format!("`{component}` cannot be made: `{ty}` is only declared"))
                         .at(change.origin)

@@ -33,30 +33,30 @@ pub(super) fn expand<'c>(
     if !configuration.changes.iter().any(|change| is_one(&change)) {
         return Expanded { configuration: Cow::Borrowed(configuration), replaced: Vec::new() };
     }
-    let mut changes = Vec::with_capacity(configuration.changes.len() + 8);
-    let mut all: BTreeMap<ComponentName, (&Change, Replacement<'_>)> = BTreeMap::new();
+    let mut first: BTreeMap<ComponentName, &Change> = BTreeMap::new();
+    // Of two different ones neither is made: what follows from the one or the other would depend on the written order.
+    let mut disputed: BTreeSet<ComponentName> = BTreeSet::new();
     for change in &configuration.changes {
-        let ChangeKind::Replace { component, ty, activity, properties, map } = &change.kind else {
-            changes.push(change.clone());
-            continue;
-        };
-        if let Some((first, _)) = all.get(component) {
-            if first.kind != change.kind {
-                findings.push(clash(first, change));
-            }
-            continue;
+        let ChangeKind::Replace { component, .. } = &change.kind else { continue };
+        let other = *first.entry(*component).or_insert(change);
+        if other.kind != change.kind {
+            findings.push(clash(other, change));
+            disputed.insert(*component);
         }
-        let found = renamed(*component, *ty, map, view);
-        let wrong = !found.is_empty() || view.types().get(*ty).is_none();
-        findings.extend(found.iter().map(|violation| violation.finding(view).at(change.origin)));
-        let one = Replacement { component: *component, ty: *ty, map, origin: change.origin, wrong };
-        all.insert(*component, (change, one));
-        let activity = activity.or_else(|| view.component(*component).and_then(|old| old.activity));
-        let (component, properties) = (*component, properties.clone());
-        for kind in [ChangeKind::Destroy { component }, ChangeKind::Create { component, ty: *ty, activity, properties }]
-        {
-            changes.push(Change { kind, origin: change.origin });
-        }
+    }
+    let mut changes = Vec::with_capacity(configuration.changes.len() + 8);
+    changes.extend(configuration.changes.iter().filter(|change| !is_one(change)).cloned());
+    let mut all: BTreeMap<ComponentName, Replacement<'_>> = BTreeMap::new();
+    for (component, change) in first.into_iter().filter(|(component, _)| !disputed.contains(component)) {
+        let ChangeKind::Replace { ty, activity, properties, map, .. } = &change.kind else { continue };
+        let (ty, origin) = (*ty, change.origin);
+        let found = renamed(component, ty, map, view);
+        let wrong = !found.is_empty() || view.types().get(ty).is_none();
+        findings.extend(found.iter().map(|violation| violation.finding(view).at(origin)));
+        all.insert(component, Replacement { component, ty, map, origin, wrong });
+        let activity = activity.or_else(|| view.component(component).and_then(|old| old.activity));
+        let create = ChangeKind::Create { component, ty, activity, properties: properties.clone() };
+        changes.extend([ChangeKind::Destroy { component }, create].map(|kind| Change { kind, origin }));
     }
     let ended: BTreeSet<(MemberRef, MemberRef)> = configuration
         .changes
@@ -78,7 +78,7 @@ pub(super) fn expand<'c>(
     // In an order that is the same every run.
     links.sort_unstable();
     for (from, to, policy) in links.into_iter().filter(|(from, to, _)| !ended.contains(&(*from, *to))) {
-        let of = |end: MemberRef| all.get(&end.component).map(|(_, one)| one);
+        let of = |end: MemberRef| all.get(&end.component);
         let Some(origin) = of(from).or_else(|| of(to)).map(|one| one.origin) else { continue };
         changes.push(Change { kind: ChangeKind::Disconnect { from, to }, origin });
         let new = |end, other, out, findings: &mut Findings| match of(end) {
@@ -90,7 +90,7 @@ pub(super) fn expand<'c>(
             changes.push(Change { kind: ChangeKind::Connect { from, to, policy }, origin });
         }
     }
-    let replaced = all.into_values().map(|(_, one)| (one.component, one.origin)).collect();
+    let replaced = all.into_values().map(|one| (one.component, one.origin)).collect();
     Expanded { configuration: Cow::Owned(Configuration { changes, ..configuration.clone() }), replaced }
 }
 

@@ -53,7 +53,8 @@ pub static DEPLOYMENT: Object = Object {
             "types",
             Form::Named(&Form::Table(&TYPE)),
             "Component types that are declared here. The simulated platform runs any; on another one a library must bring the \
-             component.",
+             component. Where a library of the deployment has a type of that name, that is what counts, and `davit check` tells every \
+             difference.",
             "types: { Gain: { properties: { k: { type: float, default: 1.0 } } } }",
             ("types: [Gain]", TEXT_WRONG_TYPE),
         ),
