@@ -41,10 +41,9 @@ fn never_run(deployment: &Deployment) -> Option<Finding> {
     }
     let message = format!("no configuration creates a `{MONITORS_TYPE}`: nothing watches `{}`", first.name);
     Some(
-        Finding::warning(MONITOR_NOT_RUN, message)
-            .at(deployment.key_origin("monitors"))
-            .path("monitors")
-            .help(format!("add `create(\"Monitors\", \"{MONITORS_TYPE}\", {{ activity = … }})` to the bring-up")),
+        Finding::warning(MONITOR_NOT_RUN, message).at(deployment.key_origin("monitors")).path("monitors").help(
+            format!("create a component of the type `{MONITORS_TYPE}` in the bring-up, in an activity of its own"),
+        ),
     )
 }
 

@@ -68,5 +68,5 @@ fn note(ports: &[MemberRef], created: Origin) -> Finding {
     let are = if ports.len() == 1 { "an in-port that nothing drives" } else { "in-ports that nothing drives" };
     Finding::info(DEPLOY_PORT_UNDRIVEN, format!("{}{more}: {are}", names.join(", ")))
         .at(created)
-        .help("they stay as if never written; connect or write them where that is not meant (`required: true` in the type demands it)")
+        .help("they stay as if never written; connect or write them where that is not meant (a type may say that a port is `required`)")
 }

@@ -2,6 +2,7 @@
 
 use super::extent;
 use crate::model::Origin;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -94,11 +95,15 @@ pub struct Location {
 pub struct SourceMap {
     files: Vec<SourceFile>,
     places: Vec<Place>,
+    speller: Option<Speller>,
 }
+
+/// What a text is in a finding about a file of YAML: the examples in it, which stand between backticks, are written as Lua has them.
+pub type Speller = fn(&str) -> String;
 
 impl Default for SourceMap {
     fn default() -> Self {
-        Self { files: Vec::new(), places: vec![Place::Nowhere] }
+        Self { files: Vec::new(), places: vec![Place::Nowhere], speller: None }
     }
 }
 
@@ -106,6 +111,25 @@ impl SourceMap {
     /// An empty one.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Who knows how examples are spelt.
+    pub fn spell_with(&mut self, speller: Speller) {
+        self.speller = Some(speller);
+    }
+
+    /// A text of a finding, with its examples in the language of the file in which `at` stands; in the first one, the deployment,
+    /// which can only be YAML, in that of the files that it names.
+    pub fn told<'t>(&self, at: Origin, text: &'t str) -> Cow<'t, str> {
+        let lua = || self.files.iter().any(|file| file.language == Language::Lua);
+        let is_yaml = || {
+            self.base(at)
+                .is_some_and(|(file, _)| self.file(file).language == Language::Yaml && !(file == FileId(0) && lua()))
+        };
+        match self.speller {
+            Some(speller) if text.contains('`') && is_yaml() => Cow::Owned(speller(text)),
+            _ => Cow::Borrowed(text),
+        }
     }
 
     /// Adds a text.

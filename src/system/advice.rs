@@ -94,11 +94,11 @@ impl Violation {
             Self::Exists(name) => format!("destroy `{name}` in the same configuration, or choose another name"),
             Self::StillConnected { links, .. } => {
                 let shown: Vec<String> =
-                    links.iter().map(|(from, to)| format!("disconnect(\"{from}\", \"{to}\")")).collect();
+                    links.iter().map(|(from, to)| format!("`disconnect(\"{from}\", \"{to}\")`")).collect();
                 format!("add {}", shown.join(", "))
             }
             Self::NotOut { .. } | Self::NotIn { .. } => {
-                "are the two ends the wrong way round? the out-port is the first: connect(out_port, in_port)".to_owned()
+                "are the two ends the wrong way round? the out-port is the first: `connect(out_port, in_port)`".to_owned()
             }
             Self::WritesOut { .. } => "name an in-port: what leaves an out-port, its component decides".to_owned(),
             Self::PortTypes { .. } => "connect ports of the same type; nothing is converted on the way".to_owned(),
@@ -106,10 +106,10 @@ impl Violation {
                 "put a component between them that converts, or correct the unit of one".to_owned()
             }
             Self::AlreadyConnected { from, to } => {
-                format!("to change the policy add disconnect(\"{from}\", \"{to}\") to the same configuration")
+                format!("to change the policy add `disconnect(\"{from}\", \"{to}\")` to the same configuration")
             }
             Self::DataAlone { to, by } | Self::Driven { port: to, by } => match by.first() {
-                Some(from) => format!("add disconnect(\"{from}\", \"{to}\") to the same configuration"),
+                Some(from) => format!("add `disconnect(\"{from}\", \"{to}\")` to the same configuration"),
                 None => return None,
             },
             Self::NeedsBuffer { .. } => "give the connection a buffer, such as `buffer = 64`".to_owned(),
@@ -135,7 +135,7 @@ impl Violation {
                 let (from, to) = if *out { (port, with) } else { (with, port) };
                 let known: Vec<&str> = view.types().get(*ty).map(|ty| Member::Port.of(ty)).unwrap_or_default();
                 format!(
-                    "say what it is called there, `map = {{ [\"{}\"] = \"…\" }}` ({}), or add disconnect(\"{from}\", \"{to}\")",
+                    "say what it is called there, `map = {{ [\"{}\"] = \"…\" }}` ({}), or add `disconnect(\"{from}\", \"{to}\")`",
                     port.member,
                     did_you_mean(port.member.as_str(), "ports", known)
                 )

@@ -29,7 +29,7 @@ const SHARED: &[Shared] = &[
         wrong: [
             "conf::not_an_in_port",
             "`ctrl.x` is an out-port; a connection ends at an in-port",
-            "are the two ends the wrong way round? the out-port is the first: connect(out_port, in_port)",
+            "are the two ends the wrong way round? the out-port is the first: `connect(out_port, in_port)`",
         ],
     },
     Shared {

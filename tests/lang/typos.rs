@@ -1,6 +1,7 @@
 //! A mistake in every kind of key, name, type and time, in every kind of file: its code, its place, its help.
 
 use crate::helpers::{COORDINATOR, DEPLOYMENT, codes, load, shown, with_configurations};
+use crate::tongue::strange;
 use davit::lang::{self, LoadOptions, Loaded, Sources};
 use std::path::Path;
 
@@ -25,6 +26,7 @@ impl Answers {
         if found != [expected] || !hinted || help.is_empty() {
             self.0.push(format!("{from} -> {to}\nexpected {expected} with `{hint}`, found {found:?}\n{text}"));
         }
+        self.0.extend(strange(&davit::diagnostics::to_json(&loaded.findings, &loaded.sources)));
     }
 }
 
