@@ -1,4 +1,4 @@
-//! Replacing a component: made of the changes that do it, on the system it meets (semantics: *Replacing a component*).
+//! Replacing a component: made of the changes that do it, on the system it meets (semantics: *Configurations*).
 //!
 //! What is connected is known only there, so a configuration is expanded when it is planned; what plans sees primitives only.
 

@@ -218,7 +218,9 @@ fn findings_speak_the_language_of_their_file() {
         }
         demo.replace(mistake.file, mistake.from, mistake.to);
         let findings = |path: &str| demo.run(&["check", path, "--json", "--notes"]).json()["findings"].clone();
-        wrong.extend(strange(&findings(D)).into_iter().map(|text| format!("{}: {text}", mistake.to)));
+        // What the deployment says of files in Lua is in Lua.
+        let strange_in_lua = strange(&findings(D)).into_iter().filter(|text| !text.contains(&format!(" at {D}: ")));
+        wrong.extend(strange_in_lua.map(|text| format!("{}: {text}", mistake.to)));
         let converted = demo.run(&["convert", D, "--to", "yaml", "-o", "yaml"]);
         if converted.code == 0 {
             in_yaml += 1;
