@@ -65,6 +65,7 @@ pub const READ: &[(&str, &[Code])] = &[
             UNKNOWN_ACTIVITY,
             BUFFER_SIZE,
             MISSING_PROPERTY,
+            TYPE_CIRCLE,
             TYPE_DIFFERS,
             TYPE_UNKNOWN_OPERATION,
             TYPE_UNKNOWN_TYPE,

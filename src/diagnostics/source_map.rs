@@ -222,7 +222,10 @@ impl SourceMap {
         let source = self.file(file);
         let mut inside = self.reach(at, file, &span);
         while let Some(word) = words.pop() {
-            let Some(found) = extent::find(&source.text, inside.clone(), word) else { continue };
+            let on_line = matches!(self.places.get(at.0 as usize), Some(Place::Line { .. })) && inside == span;
+            let far = || extent::find_in_element(&source.text, inside.clone(), word);
+            let found = on_line.then(far).flatten();
+            let Some(found) = found.or_else(|| extent::find(&source.text, inside.clone(), word)) else { continue };
             inside = extent::reach_of_key(&source.text, &found, inside.end);
             span = found;
         }
@@ -233,6 +236,12 @@ impl SourceMap {
     pub fn locate_part(&self, origin: Origin, word: &str) -> Option<Location> {
         let whole = self.locate(origin)?;
         let source = self.file(whole.file);
+        if source.line(whole.line).end == whole.span.end {
+            // Of a line it is not known where what begins there ends.
+            let found = extent::find_in_element(&source.text, whole.span.clone(), word);
+            let found = found.or_else(|| extent::find(&source.text, whole.span.clone(), word));
+            return found.map(|span| self.location(whole.file, span));
+        }
         let inside = match source.language {
             Language::Lua => extent::balanced(&source.text, whole.span.clone()),
             Language::Yaml | Language::Scxml => whole.span,
@@ -318,6 +327,20 @@ mod tests {
         let entry = map.within(list, "compA:running");
         assert_eq!(at(&map, entry).1, 23);
         assert_eq!(map.locate_part(call, "B.k").unwrap().line, 5);
+    }
+
+    #[test]
+    fn of_what_begins_on_a_line_parts_are_found_on_its_other_lines_but_not_in_what_follows_or_is_made_inside() {
+        let text = "return state {\n  up = state {\n    low = state { exit = 1 },\n    exit = f(entry),\n    events = {\n      'e',\n    },\n  },\n  \
+                    trans { entry = 2 },\n}\n";
+        let mut map = SourceMap::new();
+        let file = map.add_file("a.lua", text, Language::Lua);
+        let line = map.exact_line(file, 2);
+        for (word, wanted) in [("exit", 4), ("e", 6), ("entry", 2), ("trans", 2)] {
+            let part = map.within(line, word);
+            assert_eq!(map.locate(part).unwrap().line, wanted, "{word}");
+            assert_eq!(map.locate_part(line, word).map(|at| at.line), Some(wanted).filter(|line| *line > 2), "{word}");
+        }
     }
 
     #[test]

@@ -205,6 +205,9 @@ codes! {
     TYPE_UNKNOWN_TYPE = "type::unknown_type", "a component type refers to a type that there is not",
         "`start_after` and `stop_before` name other component types, whose components start before and stop after those of \
          this one. A name that no type has would silently order nothing. Correct it, or leave it out.";
+    TYPE_CIRCLE = "type::circle", "the order of types leads round in a circle",
+        "`start_after` and `stop_before` say which types come first inside a feedback loop, where the data flow does not. Each of these \
+         waits for another one of them, so no order fits, and the name would decide. Leave one of the names out.";
     TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \

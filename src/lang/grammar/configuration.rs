@@ -294,7 +294,7 @@ static CONNECT: Object = Object {
         key(
             "policy",
             Form::Either(&[Form::Choice(&["data"]), Form::Table(&BUFFER)]),
-            "`data`: the newest value is there. A buffer: each sample is there once, in order. In Lua the third argument.",
+            "How samples are carried. `data`: the newest value is there. A buffer: each sample is there once, in order. In Lua the third argument.",
             "policy: { buffer: 64 }",
             ("policy: fifo", TEXT_BAD_VALUE),
         )

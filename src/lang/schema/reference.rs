@@ -1,6 +1,6 @@
 //! The reference: what one key, one table or one word is, and the pages of all of them.
 
-use crate::lang::grammar::{FILES, File, Form, Key, Languages, Object, Words};
+use crate::lang::grammar::{FILES, File, Form, Key, Languages, Object, TERMS, Term, Words};
 use crate::lang::spelling::as_yaml;
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use serde::Serialize;
@@ -102,9 +102,49 @@ fn of_word(word: &Word, what: &str) -> Entry {
     }
 }
 
-/// Everything that can be written, with where it stands: `timeout`, `configuration.timeout`, `configuration`, `above`.
+fn of_term(term: &Term) -> Entry {
+    Entry {
+        name: term.name,
+        of: None,
+        form: term.form.to_owned(),
+        unit: "",
+        required: false,
+        default: "",
+        doc: term.doc,
+        example: Example::of(term.example, term.language),
+        refused: None,
+    }
+}
+
+/// The tables that a path leads to, as findings name places: from a table, or a key, over keys. What stands under names of its
+/// own (`types.Gain.ports`) may be written with such a name, or without.
+fn tables(path: &str) -> Vec<&'static Object> {
+    let all: Vec<&'static Object> = FILES.iter().flat_map(File::objects).collect();
+    let mut here: Vec<&'static Object> = Vec::new();
+    for (at, part) in path.split('.').enumerate() {
+        let part = part.split('[').next().unwrap_or(part);
+        let from = if at == 0 { &all } else { &here };
+        let mut next: Vec<&'static Object> = Vec::new();
+        if at == 0 {
+            next.extend(all.iter().filter(|object| object.name == part));
+        }
+        let keys = from.iter().flat_map(|object| object.keys).filter(|key| key.name == part);
+        keys.for_each(|key| key.form.tables(&mut |inner| next.push(inner)));
+        // A name of its own leads no further.
+        if at == 0 || !next.is_empty() {
+            here = next;
+        }
+    }
+    here
+}
+
+/// Everything that can be written, with where it stands: `timeout`, `configuration.timeout`, `type.ports.unit`, `configuration`,
+/// `above`, `e_after`.
 pub fn about(name: &str) -> Vec<Entry> {
+    // A time event as it is written.
+    let name = name.split('(').next().unwrap_or(name);
     let (of, key) = name.rsplit_once('.').map_or((None, name), |(of, key)| (Some(of), key));
+    let around: Vec<&str> = of.map(tables).unwrap_or_default().iter().map(|object| object.name).collect();
     let mut found = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
     for object in FILES.iter().flat_map(File::objects) {
@@ -112,7 +152,7 @@ pub fn about(name: &str) -> Vec<Entry> {
             continue;
         }
         seen.push(object.name);
-        let here = of.is_none_or(|of| of.rsplit('.').next() == Some(object.name));
+        let here = of.is_none() || around.contains(&object.name);
         if of.is_none() && object.name == name {
             found.push(of_object(object));
         }
@@ -122,6 +162,7 @@ pub fn about(name: &str) -> Vec<Entry> {
     if of.is_none() {
         let words = CONDITIONS.iter().map(|word| (word, "a condition")).chain(SIGNALS.iter().map(|w| (w, "a signal")));
         found.extend(words.filter(|(word, _)| word.name == name).map(|(word, what)| of_word(word, what)));
+        found.extend(TERMS.iter().filter(|term| term.name == name).map(of_term));
     }
     found
 }
@@ -131,6 +172,7 @@ pub fn names() -> Vec<&'static str> {
     let objects = FILES.iter().flat_map(File::objects);
     let mut all: Vec<&str> = objects.flat_map(|object| object.names().chain([object.name])).collect();
     all.extend(CONDITIONS.iter().chain(SIGNALS).map(|word| word.name));
+    all.extend(TERMS.iter().map(|term| term.name));
     all.sort_unstable();
     all.dedup();
     all
@@ -142,6 +184,13 @@ pub fn markdown(file: &File) -> String {
     out.push_str("Made from the table that files are read by; `davit explain KEY` shows the same in a terminal.\n");
     for object in file.objects() {
         table(&mut out, object);
+    }
+    let terms: Vec<&Term> = TERMS.iter().filter(|term| term.file == file.name).collect();
+    if !terms.is_empty() {
+        out.push_str("\n## Words that are no keys\n\n| word | stands as | meaning |\n|---|---|---|\n");
+        for term in terms {
+            _ = writeln!(out, "| `{}` | {} | {} |", term.name, term.form, term.doc);
+        }
     }
     if file.name == "monitors" {
         words(&mut out, "conditions", "A condition is true or false at every instant.", CONDITIONS);
@@ -159,6 +208,10 @@ fn table(out: &mut String, object: &Object) {
     for key in object.keys.iter().filter(|key| key.language != Languages::None) {
         let entry = of_key(object, key);
         let mark = if key.required { " (required)" } else { "" };
+        let mark = match key.instead {
+            "" => mark.to_owned(),
+            other => format!(" (required, or `{other}`)"),
+        };
         let form = key.form.words(Words::Linked);
         _ = write!(out, "\n### `{}`{mark}\n\n{}{}.", key.name, form[..1].to_uppercase(), &form[1..]);
         // The unit of a time is in its form.
