@@ -163,3 +163,39 @@ pub fn components(configuration: &Configuration) -> std::collections::BTreeSet<C
     for_each_named(configuration, &mut |component| _ = components.insert(component));
     components
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Change, Origin, Policy, RequestId, TypeName, Value};
+    use crate::stack::Requester;
+
+    #[test]
+    fn what_is_replaced_claims_what_it_may_be_connected_to() {
+        let component = |name: &str| ComponentName::new(name).unwrap();
+        let member = |name: &str, port: &str| component(name).member(Ident::new(port).unwrap());
+        let one = |id: &str, kind: ChangeKind| Configuration {
+            changes: vec![Change { kind, origin: Origin::NONE }],
+            ..Configuration::new(ConfigId::new(id).unwrap())
+        };
+        let set = |of: &str| ChangeKind::PropertySet { property: member(of, "k"), value: Value::Int(1) };
+        let all = [
+            one("wire", ChangeKind::Connect { from: member("a", "y"), to: member("b", "u"), policy: Policy::Data }),
+            one(
+                "swap",
+                ChangeKind::Replace {
+                    component: component("b"),
+                    ty: TypeName::new("T").unwrap(),
+                    activity: None,
+                    properties: BTreeMap::new(),
+                    map: BTreeMap::new(),
+                },
+            ),
+            one("source", set("a")),
+            one("other", set("c")),
+        ];
+        let claims = Claims::new(all.iter());
+        let of = |n: usize| claims.of([&Request::new(RequestId(0), Ask::Apply(all[n].id), Requester::Operator)]);
+        assert!(of(1).meets(&of(2)) && of(1).meets(&of(0)) && !of(1).meets(&of(3)));
+    }
+}
