@@ -15,7 +15,7 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     for declared in &deployment.types {
         // One that no library has is in the catalogue as it is declared.
         let Some(library) = catalogue.get(declared.name).filter(|ty| !ty.origin.is_some()) else { continue };
-        let mut of = Held { ty: declared.name, origin: declared.origin, findings: &mut findings };
+        let mut of = Compared { ty: declared.name, origin: declared.origin, findings: &mut findings };
         of.members("ports", "port", (&declared.ports, &library.ports), |of: &PortType| of.origin, port, |_| None);
         of.members(
             "properties",
@@ -39,7 +39,7 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
 }
 
 /// A difference: of what, as declared, as the library has it, and whether a plan could fail for it.
-struct Difference {
+struct Departure {
     what: &'static str,
     declared: String,
     library: String,
@@ -48,30 +48,30 @@ struct Difference {
 
 /// The differences of two members.
 #[derive(Default)]
-struct Differences(Vec<Difference>);
+struct Departures(Vec<Departure>);
 
-impl Differences {
+impl Departures {
     fn add<T: PartialEq>(&mut self, what: &'static str, pair: (&T, &T), fails: bool, told: impl Fn(&T) -> String) {
         if pair.0 != pair.1 {
-            self.0.push(Difference { what, declared: told(pair.0), library: told(pair.1), fails });
+            self.0.push(Departure { what, declared: told(pair.0), library: told(pair.1), fails });
         }
     }
 }
 
-struct Held<'f> {
+struct Compared<'f> {
     ty: TypeName,
     origin: Origin,
     findings: &'f mut Findings,
 }
 
-impl Held<'_> {
+impl Compared<'_> {
     fn members<T>(
         &mut self,
         key: &str,
         one: &str,
         (declared, library): (&BTreeMap<Ident, T>, &BTreeMap<Ident, T>),
         origin: impl Fn(&T) -> Origin,
-        compare: impl Fn(&T, &T) -> Differences,
+        compare: impl Fn(&T, &T) -> Departures,
         needed: impl Fn(&T) -> Option<&'static str>,
     ) {
         let ty = self.ty;
@@ -82,7 +82,7 @@ impl Held<'_> {
                 self.tell(true, message, origin(own), path);
                 continue;
             };
-            for Difference { what, declared, library, fails } in compare(own, other).0 {
+            for Departure { what, declared, library, fails } in compare(own, other).0 {
                 let message = format!("`{ty}.{name}`: {what} is declared as {declared}, the library has {library}");
                 self.tell(fails, message, origin(own), path.clone());
             }
@@ -97,7 +97,7 @@ impl Held<'_> {
     }
 
     fn whole(&mut self, declared: &ComponentType, library: &ComponentType) {
-        let mut found = Differences::default();
+        let mut found = Departures::default();
         let names = |list: &Vec<TypeName>| words(list.iter());
         found.add("start_after", (&declared.start_after, &library.start_after), false, names);
         found.add("stop_before", (&declared.stop_before, &library.stop_before), false, names);
@@ -109,7 +109,7 @@ impl Held<'_> {
             let all = [("configure", lost.configure), ("stop", lost.stop), ("destroy", lost.destroy)];
             words(all.iter().filter(|(_, is)| *is).map(|(word, _)| *word))
         });
-        for Difference { what, declared, library, fails } in found.0 {
+        for Departure { what, declared, library, fails } in found.0 {
             let message = format!("`{}`: {what} is declared as {declared}, the library has {library}", self.ty);
             self.tell(fails, message, self.origin, format!("types.{}.{what}", self.ty));
         }
@@ -125,8 +125,8 @@ impl Held<'_> {
     }
 }
 
-fn port(declared: &PortType, library: &PortType) -> Differences {
-    let mut found = Differences::default();
+fn port(declared: &PortType, library: &PortType) -> Departures {
+    let mut found = Departures::default();
     found.add("the direction", (&declared.direction, &library.direction), true, |of| of.word().to_owned());
     found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
     // One without a unit may be connected to any.
@@ -136,8 +136,8 @@ fn port(declared: &PortType, library: &PortType) -> Differences {
     found
 }
 
-fn property(declared: &PropertyType, library: &PropertyType) -> Differences {
-    let mut found = Differences::default();
+fn property(declared: &PropertyType, library: &PropertyType) -> Departures {
+    let mut found = Departures::default();
     found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
     found.add("the unit", (&declared.unit, &library.unit), false, unit);
     found.add("the default", (&declared.default, &library.default), library.default.is_none(), shown);
@@ -157,8 +157,8 @@ fn property(declared: &PropertyType, library: &PropertyType) -> Differences {
     found
 }
 
-fn operation(declared: &OperationType, library: &OperationType) -> Differences {
-    let mut found = Differences::default();
+fn operation(declared: &OperationType, library: &OperationType) -> Departures {
+    let mut found = Departures::default();
     let args =
         |of: &Vec<ValueType>| format!("[{}]", of.iter().map(ValueType::to_string).collect::<Vec<_>>().join(", "));
     found.add("args", (&declared.args, &library.args), true, args);
@@ -174,7 +174,7 @@ fn operation(declared: &OperationType, library: &OperationType) -> Differences {
         let other = if library.settled_by.is_some() && declared.settled_by.is_some() { "another one" } else { "" };
         let library = if other.is_empty() { told(library.settled_by.is_some()) } else { other.to_owned() };
         let declared = told(declared.settled_by.is_some());
-        found.0.push(Difference { what: "settled_by", declared, library, fails: false });
+        found.0.push(Departure { what: "settled_by", declared, library, fails: false });
     }
     found
 }

@@ -9,14 +9,14 @@ mod chart;
 mod configuration;
 mod deployment;
 mod monitor;
-mod terms;
+mod own_words;
 mod types;
 
 pub use chart::{CONNECTOR, COORDINATOR_FILE, STATE, TRANSITION};
 pub use configuration::{BUFFER, CHANGES, CONFIGURATION, CONFIGURATIONS_FILE, CONFIRM, Primitive, UNDO, primitive};
 pub use deployment::{ACTIVITY, DEPLOY, DEPLOYMENT, FAULT, LIMITS, REACTION, SHUTDOWN, SIMULATED, TRUSTED};
 pub use monitor::{COMPARISON, MONITOR, MONITORS_FILE};
-pub use terms::{TERMS, Term};
+pub use own_words::{OWN_WORDS, OwnWord};
 pub use types::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 
 use crate::model::Code;

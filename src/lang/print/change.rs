@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// What stands behind a key of a change.
-enum Part<'c> {
+enum Operand<'c> {
     Name(String),
     Value(&'c Value),
     Args(&'c [Value]),
@@ -18,41 +18,41 @@ enum Part<'c> {
 }
 
 /// The keys of a change with what stands behind them, as far as it says more than what holds without it.
-fn parts(kind: &ChangeKind) -> Vec<(&'static str, Part<'_>)> {
-    let name = |text: &dyn std::fmt::Display| Part::Name(text.to_string());
+fn parts(kind: &ChangeKind) -> Vec<(&'static str, Operand<'_>)> {
+    let name = |text: &dyn std::fmt::Display| Operand::Name(text.to_string());
     match kind {
         ChangeKind::Create { component, ty, activity, properties }
         | ChangeKind::Replace { component, ty, activity, properties, .. } => {
             let mut parts = vec![("component", name(component)), ("type", name(ty))];
             parts.extend(activity.as_ref().map(|activity| ("activity", name(activity))));
-            parts.extend(Some(("properties", Part::Values(properties))).filter(|_| !properties.is_empty()));
+            parts.extend(Some(("properties", Operand::Values(properties))).filter(|_| !properties.is_empty()));
             if let ChangeKind::Replace { map, .. } = kind {
-                parts.extend(Some(("map", Part::Names(map))).filter(|_| !map.is_empty()));
+                parts.extend(Some(("map", Operand::Names(map))).filter(|_| !map.is_empty()));
             }
             parts
         }
         ChangeKind::Destroy { component } => vec![("component", name(component))],
         ChangeKind::Connect { from, to, policy } => {
             let mut parts = vec![("from", name(from)), ("to", name(to))];
-            parts.extend(Some(("policy", Part::Policy(*policy))).filter(|_| *policy != Policy::Data));
+            parts.extend(Some(("policy", Operand::Policy(*policy))).filter(|_| *policy != Policy::Data));
             parts
         }
         ChangeKind::Disconnect { from, to } => vec![("from", name(from)), ("to", name(to))],
         ChangeKind::PropertySet { property, value } => {
-            vec![("property", name(property)), ("value", Part::Value(value))]
+            vec![("property", name(property)), ("value", Operand::Value(value))]
         }
-        ChangeKind::PortWrite { port, value } => vec![("port", name(port)), ("value", Part::Value(value))],
+        ChangeKind::PortWrite { port, value } => vec![("port", name(port)), ("value", Operand::Value(value))],
         ChangeKind::OperationCall { call, undo } => {
             let mut parts = called(call);
-            parts.extend(undo.as_ref().map(|undo| ("undo", Part::Call(undo))));
+            parts.extend(undo.as_ref().map(|undo| ("undo", Operand::Call(undo))));
             parts
         }
     }
 }
 
-fn called(call: &Call) -> Vec<(&'static str, Part<'_>)> {
-    let mut parts = vec![("operation", Part::Name(call.operation.to_string()))];
-    parts.extend(Some(("args", Part::Args(&call.args))).filter(|_| !call.args.is_empty()));
+fn called(call: &Call) -> Vec<(&'static str, Operand<'_>)> {
+    let mut parts = vec![("operation", Operand::Name(call.operation.to_string()))];
+    parts.extend(Some(("args", Operand::Args(&call.args))).filter(|_| !call.args.is_empty()));
     parts
 }
 
@@ -61,7 +61,7 @@ pub fn in_lua(kind: &ChangeKind) -> String {
     let arguments = primitive(kind.verb()).map_or(&[][..], |of| of.arguments);
     let mut out = kind.verb().to_owned();
     let parts = parts(kind);
-    let (undo, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(_, part)| matches!(part, Part::Call(_)));
+    let (undo, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(_, part)| matches!(part, Operand::Call(_)));
     // What is no argument stands in a table behind them.
     let takes = |key: &str| arguments.iter().any(|argument| argument.trim_end_matches('…') == key);
     let (own, options): (Vec<_>, Vec<_>) = parts.iter().partition(|(key, _)| takes(key));
@@ -82,11 +82,11 @@ pub fn in_yaml(kind: &ChangeKind) -> String {
     format!("{}: {{ {} }}", kind.verb(), keys(&parts(kind)))
 }
 
-fn keys(parts: &[(&'static str, Part<'_>)]) -> String {
+fn keys(parts: &[(&'static str, Operand<'_>)]) -> String {
     parts.iter().map(|(key, part)| format!("{key}: {}", part.yaml())).collect::<Vec<_>>().join(", ")
 }
 
-impl Part<'_> {
+impl Operand<'_> {
     fn lua(&self) -> String {
         let written = |value: &Value| {
             let mut out = String::new();

@@ -1,6 +1,6 @@
 //! The reference: what one key, one table or one word is, and the pages of all of them.
 
-use crate::lang::grammar::{FILES, File, Form, Key, Languages, Object, TERMS, Term, Words};
+use crate::lang::grammar::{FILES, File, Form, Key, Languages, OWN_WORDS, Object, OwnWord, Words};
 use crate::lang::spelling::as_yaml;
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use serde::Serialize;
@@ -102,7 +102,7 @@ fn of_word(word: &Word, what: &str) -> Entry {
     }
 }
 
-fn of_term(term: &Term) -> Entry {
+fn of_own_word(term: &OwnWord) -> Entry {
     Entry {
         name: term.name,
         of: None,
@@ -162,7 +162,7 @@ pub fn about(name: &str) -> Vec<Entry> {
     if of.is_none() {
         let words = CONDITIONS.iter().map(|word| (word, "a condition")).chain(SIGNALS.iter().map(|w| (w, "a signal")));
         found.extend(words.filter(|(word, _)| word.name == name).map(|(word, what)| of_word(word, what)));
-        found.extend(TERMS.iter().filter(|term| term.name == name).map(of_term));
+        found.extend(OWN_WORDS.iter().filter(|term| term.name == name).map(of_own_word));
     }
     found
 }
@@ -172,7 +172,7 @@ pub fn names() -> Vec<&'static str> {
     let objects = FILES.iter().flat_map(File::objects);
     let mut all: Vec<&str> = objects.flat_map(|object| object.names().chain([object.name])).collect();
     all.extend(CONDITIONS.iter().chain(SIGNALS).map(|word| word.name));
-    all.extend(TERMS.iter().map(|term| term.name));
+    all.extend(OWN_WORDS.iter().map(|term| term.name));
     all.sort_unstable();
     all.dedup();
     all
@@ -185,7 +185,7 @@ pub fn markdown(file: &File) -> String {
     for object in file.objects() {
         table(&mut out, object);
     }
-    let terms: Vec<&Term> = TERMS.iter().filter(|term| term.file == file.name).collect();
+    let terms: Vec<&OwnWord> = OWN_WORDS.iter().filter(|term| term.file == file.name).collect();
     if !terms.is_empty() {
         out.push_str("\n## Words that are no keys\n\n| word | stands as | meaning |\n|---|---|---|\n");
         for term in terms {

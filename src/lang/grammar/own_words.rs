@@ -4,7 +4,7 @@ use super::Languages;
 
 /// Such a word.
 #[derive(Debug)]
-pub struct Term {
+pub struct OwnWord {
     /// The word.
     pub name: &'static str,
     /// The kind of file whose page tells of it.
@@ -19,21 +19,21 @@ pub struct Term {
     pub language: Languages,
 }
 
-const fn term(
+const fn word(
     name: &'static str,
     file: &'static str,
     form: &'static str,
     doc: &'static str,
     example: &'static str,
-) -> Term {
-    Term { name, file, form, doc, example, language: Languages::All }
+) -> OwnWord {
+    OwnWord { name, file, form, doc, example, language: Languages::All }
 }
 
 /// All of them.
-pub static TERMS: &[Term] = &[
-    Term {
+pub static OWN_WORDS: &[OwnWord] = &[
+    OwnWord {
         language: Languages::Yaml,
-        ..term(
+        ..word(
             "self",
             "deployment",
             "the component in the ports of `settled_by`",
@@ -41,7 +41,7 @@ pub static TERMS: &[Term] = &[
             "settled_by: { above: [self.height, 0.3] }",
         )
     },
-    term(
+    word(
         "_default",
         "configurations",
         "the component in an entry of `pre_conf_state` or `post_conf_state`",
@@ -49,35 +49,35 @@ pub static TERMS: &[Term] = &[
          consumes it, and started after.",
         "post_conf_state = { '_default:running' }",
     ),
-    term(
+    word(
         "initial",
         "coordinator",
         "the `src` of a transition",
         "The state that is entered first: a transition from `initial` is taken when the state around it is entered.",
         "src = \"initial\", tgt = \"idle\"",
     ),
-    term(
+    word(
         "e_after",
         "coordinator",
         "an event of a transition, `e_after(SECONDS)`",
         "The time event: so many seconds after what the transition leaves was entered.",
         "events = { \"e_after(0.5)\" }",
     ),
-    term(
+    word(
         "e_at",
         "coordinator",
         "an event of a transition, `e_at(SECONDS)`",
         "The time event: so many seconds after the coordinator began.",
         "events = { \"e_at(20)\" }",
     ),
-    term(
+    word(
         "e_done",
         "coordinator",
         "an event of a transition",
         "Raised by a state without states in it once it is complete: what it does while it is active (`doo`) has ended, or there is none.",
         "events = { \"e_done\" }",
     ),
-    term(
+    word(
         "condition",
         "monitors",
         "a word of the monitors' language with its arguments",
@@ -85,7 +85,7 @@ pub static TERMS: &[Term] = &[
          `davit explain --keys` lists the words; `above`, `in_state` and `all` are some.",
         "above(\"A.x\", 2.0)",
     ),
-    term(
+    word(
         "signal",
         "monitors",
         "a number, a port, a part of one, or a word with its arguments",
