@@ -125,8 +125,7 @@ fn unknown(what: &str) -> Failure {
 
 /// What a key, a table or a word is, for people.
 fn shown(out: &Output, entry: &Entry) -> String {
-    let mark = if entry.required { " (required)" } else { "" };
-    let mut text = format!("{}{mark}\n", out.paint(Style::Name, path(entry)));
+    let mut text = format!("{}{}\n", out.paint(Style::Name, path(entry)), entry.demanded());
     text.push_str(&wrapped(entry.doc, text_columns(), 2));
     let mut line = |name: &str, value: &str| {
         if !value.is_empty() {

@@ -21,6 +21,9 @@ pub struct Entry {
     pub unit: &'static str,
     /// Whether it must be there.
     pub required: bool,
+    /// The key that may stand in its place, where one of the two must be there.
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub instead: &'static str,
     /// What holds without it.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub default: &'static str,
@@ -31,6 +34,17 @@ pub struct Entry {
     /// A line that is refused, and the code of the finding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<(&'static str, &'static str)>,
+}
+
+impl Entry {
+    /// Behind its name, whether it must be there.
+    pub fn demanded(&self) -> String {
+        match (self.required, self.instead) {
+            (true, _) => " (required)".to_owned(),
+            (false, "") => String::new(),
+            (false, other) => format!(" (required, or `{other}`)"),
+        }
+    }
 }
 
 /// A line as it is written.
@@ -63,6 +77,7 @@ fn of_key(object: &Object, key: &Key) -> Entry {
         form: key.form.words(Words::Plain),
         unit: key.unit_of(),
         required: key.required,
+        instead: key.instead,
         default: key.default,
         doc: key.doc,
         example: Example::of(key.example, key.language),
@@ -78,6 +93,7 @@ fn of_object(object: &Object) -> Entry {
         form: format!("a table with {}", keys.join(", ")),
         unit: "",
         required: false,
+        instead: "",
         default: "",
         doc: object.doc,
         example: Example {
@@ -95,6 +111,7 @@ fn of_word(word: &Word, what: &str) -> Entry {
         form: format!("{what} of the monitors' language"),
         unit: "",
         required: false,
+        instead: "",
         default: "",
         doc: word.doc,
         example: Example::of(word.usage, Languages::All),
@@ -109,6 +126,7 @@ fn of_own_word(term: &OwnWord) -> Entry {
         form: term.form.to_owned(),
         unit: "",
         required: false,
+        instead: "",
         default: "",
         doc: term.doc,
         example: Example::of(term.example, term.language),
@@ -207,11 +225,7 @@ fn table(out: &mut String, object: &Object) {
     }
     for key in object.keys.iter().filter(|key| key.language != Languages::None) {
         let entry = of_key(object, key);
-        let mark = if key.required { " (required)" } else { "" };
-        let mark = match key.instead {
-            "" => mark.to_owned(),
-            other => format!(" (required, or `{other}`)"),
-        };
+        let mark = entry.demanded();
         let form = key.form.words(Words::Linked);
         _ = write!(out, "\n### `{}`{mark}\n\n{}{}.", key.name, form[..1].to_uppercase(), &form[1..]);
         // The unit of a time is in its form.
