@@ -17,7 +17,7 @@ use std::path::Path;
 pub struct Read {
     /// The deployment.
     pub deployment: Deployment,
-    /// The component types of its libraries and those it declares.
+    /// The component types of its libraries, and those it declares beside them.
     pub catalogue: Catalogue,
     /// The libraries it names.
     pub libraries: Libraries,
@@ -122,8 +122,11 @@ fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) ->
         }
     };
     let mut catalogue = libraries.catalogue();
+    // What a library has is what runs: a declaration of it is held against that (`check`).
     for ty in &deployment.types {
-        catalogue.insert(ty.clone());
+        if catalogue.get(ty.name).is_none() {
+            catalogue.insert(ty.clone());
+        }
     }
     Ok(Read { deployment, catalogue, libraries, platform, sources: loaded.sources, findings })
 }

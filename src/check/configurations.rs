@@ -73,7 +73,10 @@ impl<'a> Check<'a> {
         // A create is judged by what is written in it, whatever bore the name before.
         let named =
             if matches!(change.kind, ChangeKind::Create { .. }) { None } else { Some(change.kind.components()) };
-        let old = matches!(change.kind, ChangeKind::Disconnect { .. } | ChangeKind::Destroy { .. });
+        let old = matches!(
+            change.kind,
+            ChangeKind::Disconnect { .. } | ChangeKind::Destroy { .. } | ChangeKind::Replace { .. }
+        );
         for component in named.into_iter().flatten() {
             let creations = self.universe.during(component, id, old);
             if creations.is_empty() {

@@ -4,11 +4,9 @@ use crate::model::codes::{
     COORD_ANSWER_NEVER_COMES, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST,
     DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
 };
-use crate::model::finding::{did_you_mean, nearest};
+use crate::model::finding::{closest, did_you_mean, nearest};
 use crate::model::statechart::is_internal;
-use crate::model::{
-    Ask, ChangeKind, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict,
-};
+use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
 use std::collections::BTreeSet;
 
@@ -153,7 +151,7 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
 /// That nobody raises an event, since it was meant to be another one: a time event, or the fault of a component.
 fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
     if let Some((head, inner)) = event.split_once('(') {
-        let near = if head.contains("at") { "e_at" } else { "e_after" };
+        let near = closest(head, ["e_after", "e_at"]);
         let message = format!("`{event}` is no time event: somebody must raise it under that very name");
         return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{near}({inner}`?")));
     }
@@ -162,10 +160,7 @@ fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
         .configurations
         .iter()
         .flat_map(|configuration| &configuration.changes)
-        .filter_map(|change| match &change.kind {
-            ChangeKind::Create { component, .. } => Some(component.as_str()),
-            _ => None,
-        })
+        .filter_map(|change| change.kind.makes().map(|(component, ..)| component.as_str()))
         .collect();
     (!created.contains(component)).then(|| {
         Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))

@@ -31,6 +31,8 @@ mod judge;
 mod lasts;
 mod late;
 mod lets_go;
+mod library;
+mod links;
 mod loss;
 mod members;
 mod monitors;

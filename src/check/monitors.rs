@@ -8,7 +8,7 @@ use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
 use crate::model::statechart::is_internal;
 use crate::model::{
-    Change, ChangeKind, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
+    Change, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
 use crate::statechart::Chart;
 use crate::system::Member;
@@ -35,16 +35,15 @@ pub fn condition(deployment: &Deployment, universe: &Universe, condition: &Condi
 /// Monitors that no component runs.
 fn never_run(deployment: &Deployment) -> Option<Finding> {
     let first = deployment.monitors.first()?;
-    let runs = |change: &Change| matches!(&change.kind, ChangeKind::Create { ty, .. } if ty.as_str() == MONITORS_TYPE);
+    let runs = |change: &Change| change.kind.makes().is_some_and(|(_, ty, _)| ty.as_str() == MONITORS_TYPE);
     if deployment.configurations.iter().flat_map(|c| &c.changes).any(runs) {
         return None;
     }
     let message = format!("no configuration creates a `{MONITORS_TYPE}`: nothing watches `{}`", first.name);
     Some(
-        Finding::warning(MONITOR_NOT_RUN, message)
-            .at(deployment.key_origin("monitors"))
-            .path("monitors")
-            .help(format!("add `create(\"Monitors\", \"{MONITORS_TYPE}\", {{ activity = … }})` to the bring-up")),
+        Finding::warning(MONITOR_NOT_RUN, message).at(deployment.key_origin("monitors")).path("monitors").help(
+            format!("create a component of the type `{MONITORS_TYPE}` in the bring-up, in an activity of its own"),
+        ),
     )
 }
 

@@ -9,8 +9,8 @@ use super::report::{Checked, Explored, Report};
 use super::state::Failed;
 use super::verdict::Verdict;
 use super::{
-    alone, beside, configurations as single, coordinator, declared, lets_go, monitors as watched, purity, safety,
-    settings, simulated, types, undriven, unheard, universe, unwatched, ways,
+    alone, beside, configurations as single, coordinator, declared, lets_go, library, monitors as watched, purity,
+    safety, settings, simulated, types, undriven, unheard, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -32,6 +32,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
+    findings.extend(library::check(deployment, catalogue));
     findings.extend(single::check(deployment, &universe));
     findings.extend(watched::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));

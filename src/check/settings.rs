@@ -58,10 +58,10 @@ fn given<'d>(deployment: &'d Deployment, member: MemberRef) -> Vec<&'d Value> {
         ChangeKind::PropertySet { property: of, value } | ChangeKind::PortWrite { port: of, value } => {
             (*of == member).then_some(value)
         }
-        ChangeKind::Create { component, properties, .. } => {
-            properties.get(&member.member).filter(|_| *component == member.component)
+        kind => {
+            let (_, _, properties) = kind.makes().filter(|(component, ..)| *component == member.component)?;
+            properties.get(&member.member)
         }
-        _ => None,
     };
     changes.filter_map(value).collect()
 }

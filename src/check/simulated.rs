@@ -1,6 +1,7 @@
 //! What the deployment says that simulated components raise by themselves, and what goes wrong there: do the steps and
 //! components exist, does somebody listen.
 
+use super::links::links;
 use super::universe::Universe;
 use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP};
 use crate::model::finding::did_you_mean;
@@ -75,13 +76,12 @@ fn never_done(fault: &StepFault, deployment: &Deployment, universe: &Universe) -
     let connects = matches!(verb, "connect" | "disconnect");
     let (operand, done): (&str, BTreeSet<String>) = if connects {
         // Each is the other's undo.
-        let ends = |kind: &ChangeKind| match kind {
-            ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
-                Some(format!("{from} -> {to}"))
-            }
+        let ended = changes().filter_map(|change| match change.kind {
+            ChangeKind::Disconnect { from, to } => Some((from, to)),
             _ => None,
-        };
-        (rest.split_once(" (").map_or(rest, |(ends, _)| ends), changes().filter_map(|c| ends(&c.kind)).collect())
+        });
+        let done = links(deployment).into_iter().chain(ended).map(|(from, to)| format!("{from} -> {to}"));
+        (rest.split_once(" (").map_or(rest, |(ends, _)| ends), done.collect())
     } else if verb == "operation_call" {
         let calls = changes().filter_map(|change| match &change.kind {
             ChangeKind::OperationCall { call, undo } => Some((call, undo)),

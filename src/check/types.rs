@@ -1,23 +1,26 @@
 //! The component types that a deployment declares.
 
-use crate::model::codes::{TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
+use crate::model::codes::{TYPE_CIRCLE, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, ChangeKind, Deployment, Effect, Finding, Findings, Ident};
+use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, TypeName};
+use std::collections::{BTreeSet, VecDeque};
 
 /// What is wrong with the declared types: names of other types and of operations that are not there.
 pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     let mut findings = Vec::new();
     for ty in &deployment.types {
         for (key, others) in [("start_after", &ty.start_after), ("stop_before", &ty.stop_before)] {
-            for other in others.iter().filter(|other| catalogue.get(**other).is_none()) {
+            for (i, other) in others.iter().enumerate().filter(|(_, other)| catalogue.get(**other).is_none()) {
+                let path = format!("types.{}.{key}", ty.name);
+                let at = deployment.key_origins.get(&format!("{path}[{i}]")).or(deployment.key_origins.get(&path));
                 let known = catalogue.iter().map(|ty| ty.name.as_str());
                 findings.push(
                     Finding::error(
                         TYPE_UNKNOWN_TYPE,
                         format!("{}: {key} names a type `{other}` that there is not", ty.name),
                     )
-                    .at(ty.origin)
-                    .path(format!("types.{}.{key}", ty.name))
+                    .at(at.copied().unwrap_or(ty.origin))
+                    .path(path)
                     .help(did_you_mean(other.as_str(), "types", known)),
                 );
             }
@@ -53,20 +56,74 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             }
         }
     }
-    findings.extend(without_code(deployment));
+    findings.extend(circles(deployment, catalogue));
+    findings.extend(without_code(deployment, catalogue));
     findings
 }
 
-/// Declared types say what a component looks like, not what it does: only the simulated platform can make one.
-fn without_code(deployment: &Deployment) -> Findings {
+/// Orders that lead back to where they begin: inside a feedback loop none of these types could come first, and the name would
+/// decide.
+fn circles(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
+    let mut findings = Findings::new();
+    for (key, others) in [
+        ("start_after", (|ty| &ty.start_after) as fn(&ComponentType) -> &Vec<TypeName>),
+        ("stop_before", |ty| &ty.stop_before),
+    ] {
+        for ty in &deployment.types {
+            let Some(round) = round(ty.name, catalogue, others) else { continue };
+            // It is told of the first of them that is declared here.
+            let first = deployment.types.iter().find(|ty| round.contains(&ty.name));
+            if first.is_none_or(|first| first.name != ty.name) {
+                continue;
+            }
+            let path = format!("types.{}.{key}", ty.name);
+            let named: Vec<&str> = round.iter().chain(round.first()).map(TypeName::as_str).collect();
+            findings.push(
+                Finding::error(
+                    TYPE_CIRCLE,
+                    format!("{}: {key} leads round in a circle: {}", ty.name, named.join(" → ")),
+                )
+                .at(deployment.key_origins.get(&path).copied().unwrap_or(ty.origin))
+                .path(path)
+                .help("leave one of them out: no order fits all of them"),
+            );
+        }
+    }
+    findings
+}
+
+/// A shortest way from a type back to itself, over what `others` names.
+fn round(from: TypeName, catalogue: &Catalogue, others: fn(&ComponentType) -> &Vec<TypeName>) -> Option<Vec<TypeName>> {
+    let mut ways = VecDeque::from([vec![from]]);
+    let mut seen = BTreeSet::new();
+    while let Some(way) = ways.pop_front() {
+        let ty = way.last().and_then(|name| catalogue.get(*name))?.clone();
+        for next in others(&ty) {
+            if *next == from {
+                return Some(way);
+            }
+            if catalogue.get(*next).is_some() && seen.insert(*next) {
+                ways.push_back([&way[..], &[*next]].concat());
+            }
+        }
+    }
+    None
+}
+
+/// Declared types say what a component looks like, not what it does: only the simulated platform can make one that no library has.
+fn without_code(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     let mut findings = Vec::new();
     if !deployment.kind.runs_libraries {
         return findings;
     }
     for configuration in &deployment.configurations {
         for change in &configuration.changes {
-            let ChangeKind::Create { component, ty, .. } = &change.kind else { continue };
-            if let Some(declared) = deployment.types.iter().find(|d| d.name == *ty) {
+            let Some((component, ty, _)) = change.kind.makes() else { continue };
+            if let Some(declared) = deployment
+                .types
+                .iter()
+                .find(|d| d.name == ty && catalogue.get(ty).is_none_or(|known| known.origin.is_some()))
+            {
                 findings.push(
                     Finding::error(TYPE_WITHOUT_CODE, format!("`{component}` cannot be made: `{ty}` is only declared"))
                         .at(change.origin)

@@ -1,5 +1,6 @@
 //! In-ports that nothing drives: no configuration connects them or writes them, and no operator may.
 
+use super::links::links;
 use super::universe::Universe;
 use crate::model::codes::{DEPLOY_PORT_REQUIRED, DEPLOY_PORT_UNDRIVEN};
 use crate::model::{ChangeKind, Deployment, Direction, Finding, Findings, MemberRef, OperatorMay, Origin};
@@ -41,8 +42,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
 /// What some configuration connects or writes, or an operator may set.
 fn driven(deployment: &Deployment) -> FxHashSet<MemberRef> {
     let changes = deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
-    let driven = changes.filter_map(|change| match &change.kind {
-        ChangeKind::Connect { to, .. } => Some(*to),
+    let written = changes.filter_map(|change| match &change.kind {
         ChangeKind::PortWrite { port, .. } => Some(*port),
         _ => None,
     });
@@ -50,7 +50,7 @@ fn driven(deployment: &Deployment) -> FxHashSet<MemberRef> {
         OperatorMay::Set(member) => Some(*member),
         OperatorMay::Apply(_) => None,
     });
-    driven.chain(set).collect()
+    links(deployment).into_iter().map(|(_, to)| to).chain(written).chain(set).collect()
 }
 
 fn required(port: MemberRef, created: Origin, declared: Origin) -> Finding {
@@ -68,5 +68,5 @@ fn note(ports: &[MemberRef], created: Origin) -> Finding {
     let are = if ports.len() == 1 { "an in-port that nothing drives" } else { "in-ports that nothing drives" };
     Finding::info(DEPLOY_PORT_UNDRIVEN, format!("{}{more}: {are}", names.join(", ")))
         .at(created)
-        .help("they stay as if never written; connect or write them where that is not meant (`required: true` in the type demands it)")
+        .help("they stay as if never written; connect or write them where that is not meant (a type may say that a port is `required`)")
 }

@@ -7,7 +7,7 @@ use crate::model::{
     TypeName,
 };
 use crate::system::{Member, Picture, Violation};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
@@ -39,13 +39,17 @@ impl Universe {
     pub fn new(deployment: &Deployment, catalogue: &Catalogue) -> Self {
         let mut components: FxHashMap<ComponentName, SmallVec<[Creation; 1]>> = FxHashMap::default();
         components.reserve(deployment.configurations.iter().map(|c| c.changes.len()).max().unwrap_or_default());
+        let mut created: FxHashSet<ComponentName> = FxHashSet::default();
         for configuration in &deployment.configurations {
             for change in &configuration.changes {
-                let ChangeKind::Create { component, ty, .. } = &change.kind else { continue };
-                let creations = components.entry(*component).or_default();
-                let at = creations.iter().position(|c| c.ty == *ty).unwrap_or_else(|| {
-                    let description = catalogue.get(*ty).cloned();
-                    creations.push(Creation { ty: *ty, description, origin: change.origin, by: SmallVec::new() });
+                let Some((component, ty, _)) = change.kind.makes() else { continue };
+                if matches!(change.kind, ChangeKind::Create { .. }) {
+                    created.insert(component);
+                }
+                let creations = components.entry(component).or_default();
+                let at = creations.iter().position(|c| c.ty == ty).unwrap_or_else(|| {
+                    let description = catalogue.get(ty).cloned();
+                    creations.push(Creation { ty, description, origin: change.origin, by: SmallVec::new() });
                     creations.len() - 1
                 });
                 let by = &mut creations[at].by;
@@ -54,6 +58,8 @@ impl Universe {
                 }
             }
         }
+        // One takes the place of what is there.
+        components.retain(|name, _| created.contains(name));
         Self { components, types: catalogue.clone() }
     }
 

@@ -2,7 +2,7 @@
 
 use super::outcome::{EMPTY, WorldId};
 use super::world::{Top, Worlds};
-use crate::model::{Ask, ChangeKind, ConfigId, TypeName, Verdict};
+use crate::model::{Ask, ConfigId, TypeName, Verdict};
 use crate::stack::Request;
 
 impl Worlds<'_> {
@@ -39,11 +39,7 @@ impl Worlds<'_> {
     fn creates_actuator(&self, id: ConfigId) -> bool {
         let types = self.get(EMPTY).map(|world| world.system.catalogue());
         let actuator = |ty: TypeName| types.and_then(|types| types.get(ty)).is_some_and(|ty| ty.actuator);
-        self.configuration(id).is_some_and(|c| {
-            c.changes.iter().any(|change| match &change.kind {
-                ChangeKind::Create { ty, .. } => actuator(*ty),
-                _ => false,
-            })
-        })
+        self.configuration(id)
+            .is_some_and(|c| c.changes.iter().any(|change| change.kind.makes().is_some_and(|(_, ty, _)| actuator(ty))))
     }
 }

@@ -13,8 +13,8 @@ use serde::Serialize;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The finding's code, as `conf::unknown_component` or `davit::conf::unknown_component`; a key, as `timeout` or
-    /// `configuration.timeout`; a table, as `configuration`; a word of the monitors' language, as `above`. Without one, all codes are
-    /// listed.
+    /// `configuration.timeout` or `type.ports.unit`; a table, as `configuration`; a word, as `above` or `e_after`. Without one, all codes
+    /// are listed.
     #[arg(value_name = "CODE|KEY")]
     what: Option<String>,
     /// List all keys, tables and words instead of the codes.
@@ -125,8 +125,7 @@ fn unknown(what: &str) -> Failure {
 
 /// What a key, a table or a word is, for people.
 fn shown(out: &Output, entry: &Entry) -> String {
-    let mark = if entry.required { " (required)" } else { "" };
-    let mut text = format!("{}{mark}\n", out.paint(Style::Name, path(entry)));
+    let mut text = format!("{}{}\n", out.paint(Style::Name, path(entry)), entry.demanded());
     text.push_str(&wrapped(entry.doc, text_columns(), 2));
     let mut line = |name: &str, value: &str| {
         if !value.is_empty() {

@@ -142,6 +142,35 @@ pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>>
     part.or_else(|| text.get(range.clone())?.find(word).map(|i| range.start + i..range.start + i + word.len()))
 }
 
+/// The token `word` of the element that begins on a line, which may be written over several: outside of what is made inside it
+/// (`name = state { … }`), since that is an element of its own.
+pub fn find_in_element(text: &str, line: Range<usize>, word: &str) -> Option<Range<usize>> {
+    let bytes = text.as_bytes();
+    let (mut at, mut named) = (line.start, false);
+    // Of each bracket that is open, whether it belongs to something made inside.
+    let mut open: Vec<bool> = Vec::new();
+    while let Some((token, kind)) = next_token(bytes, at) {
+        if open.is_empty() && token.start >= line.end {
+            break;
+        }
+        at = token.end;
+        let inside = open.last().copied().unwrap_or(false);
+        match kind {
+            Token::Open => open.push(inside || (named && !open.is_empty())),
+            Token::Close => _ = open.pop(),
+            Token::Name | Token::Text(_) if !inside => {
+                let content = if let Token::Text(content) = &kind { content.clone() } else { token.clone() };
+                if text.get(content) == Some(word) {
+                    return Some(token).filter(|span| text.get(span.clone()).is_some());
+                }
+            }
+            _ => {}
+        }
+        named = kind == Token::Name;
+    }
+    None
+}
+
 /// After a key was found: the bytes of its value (`key = { … }`), else what remains.
 pub fn reach_of_key(text: &str, key: &Range<usize>, end: usize) -> Range<usize> {
     let bytes = text.as_bytes().get(..end).unwrap_or_default();

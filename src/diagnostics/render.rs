@@ -68,11 +68,11 @@ pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
         let mut object = serde_json::json!({
             "code": finding.code.0,
             "severity": finding.severity,
-            "message": finding.message,
+            "message": sources.told(finding.origin, &finding.message),
             "file": file,
             "line": line,
             "column": column,
-            "help": finding.help,
+            "help": finding.help.as_ref().map(|help| sources.told(finding.origin, help)),
         });
         if !finding.path.is_empty() {
             object["path"] = finding.path.clone().into();
@@ -83,7 +83,7 @@ pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
             .filter_map(|label| Some((sources.locate(label.origin)?, label)))
             .map(|(location, label)| {
                 let (file, line, column) = place(Some(&location));
-                serde_json::json!({ "text": label.text, "file": file, "line": line, "column": column })
+                serde_json::json!({ "text": sources.told(label.origin, &label.text), "file": file, "line": line, "column": column })
             })
             .collect();
         if !labels.is_empty() {
@@ -146,10 +146,10 @@ impl Report {
             Severity::Info => miette::Severity::Advice,
         };
         let mut report = Self {
-            message: finding.message.clone(),
+            message: sources.told(finding.origin, &finding.message).into_owned(),
             code: format!("davit::{}", finding.code),
             severity,
-            help: finding.help.clone(),
+            help: finding.help.as_ref().map(|help| sources.told(finding.origin, help).into_owned()),
             source: None,
             labels: Vec::new(),
             related: Vec::new(),
@@ -158,14 +158,14 @@ impl Report {
         if let Some(location) = primary(finding, sources) {
             home = Some(location.file);
             report.source = Some(Window::new(sources, location.file));
-            let text = if finding.label.is_empty() { "here" } else { &finding.label };
+            let text = if finding.label.is_empty() { "here" } else { &*sources.told(finding.origin, &finding.label) };
             let span = first_line(sources, &location);
             report.labels.push(LabeledSpan::new_primary_with_span(Some(text.to_owned()), to_miette(&span)));
         } else if !finding.path.is_empty() {
             report.message = format!("{} (in {})", report.message, finding.path);
         }
         for label in &finding.labels {
-            report.add_label(label.origin, &label.text, home, sources);
+            report.add_label(label.origin, &sources.told(label.origin, &label.text), home, sources);
         }
         report
     }

@@ -2,6 +2,7 @@
 
 use super::extent;
 use crate::model::Origin;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -94,11 +95,15 @@ pub struct Location {
 pub struct SourceMap {
     files: Vec<SourceFile>,
     places: Vec<Place>,
+    speller: Option<Speller>,
 }
+
+/// What a text is in a finding about a file of YAML: the examples in it, which stand between backticks, are written as Lua has them.
+pub type Speller = fn(&str) -> String;
 
 impl Default for SourceMap {
     fn default() -> Self {
-        Self { files: Vec::new(), places: vec![Place::Nowhere] }
+        Self { files: Vec::new(), places: vec![Place::Nowhere], speller: None }
     }
 }
 
@@ -106,6 +111,25 @@ impl SourceMap {
     /// An empty one.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Who knows how examples are spelt.
+    pub fn spell_with(&mut self, speller: Speller) {
+        self.speller = Some(speller);
+    }
+
+    /// A text of a finding, with its examples in the language of the file in which `at` stands; in the first one, the deployment,
+    /// which can only be YAML, in that of the files that it names.
+    pub fn told<'t>(&self, at: Origin, text: &'t str) -> Cow<'t, str> {
+        let lua = || self.files.iter().any(|file| file.language == Language::Lua);
+        let is_yaml = || {
+            self.base(at)
+                .is_some_and(|(file, _)| self.file(file).language == Language::Yaml && !(file == FileId(0) && lua()))
+        };
+        match self.speller {
+            Some(speller) if text.contains('`') && is_yaml() => Cow::Owned(speller(text)),
+            _ => Cow::Borrowed(text),
+        }
     }
 
     /// Adds a text.
@@ -198,7 +222,10 @@ impl SourceMap {
         let source = self.file(file);
         let mut inside = self.reach(at, file, &span);
         while let Some(word) = words.pop() {
-            let Some(found) = extent::find(&source.text, inside.clone(), word) else { continue };
+            let on_line = matches!(self.places.get(at.0 as usize), Some(Place::Line { .. })) && inside == span;
+            let far = || extent::find_in_element(&source.text, inside.clone(), word);
+            let found = on_line.then(far).flatten();
+            let Some(found) = found.or_else(|| extent::find(&source.text, inside.clone(), word)) else { continue };
             inside = extent::reach_of_key(&source.text, &found, inside.end);
             span = found;
         }
@@ -209,6 +236,12 @@ impl SourceMap {
     pub fn locate_part(&self, origin: Origin, word: &str) -> Option<Location> {
         let whole = self.locate(origin)?;
         let source = self.file(whole.file);
+        if source.line(whole.line).end == whole.span.end {
+            // Of a line it is not known where what begins there ends.
+            let found = extent::find_in_element(&source.text, whole.span.clone(), word);
+            let found = found.or_else(|| extent::find(&source.text, whole.span.clone(), word));
+            return found.map(|span| self.location(whole.file, span));
+        }
         let inside = match source.language {
             Language::Lua => extent::balanced(&source.text, whole.span.clone()),
             Language::Yaml | Language::Scxml => whole.span,
@@ -294,6 +327,20 @@ mod tests {
         let entry = map.within(list, "compA:running");
         assert_eq!(at(&map, entry).1, 23);
         assert_eq!(map.locate_part(call, "B.k").unwrap().line, 5);
+    }
+
+    #[test]
+    fn of_what_begins_on_a_line_parts_are_found_on_its_other_lines_but_not_in_what_follows_or_is_made_inside() {
+        let text = "return state {\n  up = state {\n    low = state { exit = 1 },\n    exit = f(entry),\n    events = {\n      'e',\n    },\n  },\n  \
+                    trans { entry = 2 },\n}\n";
+        let mut map = SourceMap::new();
+        let file = map.add_file("a.lua", text, Language::Lua);
+        let line = map.exact_line(file, 2);
+        for (word, wanted) in [("exit", 4), ("e", 6), ("entry", 2), ("trans", 2)] {
+            let part = map.within(line, word);
+            assert_eq!(map.locate(part).unwrap().line, wanted, "{word}");
+            assert_eq!(map.locate_part(line, word).map(|at| at.line), Some(wanted).filter(|line| *line > 2), "{word}");
+        }
     }
 
     #[test]

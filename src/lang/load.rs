@@ -439,6 +439,16 @@ fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptio
             charts.push((*name, chart, *named_at));
         }
     }
+    let is_lua = |cx: &Cx, file: &str| {
+        let name = folder.join(file).display().to_string();
+        cx.sources.files().iter().any(|of| *of.name == *name && of.language == Language::Lua)
+    };
+    if let (Some((_, at)), true, false) = (draft.host.first(), trust.is_some(), charts.is_empty())
+        && !draft.coordinators.iter().any(|(_, file, _)| is_lua(cx, file))
+    {
+        let finding = Finding::error(codes::TEXT_BAD_VALUE, "`host` is given, and no coordinator is in Lua").at(*at);
+        cx.report(finding.help("leave it out: only functions of a coordinator in Lua have a host"));
+    }
     let mut monitors = Vec::new();
     for (file, named_at) in &draft.monitors {
         if let Some(node) = monitor_tree(cx, from, &folder.join(file), *named_at, &mut params) {

@@ -1,6 +1,9 @@
 //! Examples in the language of the file that they are shown for. They are written as Lua has them; what is spelt the same in both
 //! (a name, a number), or is YAML already, stays as it is.
 
+use super::grammar::{Primitive, primitive};
+use super::words::{CONDITIONS, SIGNALS};
+
 /// An example of Lua as YAML spells it; none: it is no key with a value, no call and no table.
 pub fn as_yaml(example: &str) -> Option<String> {
     let mut reader = Reader { rest: example.trim() };
@@ -14,10 +17,48 @@ pub fn as_yaml(example: &str) -> Option<String> {
     }
     match &entries[..] {
         [(None, Said::Name(_) | Said::Text(_))] => None,
-        [(None, alone)] => Some(alone.yaml()),
+        [(None, alone)] => Some(match alone.change() {
+            Some((verb, parts)) => format!("{verb}: {{ {parts} }}"),
+            None => alone.yaml(),
+        }),
         all if all.iter().all(|(key, _)| key.is_some()) => Some(inside(all)),
         _ => None,
     }
+}
+
+/// A text with examples of Lua in it, between backticks, as it is told of a file in YAML.
+pub fn told_in_yaml(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for (at, part) in text.split('`').enumerate() {
+        if at > 0 {
+            out.push('`');
+        }
+        match is_example(part).then(|| as_yaml(part)).flatten().filter(|_| at % 2 == 1) {
+            Some(spelt) => out.push_str(&spelt),
+            None => out.push_str(part),
+        }
+    }
+    out
+}
+
+/// Whether what is quoted is an example: keys with values, a table, or what a word of the language makes. Steps as plans print them,
+/// time events and calls of operations are written alike in both languages.
+fn is_example(text: &str) -> bool {
+    let mut reader = Reader { rest: text.trim() };
+    match reader.entry() {
+        Some((Some(key), _)) => !key.contains(['.', '-']),
+        Some((None, Said::Call(word, _))) => is_word(&word),
+        Some((None, Said::Table(_))) => true,
+        _ => false,
+    }
+}
+
+fn is_word(word: &str) -> bool {
+    let made =
+        ["state", "trans", "transition", "conn", "Configuration", "ConfiguratorConf", "monitor", "Monitors", "undo"];
+    primitive(word).is_some()
+        || made.contains(&word)
+        || CONDITIONS.iter().chain(SIGNALS).any(|known| known.name == word)
 }
 
 /// A value.
@@ -46,6 +87,12 @@ impl Said {
                 format!("{{ {} }}", inside(entries))
             }
             Self::Table(entries) => format!("[{}]", inside(entries)),
+            Self::Call(_, entries) if matches!(&entries[..], [(None, Self::Name(rest))] if rest == "…") => {
+                "{ … }".to_owned()
+            }
+            Self::Call(..) if self.change().is_some() => {
+                self.change().map(|(verb, parts)| format!("{{ {verb}: {{ {parts} }} }}")).unwrap_or_default()
+            }
             // Named parts belong to what is made of them; the others are what a word is said of.
             Self::Call(_, entries) if entries.iter().all(|(key, _)| key.is_some()) => {
                 if entries.is_empty() {
@@ -57,6 +104,39 @@ impl Said {
             Self::Call(word, entries) => format!("{{ {word}: [{}] }}", inside(entries)),
         }
     }
+}
+
+impl Said {
+    /// The word of a change, and its parts by name: in Lua they are its arguments.
+    fn change(&self) -> Option<(&'static str, String)> {
+        let Self::Call(word, entries) = self else { return None };
+        if let (true, Some((None, of))) = (word == "undo", entries.first()) {
+            let (verb, parts) = of.change()?;
+            let called = parts_of(primitive(verb)?, &entries[1..]);
+            return Some((verb, format!("{parts}, undo: {{ {called} }}")));
+        }
+        let of = primitive(word)?;
+        Some((of.object.name, parts_of(of, entries)))
+    }
+}
+
+fn parts_of(of: &Primitive, entries: &[(Option<String>, Said)]) -> String {
+    let mut parts = Vec::new();
+    let mut given = entries.iter().map(|(_, value)| value);
+    for argument in of.arguments {
+        match argument.strip_suffix('…') {
+            Some(list) => {
+                let rest: Vec<String> = given.by_ref().map(Said::yaml).collect();
+                parts.extend((!rest.is_empty()).then(|| format!("{list}: [{}]", rest.join(", "))));
+            }
+            None => match given.next() {
+                Some(Said::Table(options)) if *argument == "options" => parts.push(inside(options)),
+                Some(value) => parts.push(format!("{argument}: {}", value.yaml())),
+                None => {}
+            },
+        }
+    }
+    parts.join(", ")
 }
 
 fn inside(entries: &[(Option<String>, Said)]) -> String {
@@ -80,6 +160,14 @@ impl<'t> Reader<'t> {
 
     /// A value, with its key where it has one.
     fn entry(&mut self) -> Option<(Option<String>, Said)> {
+        if self.rest.starts_with('[') {
+            // A key that is no name in Lua.
+            self.skip("[")?;
+            let Said::Text(key) = self.value()? else { return None };
+            self.skip("]")?;
+            self.skip("=")?;
+            return Some((Some(key), self.value()?));
+        }
         let value = self.value()?;
         match value {
             Said::Name(key) if self.rest.starts_with('=') => {
@@ -124,7 +212,7 @@ impl<'t> Reader<'t> {
 
     /// A name or a number, or what is made with a word.
     fn word(&mut self) -> Option<Said> {
-        let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '-');
+        let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '-' | '…');
         let end = self.rest.find(|c| !is_part(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest.trim_start();
@@ -140,7 +228,6 @@ impl<'t> Reader<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lang::words::{CONDITIONS, SIGNALS};
 
     #[test]
     fn what_is_written_in_lua_is_told_in_yaml() {
@@ -171,6 +258,43 @@ mod tests {
             ["running", "0.5", "Dynamics.force[0]", "component: radio", "{ step: \"property_set a.k = 2\" }", "name: …"]
         {
             assert_eq!(as_yaml(same), None, "{same}");
+        }
+    }
+
+    #[test]
+    fn examples_in_a_text_are_told_in_yaml_and_nothing_else_is() {
+        for (lua, yaml) in [
+            ("add `disconnect(\"a.y\", \"b.u\")` to it", "add `disconnect: { from: a.y, to: b.u }` to it"),
+            (
+                "`create(\"M\", \"davit.Monitors\", { activity = … })`",
+                "`create: { component: M, type: davit.Monitors, activity: … }`",
+            ),
+            (
+                "`map = { [\"in\"] = \"…\" }`, `replace(\"c\", \"T\", { map = { y = \"z\" } })`",
+                "`map: { in: \"…\" }`, `replace: { component: c, type: T, map: { y: z } }`",
+            ),
+            (
+                "`operation_call(\"a.open\", 6):undo(\"a.close\", 0)`",
+                "`operation_call: { operation: a.open, args: [6], undo: { operation: a.close, args: [0] } }`",
+            ),
+            ("`changes = { destroy(\"a\") }`", "`changes: [{ destroy: { component: a } }]`"),
+            ("write `name = state { … }`", "write `name: { … }`"),
+            ("`trans { src = \"initial\", tgt = … }`", "`{ src: initial, tgt: … }`"),
+            ("say `safe = true` here", "say `safe: true` here"),
+            ("`once(above(\"A.x\", 2.0), { 0, 1.5 })`", "`{ once: [{ above: [A.x, 2.0] }, [0, 1.5]] }`"),
+        ] {
+            assert_eq!(told_in_yaml(lua), yaml);
+        }
+        for same in [
+            "`property_set a.k = 2.0` failed",
+            "`operation_call a.open(0.5)`",
+            "`a.open(0.5)` and `e_after(1.0)`",
+            "`gain.k = 2` was there",
+            "a = 1, outside of any",
+            "`e_go` and `safety: [e_estop]`",
+            "one ` alone, x = 1",
+        ] {
+            assert_eq!(told_in_yaml(same), same);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The loose tree both languages are read into: shapes and places, no meaning yet.
 
 use super::grammar::{Key, Languages, Object};
-use super::spelling::as_yaml;
+use super::spelling::{as_yaml, told_in_yaml};
 use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
 use crate::model::finding::did_you_mean;
@@ -82,7 +82,7 @@ impl Node {
 }
 
 /// What reading and lowering work with: the source map and the findings so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Cx {
     /// The texts and the places in them.
     pub sources: SourceMap,
@@ -90,6 +90,14 @@ pub struct Cx {
     pub findings: Findings,
     /// Whether some text could not be read or parsed at all.
     pub unreadable: bool,
+}
+
+impl Default for Cx {
+    fn default() -> Self {
+        let mut sources = SourceMap::new();
+        sources.spell_with(told_in_yaml);
+        Self { sources, findings: Findings::new(), unreadable: false }
+    }
 }
 
 impl Cx {

@@ -205,10 +205,18 @@ codes! {
     TYPE_UNKNOWN_TYPE = "type::unknown_type", "a component type refers to a type that there is not",
         "`start_after` and `stop_before` name other component types, whose components start before and stop after those of \
          this one. A name that no type has would silently order nothing. Correct it, or leave it out.";
+    TYPE_CIRCLE = "type::circle", "the order of types leads round in a circle",
+        "`start_after` and `stop_before` say which types come first inside a feedback loop, where the data flow does not. Each of these \
+         waits for another one of them, so no order fits, and the name would decide. Leave one of the names out.";
     TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \
          `platform: simulated`, or a type of one of the libraries; your own code goes into a library of your own program.";
+    TYPE_DIFFERS = "type::differs", "a declared type is another than the library's type of that name",
+        "The deployment declares a type under `types:` that one of its libraries has as well. The library's is what runs and what \
+         configurations are judged by; the declaration is held against it. It is an error where something that the declaration allows \
+         would fail (a member, an argument or a value that the library does not take), else a warning. Write what the library has, or \
+         leave the declaration out.";
     TYPE_UNKNOWN_OPERATION = "type::unknown_operation", "the undo of an operation is not an operation that fits",
         "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
          or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \
@@ -315,6 +323,10 @@ codes! {
         "A written value is the latest value of its port. A buffered port and an event port are queues and have none, so an undo could not take the sample back. Connect a component that sends it, or use an operation or a property.";
     BAD_ARGUMENTS = "conf::bad_arguments", "the operation takes other arguments",
         "The call's arguments differ from the operation's declaration in number or in type. `davit types TYPE` shows the operation with the types of its arguments. Correct the call; the same rule holds for the call that undoes it.";
+    PORT_UNLIKE = "conf::port_unlike", "a port cannot become that one where its component is replaced",
+        "The `map` of a replace says what a port of the old component is called on the new one, so that its connections go on there. The two are of different direction, type or unit: no connection of the one could be one of the other. Correct the map, or connect the new component by hand: disconnect, destroy, create and connect.";
+    PORT_UNMAPPED = "conf::port_unmapped", "a connected port has no counterpart on the component that replaces its own",
+        "A replace carries the connections of the old component over to the new one. This port is connected where the configuration is applied, and the type of the new component has no port of that name. Say in `map` what it is called there, or disconnect it in the same configuration if the connection is to end.";
     MISSING_PROPERTY = "conf::missing_property", "a property without a default is not given",
         "The type declares this property without a default, so a component cannot be created without a value for it. Give the value in the create itself; a property_set beside it comes too late, for the component would exist without one in between.";
     CLASH = "conf::clash", "two changes of one configuration do not commute",

@@ -69,6 +69,16 @@ pub enum Direction {
     Out,
 }
 
+impl Direction {
+    /// As it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::In => "in",
+            Self::Out => "out",
+        }
+    }
+}
+
 /// A port of a type. `type: event` makes an event port, `buffered: true` a port that only takes buffered connections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PortType {
@@ -151,7 +161,7 @@ pub enum ValueError {
     #[error(transparent)]
     Fit(#[from] FitError),
     /// Outside the limits.
-    #[error("{value} is outside {}", range(*.min, *.max))]
+    #[error("{}", outside(*.value, *.min, *.max))]
     Range {
         /// The number at fault.
         value: f64,
@@ -162,12 +172,11 @@ pub enum ValueError {
     },
 }
 
-fn range(min: Option<f64>, max: Option<f64>) -> String {
+fn outside(value: f64, min: Option<f64>, max: Option<f64>) -> String {
     match (min, max) {
-        (Some(min), Some(max)) => format!("{min} … {max}"),
-        (Some(min), None) => format!("{min} and more"),
-        (None, Some(max)) => format!("{max} and less"),
-        (None, None) => "any number".to_owned(),
+        (Some(min), Some(max)) => format!("{value} is outside {min} … {max}"),
+        (Some(min), None) => format!("{value} is less than {min}"),
+        (_, max) => format!("{value} is more than {}", max.unwrap_or(f64::INFINITY)),
     }
 }
 

@@ -99,7 +99,7 @@ pub struct Change {
     pub origin: Origin,
 }
 
-/// The seven primitives.
+/// The seven primitives, and what is made of them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChangeKind {
     /// Create a component.
@@ -155,6 +155,19 @@ pub enum ChangeKind {
         /// The call that undoes it, if the configuration names one.
         undo: Option<Call>,
     },
+    /// Put a new component in the place of one, with its connections. No primitive: the planner makes it of those that are.
+    Replace {
+        /// The name of both.
+        component: ComponentName,
+        /// The type of the new one.
+        ty: TypeName,
+        /// The activity the new one runs in; none: that of the old one.
+        activity: Option<Ident>,
+        /// Initial values of the new one; the others take their defaults.
+        properties: BTreeMap<Ident, Value>,
+        /// Ports of the old one, and what they are called on the new one; the others keep their names.
+        map: BTreeMap<Ident, Ident>,
+    },
 }
 
 /// A call of an operation.
@@ -178,7 +191,7 @@ impl fmt::Display for Call {
 }
 
 impl ChangeKind {
-    /// The primitive's name as it is written in both languages.
+    /// Its word as it is written in both languages.
     pub fn verb(&self) -> &'static str {
         match self {
             Self::Create { .. } => "create",
@@ -188,13 +201,27 @@ impl ChangeKind {
             Self::PropertySet { .. } => "property_set",
             Self::PortWrite { .. } => "port_write",
             Self::OperationCall { .. } => "operation_call",
+            Self::Replace { .. } => "replace",
         }
     }
 
-    /// The components it names, each once: of a connection both ends, of a call that of its undo as well.
+    /// The component that it makes, with its type and the values that are given to it.
+    pub fn makes(&self) -> Option<(ComponentName, TypeName, &BTreeMap<Ident, Value>)> {
+        match self {
+            Self::Create { component, ty, properties, .. } | Self::Replace { component, ty, properties, .. } => {
+                Some((*component, *ty, properties))
+            }
+            _ => None,
+        }
+    }
+
+    /// The components it names, each once: of a connection both ends, of a call that of its undo as well. What a replaced one
+    /// is connected to is not named.
     pub fn components(&self) -> SmallVec<[ComponentName; 2]> {
         let (one, other) = match self {
-            Self::Create { component, .. } | Self::Destroy { component } => (*component, None),
+            Self::Create { component, .. } | Self::Destroy { component } | Self::Replace { component, .. } => {
+                (*component, None)
+            }
             Self::Connect { from, to, .. } | Self::Disconnect { from, to } => (from.component, Some(to.component)),
             Self::PropertySet { property: member, .. } | Self::PortWrite { port: member, .. } => {
                 (member.component, None)
@@ -218,6 +245,7 @@ impl fmt::Display for ChangeKind {
             Self::PropertySet { property, value } => write!(f, "property_set {property} = {value}"),
             Self::PortWrite { port, value } => write!(f, "port_write {port} = {value}"),
             Self::OperationCall { call, .. } => write!(f, "operation_call {call}"),
+            Self::Replace { component, ty, .. } => write!(f, "replace {component} : {ty}"),
         }
     }
 }

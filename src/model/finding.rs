@@ -175,6 +175,12 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
+/// Which of two words was meant, where it must be one of them: the one with fewer slips of the finger, else the first.
+pub fn closest<'a>(name: &str, [one, other]: [&'a str; 2]) -> &'a str {
+    let slips = |word: &str| strsim::osa_distance(&name.to_lowercase(), word);
+    if slips(other) < slips(one) { other } else { one }
+}
+
 /// `3 steps`, `1 step`, `2 properties`.
 pub fn count(number: impl std::fmt::Display, what: &str) -> String {
     let number = number.to_string();

@@ -1,7 +1,9 @@
 //! The planner's workbench: the steps so far, simulated on an overlay, with everything that is found on the way.
 
 use super::footprint::{Footprint, Saved};
-use super::{Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order};
+use super::{
+    Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order, replace,
+};
 use crate::model::codes;
 use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, Findings, Origin, Step, Target};
 use crate::system::{Overlay, Reversibility, Undo, Violation, step};
@@ -23,6 +25,9 @@ pub(super) struct Builder<'o, 's, 'c> {
 }
 
 pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
+    let mut findings = Vec::new();
+    let replace::Expanded { configuration, replaced } = replace::expand(configuration, view, &mut findings);
+    let configuration = configuration.as_ref();
     // What `_default` moves afterwards is mostly what is created.
     let created = configuration.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Create { .. })).count();
     let defaulted = configuration.post.iter().any(|entry| entry.target == Target::Default);
@@ -37,20 +42,21 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
         ),
         footprint: Footprint::default(),
         saved: Vec::new(),
-        findings: Vec::new(),
+        findings,
         warnings: Vec::new(),
         blamed: FxHashSet::default(),
     };
     b.footprint.touches.reserve(2 * configuration.changes.len() - created + moved);
     let sorted = conflicts::sort(configuration, &mut b.findings);
     b.blamed.extend(&sorted.disputed);
-    lists::apply(&mut b, &configuration.pre, Stage::Pre, &sorted);
+    lists::apply(&mut b, &configuration.pre, Stage::Pre, &sorted, &[]);
+    let stood = lists::stood(&b, &replaced);
     b.stage = Stage::Changes;
     let from = b.steps.len();
     changes::apply(&mut b, &sorted);
     order::irreversible_last(&mut b.steps, from, &mut b.saved);
     b.stage = Stage::Post;
-    lists::apply(&mut b, &configuration.post, Stage::Post, &sorted);
+    lists::apply(&mut b, &configuration.post, Stage::Post, &sorted, &stood);
     if !b.findings.is_empty() {
         return Err(Refusal { findings: b.findings, request: 0 });
     }

@@ -57,6 +57,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
             ChangeKind::Create { .. } => 2,
             ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. } | ChangeKind::OperationCall { .. } => 3,
             ChangeKind::Connect { .. } => 4,
+            ChangeKind::Replace { .. } => unreachable!("it was expanded"),
         };
         classes[class].push(u32::try_from(i).expect("fewer changes than that"));
     }
@@ -80,6 +81,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
             ChangeKind::Connect { from, to, .. } => {
                 connect(b, &waits, *from, *to, meant.step, change, &classes[4]);
             }
+            ChangeKind::Replace { .. } => {}
         }
     }
 }

@@ -20,7 +20,7 @@ enum Subject {
 impl Subject {
     fn of(kind: &ChangeKind) -> Self {
         match kind {
-            ChangeKind::Create { component, .. } => Self::Create(*component),
+            ChangeKind::Create { component, .. } | ChangeKind::Replace { component, .. } => Self::Create(*component),
             ChangeKind::Destroy { component } => Self::Destroy(*component),
             ChangeKind::Connect { from, to, .. } => Self::Connect(*from, *to),
             ChangeKind::Disconnect { from, to } => Self::Disconnect(*from, *to),

@@ -4,15 +4,39 @@ use super::builder::Builder;
 use super::conflicts::Sorted;
 use super::footprint::{Access, Slot};
 use super::order::{self, Move};
-use super::{Stage, StepId};
+use super::{PlannedStep, Stage, StepId};
 use crate::model::codes;
-use crate::model::{ComponentName, Finding, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
+use crate::model::{ComponentName, Finding, Origin, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
 use crate::system::{View, Violation};
 use rustc_hash::FxHashSet;
 
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage, sorted: &Sorted) {
+/// A component that is replaced, and the run state to which the new one comes where the list says nothing of it.
+pub(super) struct Stood {
+    component: ComponentName,
+    state: Wanted,
+    origin: Origin,
+}
+
+/// The run states in which the changes find what they replace. What is faulted stands nowhere that anyone may demand.
+pub(super) fn stood(b: &Builder<'_, '_, '_>, replaced: &[(ComponentName, Origin)]) -> Vec<Stood> {
+    let one = |(component, origin): &(ComponentName, Origin)| {
+        let state = b.view.component(*component)?.state.wanted()?;
+        Some(Stood { component: *component, state, origin: *origin })
+    };
+    replaced.iter().filter_map(one).collect()
+}
+
+/// Carries out a list; before its entries what was replaced comes to the run state in which the old one `stood`.
+pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage, sorted: &Sorted, stood: &[Stood]) {
     b.stage = stage;
     let mut frontier: Vec<StepId> = Vec::new();
+    for state in [Wanted::Stopped, Wanted::Running] {
+        let said = |one: &&Stood| one.state == state && !says(b, list, one.component);
+        let again: Vec<&Stood> = stood.iter().filter(said).collect();
+        let moving = again.iter().map(|one| one.component).filter(|name| b.view.component(*name).is_some()).collect();
+        let origin = |name| again.iter().find(|one| one.component == name).map_or(Origin::NONE, |one| one.origin);
+        bring(b, moving, state, &origin, &mut frontier);
+    }
     for entry in list.iter() {
         match entry.target {
             Target::Component(component) => named(b, component, entry, sorted, &mut frontier),
@@ -85,10 +109,53 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
             moving.push(node.name);
         }
     });
+    let from = b.steps.len();
+    bring(b, moving, entry.state, &|_| entry.origin, frontier);
+    for (component, transition) in actuators(b, from) {
+        let verb = if transition == Transition::Start { "started" } else { "stopped" };
+        let message =
+            format!("in `{}` the actuator `{component}` is {verb} only through `_default`", b.configuration.id);
+        b.warnings.push(
+            Finding::warning(codes::ACTUATOR_BY_DEFAULT, message)
+                .at(entry.origin)
+                .help(format!("name it: \"{component}:{}\"", entry.state)),
+        );
+    }
+}
+
+/// The actuators that the steps from there on start or stop.
+fn actuators(b: &Builder<'_, '_, '_>, from: usize) -> Vec<(ComponentName, Transition)> {
+    let one = |step: &PlannedStep| match step.step {
+        Step::State { component, transition: transition @ (Transition::Start | Transition::Stop) } => {
+            b.view.component(component).filter(|node| node.ty.actuator).map(|_| (component, transition))
+        }
+        _ => None,
+    };
+    b.steps[from..].iter().filter_map(one).collect()
+}
+
+/// Whether a list says to which run state a component comes.
+fn says(b: &Builder<'_, '_, '_>, list: &StateList, component: ComponentName) -> bool {
+    let by_default = || {
+        component.prefix() == b.configuration.id.prefix()
+            && !b.context.avoid.contains(&component)
+            && list.iter().any(|entry| entry.target == Target::Default)
+    };
+    list.named().any(|name| name == component) || by_default()
+}
+
+/// Brings these components to a run state, in the order of the data flow.
+fn bring(
+    b: &mut Builder<'_, '_, '_>,
+    moving: Vec<ComponentName>,
+    wanted: Wanted,
+    origin: &dyn Fn(ComponentName) -> Origin,
+    frontier: &mut Vec<StepId>,
+) {
     if moving.is_empty() {
         return;
     }
-    let key = match entry.state {
+    let key = match wanted {
         Wanted::Running => Transition::Start,
         Wanted::Stopped | Wanted::Unconfigured => Transition::Stop,
     };
@@ -101,10 +168,10 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
     let mut waits: Vec<StepId> = Vec::new();
     for Move { component, after } in &moves {
         let node = b.view.component(*component).expect("it was just seen");
-        let (state, actuator) = (node.state, node.ty.actuator);
+        let state = node.state;
         let mut own = None;
         let mut previous: Option<StepId> = None;
-        for transition in state.path_to(entry.state) {
+        for transition in state.path_to(wanted) {
             waits.clear();
             match previous {
                 Some(before) => waits.push(before),
@@ -113,21 +180,15 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
             if *transition == key {
                 waits.extend(after.iter().filter_map(|at| keys[*at as usize]));
             }
-            previous =
-                b.step(Step::State { component: *component, transition: *transition }, None, entry.origin, &waits);
+            previous = b.step(
+                Step::State { component: *component, transition: *transition },
+                None,
+                origin(*component),
+                &waits,
+            );
             if *transition == key {
                 own = previous;
             }
-        }
-        if actuator && own.is_some() {
-            let verb = if key == Transition::Start { "started" } else { "stopped" };
-            let message =
-                format!("in `{}` the actuator `{component}` is {verb} only through `_default`", b.configuration.id);
-            b.warnings.push(
-                Finding::warning(codes::ACTUATOR_BY_DEFAULT, message)
-                    .at(entry.origin)
-                    .help(format!("name it: \"{component}:{}\"", entry.state)),
-            );
         }
         keys.push(own);
     }

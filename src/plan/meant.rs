@@ -2,6 +2,7 @@
 //! is planned is the same.
 
 use super::Context;
+use super::replace::renamed;
 use crate::model::finding::did_you_mean;
 use crate::model::{Call, ChangeKind, ComponentName, Ident, MemberRef, Step, TypeName, Value};
 use crate::system::{Member, View, Violation, step};
@@ -25,13 +26,18 @@ impl Meant {
         let mut wrong = Vec::new();
         let mut named = None;
         let step = match kind {
-            ChangeKind::Create { component, ty, activity, properties } => {
+            // Of a replacement what can be told without the system that it meets: the new component, and the names of ports.
+            ChangeKind::Create { component, ty, activity, properties }
+            | ChangeKind::Replace { component, ty, activity, properties, .. } => {
                 if let Some(activity) = activity.filter(|name| !context.activities.contains(name)) {
                     let known = context.activities.iter().map(Ident::as_str);
                     let near = did_you_mean(activity.as_str(), "activities", known);
                     wrong.push(Violation::UnknownActivity { component: *component, activity, near });
                 }
                 let properties = initial(*component, *ty, properties, view, &mut wrong);
+                if let ChangeKind::Replace { map, .. } = kind {
+                    wrong.extend(renamed(*component, *ty, map, view));
+                }
                 Step::Create { component: *component, ty: *ty, activity: *activity, properties }
             }
             ChangeKind::Destroy { component } => Step::Destroy { component: *component },

@@ -11,6 +11,7 @@ pub mod footprint;
 mod lists;
 pub mod meant;
 mod order;
+pub mod replace;
 #[cfg(test)]
 mod tests;
 pub mod undo;

@@ -10,6 +10,7 @@ use super::work::{Op, Planned, Room, Work};
 use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
+use crate::plan::replace::neighbours;
 use crate::plan::{Context, PlannedStep, Refusal};
 use crate::system::Overlay;
 use crate::time::Time;
@@ -244,6 +245,7 @@ fn resolve<'a>(
     let still_broken = |components: &mut dyn Iterator<Item = ComponentName>| {
         world.broken_at(components).map(|broken| Reason::StillBroken(broken.residual.clone()))
     };
+    let touched = |of: &Configuration| claims::components(of).into_iter().chain(neighbours(of, &world.system));
     match request.ask {
         Ask::Apply(id) => {
             let Some(configuration) = rules.configurations.get(&id) else { return tell(failed, Reason::Unknown(id)) };
@@ -251,7 +253,7 @@ fn resolve<'a>(
                 return tell(failed, Reason::NotListed(id));
             }
             if !world.broken.is_empty()
-                && let Some(reason) = still_broken(&mut claims::components(configuration).into_iter())
+                && let Some(reason) = still_broken(&mut touched(configuration))
             {
                 return tell(failed, reason);
             }

@@ -2,7 +2,7 @@
 //! same time (semantics: *Requests*).
 
 use super::request::Request;
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, Ident, Target};
+use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -57,7 +57,8 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// What each configuration claims: the components that it and those of its group name; with `_default` all of its file.
+    /// What each configuration claims: the components that it and those of its group name, and what those may be connected to
+    /// that it replaces; with `_default` all of its file.
     pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone) -> Self {
         let most = configurations.clone().map(|configuration| configuration.changes.len()).max().unwrap_or_default();
         let mut numbers: FxHashMap<ComponentName, usize> = FxHashMap::default();
@@ -70,6 +71,22 @@ impl Claims {
                 claim.set(*numbers.entry(component).or_insert(next));
             });
             of.insert(configuration.id, claim);
+        }
+        // What is replaced may be connected to whatever any of them connects it to.
+        let changes = configurations.clone().flat_map(|configuration| &configuration.changes);
+        let linked: Vec<(ComponentName, ComponentName)> = changes
+            .filter_map(|change| match &change.kind {
+                ChangeKind::Connect { from, to, .. } => Some((from.component, to.component)),
+                _ => None,
+            })
+            .collect();
+        for configuration in configurations.clone() {
+            for change in &configuration.changes {
+                let ChangeKind::Replace { component, .. } = &change.kind else { continue };
+                let ends = linked.iter().filter(|(from, to)| from == component || to == component);
+                let Some(claim) = of.get_mut(&configuration.id) else { continue };
+                ends.flat_map(|(from, to)| [from, to]).for_each(|end| claim.set(numbers[end]));
+            }
         }
         // With `_default` all of the file, whichever names it.
         for configuration in configurations.clone() {
@@ -145,4 +162,40 @@ pub fn components(configuration: &Configuration) -> std::collections::BTreeSet<C
     let mut components = std::collections::BTreeSet::new();
     for_each_named(configuration, &mut |component| _ = components.insert(component));
     components
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Change, Origin, Policy, RequestId, TypeName, Value};
+    use crate::stack::Requester;
+
+    #[test]
+    fn what_is_replaced_claims_what_it_may_be_connected_to() {
+        let component = |name: &str| ComponentName::new(name).unwrap();
+        let member = |name: &str, port: &str| component(name).member(Ident::new(port).unwrap());
+        let one = |id: &str, kind: ChangeKind| Configuration {
+            changes: vec![Change { kind, origin: Origin::NONE }],
+            ..Configuration::new(ConfigId::new(id).unwrap())
+        };
+        let set = |of: &str| ChangeKind::PropertySet { property: member(of, "k"), value: Value::Int(1) };
+        let all = [
+            one("wire", ChangeKind::Connect { from: member("a", "y"), to: member("b", "u"), policy: Policy::Data }),
+            one(
+                "swap",
+                ChangeKind::Replace {
+                    component: component("b"),
+                    ty: TypeName::new("T").unwrap(),
+                    activity: None,
+                    properties: BTreeMap::new(),
+                    map: BTreeMap::new(),
+                },
+            ),
+            one("source", set("a")),
+            one("other", set("c")),
+        ];
+        let claims = Claims::new(all.iter());
+        let of = |n: usize| claims.of([&Request::new(RequestId(0), Ask::Apply(all[n].id), Requester::Operator)]);
+        assert!(of(1).meets(&of(2)) && of(1).meets(&of(0)) && !of(1).meets(&of(3)));
+    }
 }

@@ -85,7 +85,9 @@ impl<'m> Builder<'m> {
                 Finding::error(codes::CHART_NO_INITIAL, "the coordinator does not say in which state it begins")
                     .at(root.origin)
                     .path(ROOT)
-                    .help("write a transition from `initial` to the first state: trans { src = \"initial\", tgt = … }"),
+                    .help(
+                        "write a transition from `initial` to the first state: `trans { src = \"initial\", tgt = … }`",
+                    ),
             );
         } else if self.kinds[self.children[&(node, initial())] as usize] != Kind::Connector {
             let at = self.children[&(node, initial())];
@@ -235,7 +237,7 @@ impl<'m> Builder<'m> {
                 )
                 .at(transition.origin)
                 .path(path)
-                .help(format!("write {which} = \"NAME\"")),
+                .help(format!("write `{which} = \"NAME\"`")),
             );
             return None;
         };

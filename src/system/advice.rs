@@ -37,9 +37,15 @@ impl Violation {
                 let declared = types.iter().filter_map(|ty| view.types().get(*ty));
                 declared.map(|ty| (ty.origin, format!("{} is declared here", ty.name))).collect()
             }
-            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } => {
+            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } | Self::PortUnlike { from, to, .. } => {
                 [from, to].map(|(port, declared)| (*declared, format!("`{port}` is declared here"))).to_vec()
             }
+            Self::PortUnmapped { ty, .. } => view
+                .types()
+                .get(*ty)
+                .map(|ty| (ty.origin, format!("{} is declared here", ty.name)))
+                .into_iter()
+                .collect(),
             Self::MissingProperty { declared, .. } => here(declared, " without a default"),
             Self::NeedsBuffer { declared, .. } => here(declared, " as buffered"),
             Self::NotOut { declared, .. }
@@ -88,11 +94,11 @@ impl Violation {
             Self::Exists(name) => format!("destroy `{name}` in the same configuration, or choose another name"),
             Self::StillConnected { links, .. } => {
                 let shown: Vec<String> =
-                    links.iter().map(|(from, to)| format!("disconnect(\"{from}\", \"{to}\")")).collect();
+                    links.iter().map(|(from, to)| format!("`disconnect(\"{from}\", \"{to}\")`")).collect();
                 format!("add {}", shown.join(", "))
             }
             Self::NotOut { .. } | Self::NotIn { .. } => {
-                "are the two ends the wrong way round? the out-port is the first: connect(out_port, in_port)".to_owned()
+                "are the two ends the wrong way round? the out-port is the first: `connect(out_port, in_port)`".to_owned()
             }
             Self::WritesOut { .. } => "name an in-port: what leaves an out-port, its component decides".to_owned(),
             Self::PortTypes { .. } => "connect ports of the same type; nothing is converted on the way".to_owned(),
@@ -100,10 +106,10 @@ impl Violation {
                 "put a component between them that converts, or correct the unit of one".to_owned()
             }
             Self::AlreadyConnected { from, to } => {
-                format!("to change the policy add disconnect(\"{from}\", \"{to}\") to the same configuration")
+                format!("to change the policy add `disconnect(\"{from}\", \"{to}\")` to the same configuration")
             }
             Self::DataAlone { to, by } | Self::Driven { port: to, by } => match by.first() {
-                Some(from) => format!("add disconnect(\"{from}\", \"{to}\") to the same configuration"),
+                Some(from) => format!("add `disconnect(\"{from}\", \"{to}\")` to the same configuration"),
                 None => return None,
             },
             Self::NeedsBuffer { .. } => "give the connection a buffer, such as `buffer = 64`".to_owned(),
@@ -121,6 +127,18 @@ impl Violation {
             Self::ArgumentCount { operation, wanted, .. } | Self::Argument { operation, wanted, .. } => {
                 let wanted: Vec<String> = wanted.iter().map(ValueType::to_string).collect();
                 format!("call it as {operation}({})", wanted.join(", "))
+            }
+            Self::PortUnlike { .. } => {
+                "a port becomes one of the same direction, type and unit: correct the map, or put a component between them".to_owned()
+            }
+            Self::PortUnmapped { port, with, out, ty } => {
+                let (from, to) = if *out { (port, with) } else { (with, port) };
+                let known: Vec<&str> = view.types().get(*ty).map(|ty| Member::Port.of(ty)).unwrap_or_default();
+                format!(
+                    "say what it is called there, `map = {{ [\"{}\"] = \"…\" }}` ({}), or add `disconnect(\"{from}\", \"{to}\")`",
+                    port.member,
+                    did_you_mean(port.member.as_str(), "ports", known)
+                )
             }
             Self::Transition { .. }
             | Self::NotUnconfigured { .. }

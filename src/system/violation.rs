@@ -113,6 +113,11 @@ pub enum Violation {
         wanted: Vec<ValueType>,
         declared: Origin,
     },
+    /// A port of a component that is replaced, and what it is to be called.
+    #[error("`{}` cannot become `{}`: {why}", from.0, to.0.member)]
+    PortUnlike { from: (MemberRef, Origin), to: (MemberRef, Origin), why: String },
+    #[error("`{port}` is connected to `{with}`, and {ty}, which replaces {}, has no port `{}`", port.component, port.member)]
+    PortUnmapped { port: MemberRef, with: MemberRef, out: bool, ty: TypeName },
     #[error("`{component}` is created with {}, its type has {}", count(found, "value"), count(expected, "property"))]
     PropertyCount { component: ComponentName, expected: usize, found: usize },
 }
@@ -186,6 +191,8 @@ impl Violation {
             Self::Driven { .. } => codes::PORT_DRIVEN,
             Self::NotWritable { .. } => codes::PORT_NOT_WRITABLE,
             Self::ArgumentCount { .. } | Self::Argument { .. } => codes::BAD_ARGUMENTS,
+            Self::PortUnlike { .. } => codes::PORT_UNLIKE,
+            Self::PortUnmapped { .. } => codes::PORT_UNMAPPED,
         }
     }
 
@@ -209,6 +216,7 @@ impl Violation {
             | Self::NotWritable { .. }
             | Self::ArgumentCount { .. }
             | Self::Argument { .. }
+            | Self::PortUnlike { .. }
             | Self::PropertyCount { .. } => true,
             Self::UnknownComponent(_)
             | Self::Exists(_)
@@ -219,6 +227,7 @@ impl Violation {
             | Self::NotConnected { .. }
             | Self::DataAlone { .. }
             | Self::NotTunable { .. }
+            | Self::PortUnmapped { .. }
             | Self::Driven { .. } => false,
         }
     }
@@ -251,7 +260,10 @@ impl Violation {
             | Self::NotWritable { port: m, .. }
             | Self::ArgumentCount { operation: m, .. }
             | Self::Argument { operation: m, .. } => [Some(*m), None],
-            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } => [Some(from.0), Some(to.0)],
+            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } | Self::PortUnlike { from, to, .. } => {
+                [Some(from.0), Some(to.0)]
+            }
+            Self::PortUnmapped { port, with, .. } => [Some(*port), Some(*with)],
             Self::AlreadyConnected { from, to } | Self::NotConnected { from, to } => [Some(*from), Some(*to)],
             Self::UnknownComponent(_)
             | Self::UnknownType { .. }

@@ -241,6 +241,14 @@ fn an_event_that_nobody_can_mean_is_told() {
             "e_aftre(1.5)",
             "`e_aftre(1.5)` is no time event: somebody must raise it under that very name; did you mean `e_after(1.5)`?",
         ),
+        (
+            "e_ater(5)",
+            "`e_ater(5)` is no time event: somebody must raise it under that very name; did you mean `e_after(5)`?",
+        ),
+        (
+            "after(5)",
+            "`after(5)` is no time event: somebody must raise it under that very name; did you mean `e_after(5)`?",
+        ),
         ("E_at(3)", "`E_at(3)` is no time event: somebody must raise it under that very name; did you mean `e_at(3)`?"),
         ("aa.faulted", "`aa.faulted` never comes: there is no component `aa`; did you mean `a`?"),
     ];

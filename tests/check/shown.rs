@@ -97,6 +97,8 @@ fn reasons() -> Vec<Row> {
         reason("conf::data_alone", "connect('b.p', 'b.q')", "connect('a.p', 'b.q')|"),
         reason("conf::not_tunable", "property_set('a.mode', 1)", "post_conf_state = { 'a:running' }|"),
         reason("conf::port_driven", "port_write('b.q', 1.0)", "connect('a.p', 'b.q')|"),
+        reason("conf::port_unmapped", "replace('a', 'Two')", "connect('a.m', 'b.q')|"),
+        reason("conf::port_unlike", "replace('x', 'One', { map = { ty = 'q' } })", ""),
         reason("conf::clash", "property_set('a.k', 2.0), property_set('a.k', 3.0)", ""),
         reason("conf::pre_on_created", "create('y', 'One'), pre_conf_state = { 'y:stopped' }", ""),
         reason("conf::post_on_destroyed", "destroy('b'), post_conf_state = { 'b:stopped' }", ""),

@@ -1,6 +1,7 @@
 //! One deliberate mistake at a time in a sound deployment, and the exact finding it leads to.
 
 use crate::demo::Demo;
+use crate::tongue::strange;
 use serde_json::Value;
 
 struct Mistake {
@@ -184,6 +185,54 @@ fn every_mistake_is_found_where_it_is() {
         }
     }
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), MISTAKES.len(), wrong.join("\n"));
+}
+
+/// What helps is written as the file is that it is about: each mistake in Lua, and where it can be read, in YAML.
+#[test]
+fn findings_speak_the_language_of_their_file() {
+    let (mut wrong, mut in_yaml) = (Vec::new(), 0);
+    let more = [
+        error(C, "    connect(\"source.y\", \"sink.u\"),", "    disconnect(\"source.y\", \"sink.u\"),", "", ""),
+        error(C, "create(\"sink\", \"Sink\"", "create(\"source2\", \"Sink\"", "", ""),
+        error(
+            C,
+            "    connect(\"source.y\", \"sink.u\"),\n",
+            "    destroy(\"source\"), connect(\"source.y\", \"sink.u\"),\n",
+            "",
+            "",
+        ),
+        error(C, "property_set(\"source.name\", \"second\")", "destroy(\"source\")", "", ""),
+        error(C, "property_set(\"source.k\", 1.0)", "connect(\"source.y\", \"sink.u\")", "", ""),
+        error(C, "property_set(\"source.k\", 1.0)", "operation_call(\"source.burn\")", "", ""),
+        error(C, "property_set(\"source.k\", 1.0)", "replace(\"source\", \"Sink\")", "", ""),
+        error(K, "trans { src = \"initial\", tgt = \"idle\" },", "", "", ""),
+        error(K, "trans { src = \"initial\", tgt = \"idle\" },", "trans { tgt = \"idle\" },", "", ""),
+        error(K, "trans { src = \"initial\",  tgt = \"creating\" },", "", "", ""),
+        error(D, "direction: in, type: bool", "direction: in, type: bool, required: true", "", ""),
+    ];
+    for mistake in MISTAKES.iter().chain(&more).filter(|mistake| mistake.code != "lua::undefined") {
+        let demo = Demo::new();
+        if mistake.to.contains("required") {
+            demo.replace(C, "port_write(\"sink.flag\", false),", "");
+            demo.replace(C, "port_write(\"sink.flag\", true),", "");
+        }
+        demo.replace(mistake.file, mistake.from, mistake.to);
+        let findings = |path: &str| demo.run(&["check", path, "--json", "--notes"]).json()["findings"].clone();
+        // What the deployment says of files in Lua is in Lua.
+        let strange_in_lua = strange(&findings(D)).into_iter().filter(|text| !text.contains(&format!(" at {D}: ")));
+        wrong.extend(strange_in_lua.map(|text| format!("{}: {text}", mistake.to)));
+        let converted = demo.run(&["convert", D, "--to", "yaml", "-o", "yaml"]);
+        if converted.code == 0 {
+            in_yaml += 1;
+            let found = findings("yaml/demo.deployment.yaml");
+            assert!(found.as_array().is_some_and(|found| !found.is_empty()), "{}", mistake.to);
+            wrong.extend(strange(&found).into_iter().map(|text| format!("{}: {text}", mistake.to)));
+        }
+    }
+    wrong.sort();
+    wrong.dedup();
+    assert!(wrong.is_empty(), "{}:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(in_yaml > 30, "{in_yaml}");
 }
 
 #[test]

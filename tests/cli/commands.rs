@@ -74,6 +74,27 @@ fn explain_tells_what_a_key_means() {
     assert_eq!(of, ["type", "operation"]);
     assert_eq!(at_home(&["explain", "operation.moves", "--json"]).json().as_array().unwrap().len(), 1);
     assert!(at_home(&["explain", "for_at_least"]).out.contains("a condition"));
+    // What is written and is no key, and the ways in which findings name places.
+    for (what, says) in [
+        ("self", "settled_by"),
+        ("_default", "the list does not name"),
+        ("initial", "entered first"),
+        ("e_after", "so many seconds after"),
+        ("e_after(0.5)", "so many seconds after"),
+        ("e_at", "the coordinator began"),
+        ("e_done", "complete"),
+        ("condition", "true or false"),
+        ("signal", "a number at every instant"),
+    ] {
+        let told = at_home(&["explain", what]);
+        assert!(told.code == 0 && told.out.contains(says), "{what}: {}{}", told.out, told.err);
+    }
+    for path in ["type.ports.unit", "types.Gain.ports.u.unit", "deployment.types.ports.unit", "port.unit"] {
+        let told = at_home(&["explain", path, "--json"]).json();
+        assert_eq!(told[0]["of"], "port", "{path}: {told}");
+        assert_eq!(told.as_array().unwrap().len(), 1, "{path}: {told}");
+    }
+    assert_eq!(at_home(&["explain", "type.prots.unit"]).code, 1);
     let unknown = at_home(&["explain", "timeut"]);
     assert!(unknown.code == 1 && unknown.err.contains("did you mean `timeout`?"), "{}", unknown.err);
     let keys = at_home(&["explain", "--keys"]);

@@ -62,6 +62,30 @@ fn names_are_checked() {
             "activity",
             16,
         ),
+        (
+            "deployment.yaml",
+            "    moves: [start]\n",
+            "    moves: [start]\n    start_after: [Sink, Snik]\n",
+            "type::unknown_type",
+            "did you mean `Sink`",
+            18,
+        ),
+        (
+            "deployment.yaml",
+            "    moves: [start]\n",
+            "    moves: [start]\n    stop_before: Snik\n",
+            "type::unknown_type",
+            "did you mean `Sink`",
+            18,
+        ),
+        (
+            "deployment.yaml",
+            "    moves: [start]\n  Sink:\n",
+            "    moves: [start]\n    start_after: [Sink]\n  Sink:\n    start_after: [Source]\n",
+            "type::circle",
+            "start_after leads round in a circle: Source → Sink → Source",
+            18,
+        ),
         ("configurations.lua", "\"source.y\", 1.0", "\"sorce.y\", 1.0", "conf::unknown_component", "`source`", 16),
         ("configurations.lua", "\"source.y\", 1.0", "\"source.yy\", 1.0", "conf::unknown_port", "`y`", 16),
     ] {
@@ -141,5 +165,163 @@ fn the_shipped_arms_say_what_moves() {
             .collect();
         let fold = if deployment.starts_with("youbot") { "youbot.fold" } else { "arm.lower" };
         assert_eq!(back, [fold], "{deployment}");
+    }
+}
+
+/// The type `standard.Gain`, declared as the library has it.
+const GAIN: &str = "types:
+  standard.Gain:
+    ports:
+      u: { direction: in, type: float }
+      y: { direction: out, type: float }
+    properties:
+      k: { type: float, default: 1.0 }
+";
+
+/// The differences that are found where `from` is `to` in that declaration: severity, message, line.
+fn differences(platform: &str, from: &str, to: &str) -> Vec<(String, String, u64)> {
+    let demo = Demo::new();
+    let declared = GAIN.replacen(from, to, 1);
+    assert!(from.is_empty() || declared != GAIN, "{from}");
+    demo.write(
+        "deployment.yaml",
+        &format!(
+            "davit: 1\nname: demo\nplatform: {platform}\nlibraries: [standard]\n{declared}\
+             configurations: [configurations.lua]\ncoordinator: coordinator.lua\n\
+             deploy: {{ event: e_start, up: up, within_s: 5 }}\nshutdown: {{ event: e_stop, down: idle, within_s: 5 }}\n"
+        ),
+    );
+    demo.write("configurations.lua", "ConfiguratorConf { a = Configuration { create('g', 'standard.Gain') } }");
+    let coordinator =
+        "return state { idle = state {}, up = state { config = 'a' }, trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'up', events = { 'e_start' } },
+        trans { src = 'up', tgt = 'idle', events = { 'e_stop', 'a.failed', 'a.broken' } } }";
+    demo.write("coordinator.lua", coordinator);
+    let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    let all = json["findings"].as_array().unwrap().iter();
+    let rest = all.clone().find(|f| f["code"] != "type::differs" && f["severity"] == "error");
+    assert!(rest.is_none(), "{to}: {rest:#?}");
+    let text = |f: &serde_json::Value, key: &str| f[key].as_str().unwrap_or_default().to_owned();
+    all.filter(|f| f["code"] == "type::differs")
+        .map(|f| (text(f, "severity"), text(f, "message"), f["line"].as_u64().unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_declaration_is_held_against_the_library_that_has_the_type() {
+    for platform in ["embedded", "simulated"] {
+        assert_eq!(differences(platform, "", ""), [], "what is the same is no difference");
+    }
+    let k = "k: { type: float, default: 1.0 }";
+    for (from, to, severity, message, line) in [
+        (
+            "u: { direction: in, type: float }",
+            "v: { direction: in, type: float }",
+            "error",
+            "the library's `standard.Gain` has no port `v`",
+            8,
+        ),
+        (
+            "      u: { direction: in, type: float }\n",
+            "",
+            "warning",
+            "the library's `standard.Gain` has a port `u` that is not declared",
+            6,
+        ),
+        (
+            "direction: in, type: float",
+            "direction: out, type: float",
+            "error",
+            "`standard.Gain.u`: the direction is declared as out, the library has in",
+            8,
+        ),
+        (
+            "direction: in, type: float",
+            "direction: in, type: int",
+            "error",
+            "`standard.Gain.u`: the type is declared as int, the library has float",
+            8,
+        ),
+        (
+            "direction: in, type: float",
+            "direction: in, type: float, unit: N",
+            "warning",
+            "`standard.Gain.u`: the unit is declared as `N`, the library has none",
+            8,
+        ),
+        (
+            "direction: in, type: float",
+            "direction: in, type: float, buffered: true",
+            "error",
+            "`standard.Gain.u`: buffered is declared as true, the library has false",
+            8,
+        ),
+        (
+            "direction: in, type: float",
+            "direction: in, type: float, required: true",
+            "warning",
+            "`standard.Gain.u`: required is declared as true, the library has false",
+            8,
+        ),
+        (
+            k,
+            "k: { type: float, default: 2.0 }",
+            "warning",
+            "`standard.Gain.k`: the default is declared as 2.0, the library has 1.0",
+            11,
+        ),
+        (
+            k,
+            "k: { type: float }",
+            "warning",
+            "`standard.Gain.k`: the default is declared as none, the library has 1.0",
+            11,
+        ),
+        (
+            k,
+            "k: { type: float, default: 1.0, max: 5.0 }",
+            "warning",
+            "`standard.Gain.k`: max is declared as 5, the library has none",
+            11,
+        ),
+        (
+            k,
+            "k: { type: float, default: 1.0, tunable: stopped }",
+            "warning",
+            "`standard.Gain.k`: tunable is declared as stopped, the library has always",
+            11,
+        ),
+        (
+            "    properties:",
+            "    operations: { zero: {} }\n    properties:",
+            "error",
+            "the library's `standard.Gain` has no operation `zero`",
+            10,
+        ),
+        (
+            "    ports:",
+            "    moves: [start]\n    ports:",
+            "warning",
+            "`standard.Gain`: moves is declared as start, the library has none",
+            6,
+        ),
+        (
+            "    ports:",
+            "    actuator: true\n    ports:",
+            "warning",
+            "`standard.Gain`: actuator is declared as true, the library has false",
+            6,
+        ),
+        (
+            "    ports:",
+            "    start_after: [standard.Sine]\n    ports:",
+            "warning",
+            "`standard.Gain`: start_after is declared as standard.Sine, the library has none",
+            6,
+        ),
+    ] {
+        let found = differences("embedded", from, to);
+        let wanted = (severity.to_owned(), message.to_owned(), line);
+        assert!(found.contains(&wanted), "{to}: {found:#?}");
     }
 }

@@ -29,7 +29,7 @@ const SHARED: &[Shared] = &[
         wrong: [
             "conf::not_an_in_port",
             "`ctrl.x` is an out-port; a connection ends at an in-port",
-            "are the two ends the wrong way round? the out-port is the first: connect(out_port, in_port)",
+            "are the two ends the wrong way round? the out-port is the first: `connect(out_port, in_port)`",
         ],
     },
     Shared {
@@ -130,11 +130,7 @@ const SHARED: &[Shared] = &[
         of_pid: "property_set('ctrl.k', 2.0)",
         off: "",
         of_mpc: "property_set('ctrl.k', 25)",
-        wrong: [
-            "conf::bad_value",
-            "`ctrl.k` cannot be 2.0: 2 is outside 20 and more",
-            "give it a value of type float in N",
-        ],
+        wrong: ["conf::bad_value", "`ctrl.k` cannot be 2.0: 2 is less than 20", "give it a value of type float in N"],
     },
     Shared {
         what: "length of an array",
@@ -335,10 +331,10 @@ fn a_configuration_that_meets_either_type_is_refused_when_both_refuse_it() {
     }
     // Each refuses it for the same reason, or each for its own.
     let found = tune(k, k, "property_set('ctrl.k', 6.0)");
-    assert_eq!(found[0]["message"], "`ctrl.k` cannot be 6.0: 6 is outside 5 and less, whether `ctrl` is Pid or Mpc");
+    assert_eq!(found[0]["message"], "`ctrl.k` cannot be 6.0: 6 is more than 5, whether `ctrl` is Pid or Mpc");
     let found = tune(k, x, "property_set('ctrl.k', 6.0)");
     assert_eq!(found.len(), 1, "{found:#?}");
-    assert_eq!(found[0]["message"], "`ctrl.k` cannot be 6.0: 6 is outside 5 and less, if `ctrl` is Pid");
+    assert_eq!(found[0]["message"], "`ctrl.k` cannot be 6.0: 6 is more than 5, if `ctrl` is Pid");
     let text = "if `ctrl` is Mpc: ctrl (Mpc) has no property `k`";
     assert!(found[0]["labels"].as_array().unwrap().iter().any(|l| l["text"] == text), "{found:#?}");
     let found = tune(x, x, "disconnect('plant.y', 'ctrl.z')");
@@ -400,4 +396,203 @@ fn findings_about_values_name_what_cannot_have_them() {
             "{to}: {found:#?}"
         );
     }
+}
+
+// ---- `replace` ---------------------------------------------------------------------------------------------------
+
+/// `up` makes a `Pid` that is connected to a plant and to itself, and a log behind it; `swap` is given.
+fn replaced(swap: &str) -> Demo {
+    let demo = deployment(
+        "ports: { in: { direction: in, type: float }, loop: { direction: in, type: float }, y: { direction: out, type: float } }\n    \
+         properties: { k: { type: float, default: 1.0 } }",
+        "ports: { state: { direction: in, type: float }, loop: { direction: in, type: float }, command: { direction: out, type: float },\n            \
+         n: { direction: in, type: int }, y: { direction: out, type: int } }\n    \
+         properties: { horizon: { type: int, default: 5, max: 50 }, rate: { type: float } }",
+        "create('log', 'Pid'), connect('plant.y', 'ctrl.in', { buffer = 4 }), connect('ctrl.y', 'ctrl.loop'),
+         connect('ctrl.y', 'log.in'), post_conf_state = { '_default:running' },",
+        "",
+        false,
+    );
+    demo.replace("configurations.lua", "destroy('ctrl'), create('ctrl', 'Mpc'),", swap);
+    demo.replace("configurations.lua", "create('ctrl', 'Pid')", "create('ctrl', 'Pid', { activity = 'fast' })");
+    demo.replace("deployment.yaml", "configurations:", "activities: { fast: { period_ms: 1.0 } }\nconfigurations:");
+    demo
+}
+
+const FITS: &str = "properties = { rate = 2.0 }, map = { ['in'] = 'state', y = 'command' }";
+
+fn planned(demo: &Demo) -> Value {
+    let planned = demo.run(&["plan", "deployment.yaml", "up", "swap", "--json"]);
+    assert_eq!(planned.code, 0, "{}{}", planned.out, planned.err);
+    planned.json()[1].clone()
+}
+
+#[test]
+fn a_replacement_is_what_is_written_by_hand() {
+    let sugar = replaced(&format!("replace('ctrl', 'Mpc', {{ {FITS} }}),"));
+    let ran = sugar.run(&["check", "deployment.yaml", "--json"]);
+    assert!(ran.code == 0 && errors(&ran.json()).is_empty(), "{}", ran.out);
+    let plan = planned(&sugar);
+    let by_hand = replaced(
+        "destroy('ctrl'), create('ctrl', 'Mpc', { activity = 'fast', properties = { rate = 2.0 } }),
+         disconnect('ctrl.y', 'ctrl.loop'), connect('ctrl.command', 'ctrl.loop'),
+         disconnect('ctrl.y', 'log.in'), connect('ctrl.command', 'log.in'),
+         disconnect('plant.y', 'ctrl.in'), connect('plant.y', 'ctrl.state', { buffer = 4 }),
+         post_conf_state = { 'ctrl:running' },",
+    );
+    assert_eq!(plan, planned(&by_hand));
+    assert_eq!(plan["result"]["components"]["ctrl"]["activity"], "fast");
+    // In the other language it is the same.
+    let yaml = sugar.run(&["convert", "deployment.yaml", "--to", "yaml", "-o", "yaml"]);
+    assert_eq!(yaml.code, 0, "{}", yaml.err);
+    let text = sugar.read("yaml/configurations.yaml");
+    assert!(
+        text.contains(
+            "- replace: { component: ctrl, type: Mpc, properties: { rate: 2.0 }, map: { in: state, \"y\": command } }"
+        ),
+        "{text}"
+    );
+    let again = sugar.run(&["plan", "yaml/swap.deployment.yaml", "up", "swap", "--json"]);
+    assert_eq!(again.json()[1], plan);
+}
+
+#[test]
+fn the_new_one_comes_to_the_run_state_of_the_old_one() {
+    for (pre, post, wanted) in [
+        ("", "", "running"),
+        ("'ctrl:stopped'", "", "stopped"),
+        ("'_default:stopped'", "", "stopped"),
+        ("'ctrl:unconfigured'", "", "unconfigured"),
+        ("'ctrl:unconfigured'", "'ctrl:stopped'", "stopped"),
+        ("", "'ctrl:stopped'", "stopped"),
+        ("'_default:stopped'", "'_default:running'", "running"),
+        ("", "'_default:stopped'", "stopped"),
+        ("", "'plant:stopped'", "running"),
+    ] {
+        let lists = format!("pre_conf_state = {{ {pre} }}, post_conf_state = {{ {post} }},");
+        let plan = planned(&replaced(&format!("replace('ctrl', 'Mpc', {{ {FITS} }}), {lists}")));
+        assert_eq!(plan["result"]["components"]["ctrl"]["state"], wanted, "{lists}");
+        // It does not go further than it stays.
+        let moves = plan["steps"].as_array().unwrap().iter().filter(|step| {
+            step["stage"] == "post"
+                && step["target"] == "ctrl"
+                && ["stop", "cleanup"].iter().any(|verb| step["do"] == *verb)
+        });
+        assert_eq!(moves.count(), 0, "{lists}: {plan:#}");
+    }
+}
+
+#[test]
+fn several_are_replaced_together_and_a_disconnect_beside_ends_a_connection() {
+    let both = format!(
+        "replace('ctrl', 'Mpc', {{ {FITS} }}), replace('log', 'Mpc', {{ {FITS} }}), disconnect('ctrl.y', 'ctrl.loop'),"
+    );
+    let plan = planned(&replaced(&both));
+    let links: Vec<String> = plan["result"]["connections"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|link| format!("{} {} {}", link["from"].as_str().unwrap(), link["to"].as_str().unwrap(), link["policy"]))
+        .collect();
+    assert_eq!(links, ["ctrl.command log.state \"data\"", "plant.y ctrl.state {\"buffer\":4}"]);
+}
+
+#[test]
+fn what_cannot_be_replaced_is_told_where_it_is_written() {
+    let one = |options: &str| format!("replace('ctrl', 'Mpc', {{ properties = {{ rate = 2.0 }}, {options} }}),");
+    let cases = [
+        (
+            one("map = { y = 'command' }"),
+            "conf::port_unmapped",
+            "`ctrl.in` is connected to `plant.y`, and Mpc, which replaces ctrl, has no port `in`",
+            "say what it is called there, `map = { [\"in\"] = \"…\" }` (",
+        ),
+        (
+            one("map = { ['in'] = 'state', u = 'n', y = 'command' }"),
+            "conf::unknown_port",
+            "ctrl (Pid) has no port `u`",
+            "known ports: `in`, `loop`, `y`",
+        ),
+        (
+            one("map = { ['in'] = 'stat', y = 'command' }"),
+            "conf::unknown_port",
+            "ctrl (Mpc) has no port `stat`",
+            "did you mean `state`?",
+        ),
+        (
+            one("map = { ['in'] = 'command', y = 'command' }"),
+            "conf::port_unlike",
+            "`ctrl.in` cannot become `command`: that is an out-port, this one an in-port",
+            "a port becomes one of the same direction",
+        ),
+        (
+            one("map = { ['in'] = 'n', y = 'command' }"),
+            "conf::port_unlike",
+            "`ctrl.in` cannot become `n`: that is of type int, this one float",
+            "a port becomes one of the same direction",
+        ),
+        (
+            one("map = { ['in'] = 'state' }"),
+            "conf::port_types",
+            "`ctrl.y` carries int, `log.in` takes float",
+            "connect ports of the same type",
+        ),
+        (
+            "replace('ctrl', 'Mpc', { map = { ['in'] = 'state', y = 'command' } }),".to_owned(),
+            "conf::missing_property",
+            "`ctrl` is created without a value for `rate`, which has no default",
+            "add `rate = …` (float)",
+        ),
+        (
+            format!("replace('ctrl', 'Mpc', {{ {FITS} }}), replace('ctrl', 'Pid'),"),
+            "conf::clash",
+            "`replace ctrl : Mpc` and `replace ctrl : Pid` do not commute",
+            "keep one of the two",
+        ),
+        (
+            format!("replace('ctrl', 'Mcp', {{ {FITS} }}),"),
+            "conf::unknown_type",
+            "there is no component type `Mcp`",
+            "known component types: `Mpc`, `Pid`, `Plant`",
+        ),
+        (
+            format!("replace('ctlr', 'Mpc', {{ {FITS} }}),"),
+            "conf::unknown_component",
+            "no configuration creates a component `ctlr`",
+            "did you mean `ctrl`?",
+        ),
+    ];
+    for (swap, code, message, help) in cases {
+        let demo = replaced(&swap);
+        let text = demo.read("configurations.lua");
+        let line = text.lines().position(|line| line.contains("replace(")).unwrap() + 1;
+        let found = errors(&demo.run(&["check", "deployment.yaml", "--json"]).json());
+        let told = found.iter().find(|f| f["code"] == code && f["message"] == message);
+        let Some(told) = told else { panic!("{swap}: {found:#?}") };
+        assert!(told["help"].as_str().unwrap().contains(help), "{swap}: {told}");
+        assert_eq!(told["line"], line, "{swap}: {told}");
+        // The planner says the same.
+        let planned = demo.run(&["plan", "deployment.yaml", "up", "swap", "--json"]);
+        assert!(planned.code == 1 && planned.out.contains(code), "{swap}: {}", planned.out);
+    }
+}
+
+#[test]
+fn what_only_a_replacement_drives_or_connects_is_known() {
+    let demo = replaced(&format!("replace('ctrl', 'Mpc', {{ {FITS} }}),"));
+    demo.replace("deployment.yaml", "state: { direction: in,", "state: { direction: in, required: true,");
+    demo.replace(
+        "deployment.yaml",
+        "configurations:",
+        "faults: [{ step: \"connect plant.y -> ctrl.state\", how: fail }]\nconfigurations:",
+    );
+    let ran = demo.run(&["check", "deployment.yaml", "--json"]);
+    let found = ran.json();
+    let of = |f: &&Value| ["deploy::port_required", "simulated::unknown_step"].iter().any(|code| f["code"] == *code);
+    let told: Vec<&Value> = found["findings"].as_array().unwrap().iter().filter(of).collect();
+    assert!(told.is_empty(), "{told:#?}");
+    // Without the map nothing connects it.
+    demo.replace("configurations.lua", "['in'] = 'state'", "['in'] = 'loop'");
+    let found = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    assert_eq!(found["findings"].as_array().unwrap().iter().filter(of).count(), 2);
 }

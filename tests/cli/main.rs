@@ -33,6 +33,8 @@ mod simulated;
 mod stalled;
 mod stopping;
 mod together;
+#[path = "../lang/tongue.rs"]
+mod tongue;
 mod unasked;
 mod unheard;
 mod vanished;

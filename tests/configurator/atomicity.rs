@@ -126,13 +126,14 @@ fn ready(word: &str) -> Rig {
     rig
 }
 
-const WORDS: [&str; 12] = [
+const WORDS: [&str; 13] = [
     "make",
     "wire",
     "run",
     "switch",
     "rewire",
     "replace",
+    "hot",
     "five",
     "drop",
     "switch.undo",
@@ -167,7 +168,7 @@ fn one_thing_goes_wrong_at_any_step_of_any_configuration() {
 
 #[test]
 fn something_goes_wrong_while_undoing_too() {
-    for word in ["switch", "rewire", "replace", "drop", "quick", "quick.undo"] {
+    for word in ["switch", "rewire", "replace", "hot", "drop", "quick", "quick.undo"] {
         for kind in 0..KINDS {
             let mut rig = ready(word);
             for nth in 2..7u64 {

@@ -67,7 +67,7 @@ pub fn catalogue() -> Catalogue {
     catalogue
 }
 
-/// One change in words: `create A`, `destroy A`, `connect A.y B.u`, `disconnect A.y B.u`, `set A.k 2`, `write A.u 3`,
+/// One change in words: `create A`, `destroy A`, `swap A` (by another one), `connect A.y B.u`, `disconnect A.y B.u`, `set A.k 2`, `write A.u 3`,
 /// `call A.open`.
 fn change(text: &str) -> Change {
     let words: Vec<&str> = text.split_whitespace().collect();
@@ -78,6 +78,13 @@ fn change(text: &str) -> Change {
             ty: TypeName::new("Node").unwrap(),
             activity: None,
             properties: BTreeMap::new(),
+        },
+        "swap" => ChangeKind::Replace {
+            component: name(words[1]),
+            ty: TypeName::new("Node").unwrap(),
+            activity: None,
+            properties: BTreeMap::new(),
+            map: BTreeMap::new(),
         },
         "destroy" => ChangeKind::Destroy { component: name(words[1]) },
         "connect" => ChangeKind::Connect { from: member(words[1]), to: member(words[2]), policy: Policy::Data },
@@ -357,6 +364,7 @@ pub fn scenario() -> Vec<Configuration> {
         configuration("quiet", "", "", "_default:stopped"),
         configuration("quick", "B:stopped", "set B.s 2; set B.k 3; write C.w 4", "B:running"),
         configuration("bad", "", "set Z.k 1", ""),
+        configuration("hot", "", "swap B", ""),
     ];
     for configuration in &mut all {
         configuration.safe = configuration.id == id("quiet");

@@ -73,6 +73,19 @@ fn what_nobody_can_settle_is_broken_and_says_so() {
     assert_eq!(rig.ask("eight"), ["eight.ok"]);
 }
 
+#[test]
+fn what_is_connected_to_something_broken_is_not_replaced() {
+    let rig = up_with(vec![configuration("open", "", "call A.open", "")]);
+    rig.inject("operation_call", Fault::LostAnswer);
+    assert_eq!(rig.ask("open"), ["open.broken"]);
+    // It names B alone, and would disconnect A from it.
+    assert_eq!(rig.ask("hot"), ["hot.failed"]);
+    assert!(matches!(rig.last().reason.as_deref(), Some(Reason::StillBroken(_))));
+    assert_eq!(rig.ask("open.undo"), ["open.undone"]);
+    assert_eq!(rig.ask("hot"), ["hot.ok"]);
+    rig.in_step();
+}
+
 /// `engage`: a call of A that a call of B takes back, and a property of C.
 fn engage() -> Configuration {
     let call = |operation: &str| Call { operation: member(operation), args: vec![] };

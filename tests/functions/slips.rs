@@ -51,6 +51,24 @@ fn misspelt_keys_are_named_with_what_was_meant() {
 }
 
 #[test]
+fn what_is_written_over_several_lines_is_shown_on_its_own() {
+    let text = "return rfsm.state {
+  off = rfsm.state {
+    inner = rfsm.state {},
+    entyr = function() end,
+  },
+  rfsm.trans { src = 'initial', tgt = 'off' },
+  rfsm.trans {
+    src = 'off', tgt = 'off',
+    evnts = { 'e_on' },
+  },
+  rfsm.trans { src = 'off', tgt = 'off', events = { 'evnts', 'entyr' } },
+}";
+    let found: Vec<(u32, String)> = slips(text).into_iter().map(|(line, about, _)| (line, about)).collect();
+    assert_eq!(found, [(9, "evnts".to_owned()), (4, "entyr".to_owned())]);
+}
+
+#[test]
 fn a_global_that_nobody_has_set_is_named_where_it_is_a_fields_value() {
     let said = slips(&model("entry=do_it, note=1", "guard = is_it,\n effect = here"));
     let found: Vec<(u32, &str)> = said.iter().map(|(line, about, _)| (*line, about.as_str())).collect();

@@ -6,4 +6,5 @@ mod listings;
 mod monitors;
 mod reference;
 mod round_trip;
+mod tongue;
 mod typos;

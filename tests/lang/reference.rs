@@ -193,6 +193,32 @@ fn every_example_in_lua_is_read() {
     assert!(read > 25, "{read}");
 }
 
+/// `davit explain --keys` shows the first sentence: it is one, and says what the key is for, not what one of its words means.
+#[test]
+fn what_a_key_is_for_is_said_first() {
+    for object in FILES.iter().flat_map(File::objects) {
+        for key in object.keys.iter().filter(|key| key.language != Languages::None) {
+            let first = key.doc.split(". ").next().unwrap();
+            let of_a_word = first.starts_with('`') && first.contains("`: ");
+            assert!(!of_a_word && first.len() > 8, "{}.{}: {first}", object.name, key.name);
+        }
+    }
+}
+
+/// Where one of two keys must be there, an editor says so.
+#[test]
+fn the_schema_demands_one_of_two_keys() {
+    let file = File::named("deployment").unwrap();
+    let text = "davit: 1\nname: a\nplatform: simulated\nlibraries: [standard]\nconfigurations: [c.lua]\ncoordinator: k.lua\n\
+                deploy: { event: e, up: up, within_s: 1 }\nshutdown: { event: f, down: idle, within_s: 1 }\n";
+    let valid = |text: &str| validator(file).is_valid(&as_json(&serde_yaml::from_str(text).unwrap()));
+    assert!(valid(text));
+    assert!(valid(&text.replace("coordinator: k.lua", "coordinators: { a: k.lua }")));
+    assert!(valid(&text.replace("libraries: [standard]", "types: {}")));
+    assert!(!valid(&text.replace("coordinator: k.lua\n", "")));
+    assert!(!valid(&text.replace("libraries: [standard]\n", "")));
+}
+
 /// What no schema sees: files, numbers that are none, and what stands in several places.
 const BEYOND: &[davit::model::Code] = &[
     codes::TEXT_NO_FILE,

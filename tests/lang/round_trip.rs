@@ -103,6 +103,20 @@ fn change() -> impl Strategy<Value = Change> {
             |(component, ty, activity, properties)| ChangeKind::Create { component, ty, activity, properties }
         ),
         component().prop_map(|component| ChangeKind::Destroy { component }),
+        (
+            component(),
+            type_name(),
+            option::of(ident()),
+            btree_map(ident(), value(), 0..3),
+            btree_map(ident(), ident(), 0..3)
+        )
+            .prop_map(|(component, ty, activity, properties, map)| ChangeKind::Replace {
+                component,
+                ty,
+                activity,
+                properties,
+                map
+            }),
         (member(), member(), policy).prop_map(|(from, to, policy)| ChangeKind::Connect { from, to, policy }),
         (member(), member()).prop_map(|(from, to)| ChangeKind::Disconnect { from, to }),
         (member(), value()).prop_map(|(property, value)| ChangeKind::PropertySet { property, value }),

@@ -1,6 +1,7 @@
 //! A mistake in every kind of key, name, type and time, in every kind of file: its code, its place, its help.
 
 use crate::helpers::{COORDINATOR, DEPLOYMENT, codes, load, shown, with_configurations};
+use crate::tongue::strange;
 use davit::lang::{self, LoadOptions, Loaded, Sources};
 use std::path::Path;
 
@@ -25,6 +26,7 @@ impl Answers {
         if found != [expected] || !hinted || help.is_empty() {
             self.0.push(format!("{from} -> {to}\nexpected {expected} with `{hint}`, found {found:?}\n{text}"));
         }
+        self.0.extend(strange(&davit::diagnostics::to_json(&loaded.findings, &loaded.sources)));
     }
 }
 
@@ -103,6 +105,8 @@ fn deployment_keys_names_and_values() {
         ("safety: [e_estop]", "trusted: yes", "text::wrong_type 21:10", "true or false"),
         ("{ stack: 32, step_timeout_s: 0.5 }", "[]", "text::wrong_type 20:9", "limits: {"),
         ("effect: none", "effect: []", "text::wrong_type 12:54", "`none`, `irreversible`"),
+        ("up: operational", "up: []", "deploy::unknown_state 18:27", "every coordinator has one"),
+        ("down: idle", "down: []", "deploy::unknown_state 19:32", "every coordinator has one"),
     ];
     let mut answers = Answers::default();
     for (from, to, expected, hint) in table {
@@ -286,6 +290,21 @@ fn coordinators() {
         lang::load_coordinator(&Sources::memory([("k.yaml", text)]), Path::new("k.yaml"), &LoadOptions::default());
     let found: Vec<_> = loaded.findings.iter().map(|f| f.code.0).collect();
     assert_eq!(found, ["text::unknown_key", "text::unknown_key"], "all findings, not the first");
+}
+
+/// Only functions have a host, and only Lua has functions.
+#[test]
+fn a_host_of_coordinators_that_are_not_in_lua_is_told() {
+    let chart = "coordinator:\n  states: { idle: {}, operational: {}, fault: {} }\n  transitions: [{ src: initial, tgt: idle }]\n";
+    let deployment = DEPLOYMENT.replace("k.lua", "k.yaml");
+    for (trusted, wanted) in
+        [("trusted: true\nhost: [h.lua]\n", &["text::bad_value 25:8"][..]), ("trusted: true\n", &[])]
+    {
+        let text = format!("{deployment}{trusted}");
+        let files = [("d.yaml", text.as_str()), ("k.yaml", chart), ("h.lua", "")];
+        let loaded = load(&files, &LoadOptions::default());
+        assert_eq!(codes(&loaded), wanted, "{}", shown(&loaded.findings, &loaded.sources));
+    }
 }
 
 #[test]

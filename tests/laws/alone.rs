@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 /// What follows from types alone. (A default twice and a demanded `faulted` are found by the readers: no model holds them.)
-const OF_TYPES: [Code; 15] = [
+const OF_TYPES: [Code; 16] = [
     UNKNOWN_TYPE,
     UNKNOWN_ACTIVITY,
     UNKNOWN_PORT,
@@ -26,6 +26,7 @@ const OF_TYPES: [Code; 15] = [
     NOT_AN_IN_PORT,
     PORT_TYPES,
     PORT_UNITS,
+    PORT_UNLIKE,
     NEEDS_BUFFER,
     BUFFER_SIZE,
     BAD_VALUE,
@@ -91,6 +92,9 @@ fn mistake(conf: &mut Configuration, [at, what, more]: [u8; 3]) {
             1 => *ty = TypeName::new("T.four").unwrap(),
             _ => *ty = TypeName::new("T.five").unwrap(),
         },
+        (ChangeKind::Replace { map, .. }, 0) => _ = map.insert(generate::ident("p0"), generate::ident("p1")),
+        (ChangeKind::Replace { map, .. }, 1) => _ = map.insert(generate::ident("zz"), generate::ident("p1")),
+        (ChangeKind::Replace { properties, .. }, _) => _ = properties.insert(generate::ident("zz"), value),
         (ChangeKind::Destroy { component }, _) => {
             *component = member(component.member(generate::ident("zz"))).component
         }
@@ -108,7 +112,8 @@ fn world(types: &[TypeGene], genes: &[(ConfigGene, [u8; 3])], single: bool) -> W
         // An identifier is used once.
         conf.id = ConfigId::new(&format!("{}_{i}", conf.id)).unwrap();
         for change in &mut conf.changes {
-            if let ChangeKind::Create { component, ty, .. } = &mut change.kind
+            if let ChangeKind::Create { component, ty, .. } | ChangeKind::Replace { component, ty, .. } =
+                &mut change.kind
                 && single
             {
                 *ty = *first.entry(*component).or_insert(*ty);
@@ -158,7 +163,9 @@ fn stranger(world: &World, without: ConfigId, seed: &[u8]) -> System {
 fn is_single(deployment: &Deployment) -> bool {
     let mut first: BTreeMap<ComponentName, TypeName> = BTreeMap::new();
     deployment.configurations.iter().flat_map(|conf| &conf.changes).all(|change| match &change.kind {
-        ChangeKind::Create { component, ty, .. } => first.entry(*component).or_insert(*ty) == ty,
+        ChangeKind::Create { component, ty, .. } | ChangeKind::Replace { component, ty, .. } => {
+            first.entry(*component).or_insert(*ty) == ty
+        }
         _ => true,
     })
 }

@@ -250,6 +250,7 @@ impl Reader<'_> {
                 }
             }
             14 => self.call(a, b, c),
+            15 if c % 4 > 1 => self.replace(a, b, c),
             15 => {
                 if let Some(component) = self.destroy(a, b) {
                     self.create(component, b, c);
@@ -264,10 +265,33 @@ impl Reader<'_> {
         }
     }
 
-    fn create(&mut self, component: ComponentName, b: u8, c: u8) {
-        if self.there.contains_key(&component) && c % 8 != 7 {
-            return;
+    /// One that is there, by another; a port that the new one does not have is mapped to one that may do.
+    fn replace(&mut self, a: u8, b: u8, c: u8) {
+        let mut old = Vec::new();
+        self.system.for_each_component(&mut |n| old.push((n.name, n.ty.clone())));
+        old.retain(|(name, _)| c % 32 == 31 || !self.gone.contains(name));
+        let Some((component, old)) = pick(&old, a) else { return };
+        let (ty, declared, properties) = self.made(b, c);
+        let mut map = BTreeMap::new();
+        let mut taken: BTreeSet<Ident> =
+            declared.ports.keys().filter(|port| old.ports.contains_key(*port)).copied().collect();
+        for (port, of) in old.ports.iter().filter(|(port, _)| !declared.ports.contains_key(*port)) {
+            let fits = |(name, to): &(&Ident, &PortType)| {
+                c % 16 == 15 || to.direction == of.direction && to.ty == of.ty && !taken.contains(*name)
+            };
+            if let Some((name, _)) = declared.ports.iter().find(fits) {
+                taken.insert(*name);
+                map.insert(*port, *name);
+            }
         }
+        let activity = [None, Some(ident("fast"))][b as usize % 2];
+        self.push(ChangeKind::Replace { component, ty, activity, properties, map });
+        self.there.insert(component, declared);
+        self.gone.insert(component);
+    }
+
+    /// A type, and initial values of one of it.
+    fn made(&self, b: u8, c: u8) -> (TypeName, Arc<ComponentType>, BTreeMap<Ident, Value>) {
         let ty = type_name(b as usize);
         let declared = self.system.types().get(ty).unwrap().clone();
         let properties = declared
@@ -277,6 +301,14 @@ impl Reader<'_> {
             .filter(|(i, (_, p))| (p.default.is_none() && c % 16 != 15) || (c >> i) & 1 == 1)
             .map(|(i, (name, p))| (*name, value(&p.ty, b.wrapping_add(i as u8))))
             .collect();
+        (ty, declared, properties)
+    }
+
+    fn create(&mut self, component: ComponentName, b: u8, c: u8) {
+        if self.there.contains_key(&component) && c % 8 != 7 {
+            return;
+        }
+        let (ty, declared, properties) = self.made(b, c);
         let activity = [None, Some(ident("fast")), Some(ident("slow")), None][c as usize % 4];
         self.push(ChangeKind::Create { component, ty, activity, properties });
         self.there.insert(component, declared);
@@ -411,6 +443,9 @@ proptest! {
                 match plan(&system, &conf, &context()) {
                     Ok(plan) => {
                         accepted += 1;
+                        // No step is called so.
+                        let replaces = |change: &&Change| matches!(change.kind, ChangeKind::Replace { .. });
+                        *verbs.entry("replace").or_insert(0) += conf.changes.iter().filter(replaces).count();
                         steps += plan.steps.len();
                         for s in &plan.steps {
                             *verbs.entry(s.step.verb()).or_insert(0usize) += 1;
@@ -429,7 +464,7 @@ proptest! {
         prop_assert!((0.3..0.97).contains(&share), "{share} of the generated configurations are accepted");
         prop_assert!(steps as f64 / accepted as f64 > 1.5, "accepted configurations have {steps} steps in {accepted}");
         for verb in ["configure", "start", "stop", "cleanup", "create", "destroy", "connect", "disconnect", "property_set",
-            "port_write", "operation_call"] {
+            "port_write", "operation_call", "replace"] {
             prop_assert!(verbs.get(verb).copied().unwrap_or(0) > 20, "{verb}: {:?}", verbs.get(verb));
         }
     }

@@ -147,6 +147,13 @@ fn change(text: &str) -> Change {
             activity: None,
             properties: BTreeMap::new(),
         },
+        "replace" => ChangeKind::Replace {
+            component: component(1),
+            ty: TypeName::new("Node").expect("a plain name"),
+            activity: None,
+            properties: BTreeMap::new(),
+            map: BTreeMap::new(),
+        },
         "destroy" => ChangeKind::Destroy { component: component(1) },
         "connect" => ChangeKind::Connect { from: member(1), to: member(2), policy: Policy::Data },
         "disconnect" => ChangeKind::Disconnect { from: member(1), to: member(2) },
@@ -175,6 +182,7 @@ fn pieces(chance: &mut Chance, on: &str, kept: bool, changes: &mut Vec<String>, 
         13 => changes.push(format!("write {on}.u {number}")),
         14 => post.push(format!("_default:{state}")),
         _ if on == "c" && kept => changes.push("call c.open".to_owned()),
+        _ if number == 2 => changes.push(format!("replace {on}")),
         _ => changes.push(format!("destroy {on}")),
     }
 }

@@ -10,6 +10,7 @@ mod flood;
 mod hangs;
 mod life;
 mod platforms;
+mod replaced;
 mod settled;
 mod socket;
 mod stands;

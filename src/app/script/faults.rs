@@ -6,7 +6,7 @@ use crate::app::start::rule;
 use crate::check;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{ChangeKind, ComponentName, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
+use crate::model::{ComponentName, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
 use crate::platform::simulated::Simulated;
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -68,11 +68,8 @@ impl Faults {
         if name.is_some_and(|name| simulated.fault(name, "the script lets it fail")) {
             return Ok(());
         }
-        let created = checked.deployment.configurations.iter().flat_map(|c| &c.changes).filter_map(|c| match &c.kind {
-            ChangeKind::Create { component, .. } => Some(*component),
-            _ => None,
-        });
-        let known: BTreeSet<ComponentName> = created.collect();
+        let created = checked.deployment.configurations.iter().flat_map(|c| &c.changes).filter_map(|c| c.kind.makes());
+        let known: BTreeSet<ComponentName> = created.map(|(component, ..)| component).collect();
         if name.is_some_and(|name| known.contains(&name)) {
             return Err(error(format!("`{component}` is not there now, and cannot fail")));
         }

@@ -1,4 +1,4 @@
-//! Configurations and the seven primitives.
+//! Configurations, the seven primitives and what is made of them.
 
 use super::{Form, Key, Names, Object, key};
 use crate::model::codes::{
@@ -145,7 +145,7 @@ pub static CONFIRM: Object = Object {
     ],
 };
 
-/// One of the primitives.
+/// A change: one of the primitives, or what is made of them.
 #[derive(Debug)]
 pub struct Primitive {
     /// Its keys, under its word.
@@ -154,7 +154,7 @@ pub struct Primitive {
     pub arguments: &'static [&'static str],
 }
 
-/// The primitives, in the order of the reference.
+/// The changes, in the order of the reference.
 pub static CHANGES: &[Primitive] = &[
     Primitive { object: &CREATE, arguments: &["component", "type", "options"] },
     Primitive { object: &DESTROY, arguments: &["component"] },
@@ -163,9 +163,10 @@ pub static CHANGES: &[Primitive] = &[
     Primitive { object: &PROPERTY_SET, arguments: &["property", "value"] },
     Primitive { object: &PORT_WRITE, arguments: &["port", "value"] },
     Primitive { object: &OPERATION_CALL, arguments: &["operation", "args…"] },
+    Primitive { object: &REPLACE, arguments: &["component", "type", "options"] },
 ];
 
-/// The primitive of that word.
+/// The change of that word.
 pub fn primitive(word: &str) -> Option<&'static Primitive> {
     CHANGES.iter().find(|change| change.object.name == word)
 }
@@ -178,6 +179,19 @@ const COMPONENT: Key = key(
     ("component: Dyna-mics", TEXT_BAD_NAME),
 )
 .required();
+
+const COMPONENT_TYPE: Key =
+    key("type", Form::Name(Names::Type), "Its type.", "type: youbot.Dynamics", ("type: \"you bot\"", TEXT_BAD_NAME))
+        .required();
+
+const PROPERTIES: Key = key(
+    "properties",
+    Form::Named(&Form::Value),
+    "Initial values of properties; in Lua in the table behind the type. `tunable` does not bind them.",
+    "properties = { friction_comp = 0.9 }",
+    ("properties: [0.9]", TEXT_WRONG_TYPE),
+)
+.without("their defaults");
 
 const FROM: Key =
     key("from", Form::Name(Names::Member), "The out-port.", "from: Kin.jacobian", ("from: Kin", TEXT_BAD_NAME))
@@ -208,14 +222,7 @@ static CREATE: Object = Object {
     may_be_empty: false,
     keys: &[
         COMPONENT,
-        key(
-            "type",
-            Form::Name(Names::Type),
-            "Its type.",
-            "type: youbot.Dynamics",
-            ("type: \"you bot\"", TEXT_BAD_NAME),
-        )
-        .required(),
+        COMPONENT_TYPE,
         key(
             "activity",
             Form::Name(Names::Plain),
@@ -224,14 +231,43 @@ static CREATE: Object = Object {
             ("activity: 1", TEXT_WRONG_TYPE),
         )
         .without("the activity `default`, with a period of 10 ms"),
+        PROPERTIES,
+    ],
+};
+
+/// Puts another component in the place of one.
+static REPLACE: Object = Object {
+    name: "replace",
+    what: "replace",
+    doc: "Puts a new component in the place of one: destroys the old one, creates the new one under its name, and connects it as the \
+          old one is connected where it is applied, with the same policies. The new one comes to the run state of the old one \
+          (where that has faulted it stays unconfigured), unless `post_conf_state` says otherwise. Values of properties and written ports are not \
+          taken over. Made of the seven others, and undone like them: when it fails, the old one is back. A `disconnect` \
+          beside it lets that connection end.",
+    example: "replace(\"ctrl\", \"Mpc\", { map = { force = \"wrench\" } })",
+    in_yaml: "replace: { component: ctrl, type: Mpc, map: { force: wrench } }",
+    may_be_empty: false,
+    keys: &[
+        COMPONENT,
+        COMPONENT_TYPE,
         key(
-            "properties",
-            Form::Named(&Form::Value),
-            "Initial values of properties; in Lua in the table behind the type. `tunable` does not bind them.",
-            "properties = { friction_comp = 0.9 }",
-            ("properties: [0.9]", TEXT_WRONG_TYPE),
+            "activity",
+            Form::Name(Names::Plain),
+            "The activity that the new one runs in; in Lua in the table behind the type.",
+            "activity = \"control\"",
+            ("activity: 1", TEXT_WRONG_TYPE),
         )
-        .without("their defaults"),
+        .without("that of the old one"),
+        PROPERTIES,
+        key(
+            "map",
+            Form::Named(&Form::Name(Names::Plain)),
+            "Ports of the old one, and what they are called on the new one; in Lua in the table behind the type. A connected port that \
+             the new one does not have must stand here.",
+            "map = { force = \"wrench\" }",
+            ("map: { force: 1 }", TEXT_WRONG_TYPE),
+        )
+        .without("each port keeps its name"),
     ],
 };
 
@@ -258,7 +294,7 @@ static CONNECT: Object = Object {
         key(
             "policy",
             Form::Either(&[Form::Choice(&["data"]), Form::Table(&BUFFER)]),
-            "`data`: the newest value is there. A buffer: each sample is there once, in order. In Lua the third argument.",
+            "How samples are carried. `data`: the newest value is there. A buffer: each sample is there once, in order. In Lua the third argument.",
             "policy: { buffer: 64 }",
             ("policy: fifo", TEXT_BAD_VALUE),
         )

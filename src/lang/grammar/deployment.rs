@@ -45,15 +45,17 @@ pub static DEPLOYMENT: Object = Object {
         key(
             "libraries",
             Form::Several(&Form::Name(Names::Plain)),
-            "Libraries of component types, by name; `davit types` lists what they offer. Required where no `types` are declared.",
+            "Libraries of component types, by name; `davit types` lists what they offer.",
             "libraries: [standard]",
             ("libraries: [\"my lib\"]", TEXT_BAD_NAME),
-        ),
+        )
+        .instead("types"),
         key(
             "types",
             Form::Named(&Form::Table(&TYPE)),
             "Component types that are declared here. The simulated platform runs any; on another one a library must bring the \
-             component.",
+             component. Where a library of the deployment has a type of that name, that is what counts, and `davit check` tells every \
+             difference.",
             "types: { Gain: { properties: { k: { type: float, default: 1.0 } } } }",
             ("types: [Gain]", TEXT_WRONG_TYPE),
         ),
@@ -75,10 +77,11 @@ pub static DEPLOYMENT: Object = Object {
         key(
             "coordinator",
             Form::Path,
-            "The coordinator's file (Lua, YAML or SCXML). It is called like the deployment. Required where there are no `coordinators`.",
+            "The coordinator's file (Lua, YAML or SCXML). It is called like the deployment.",
             "coordinator: coordinator.lua",
             ("coordinator: nowhere.lua", TEXT_NO_FILE),
-        ),
+        )
+        .instead("coordinators"),
         key(
             "coordinators",
             Form::Named(&Form::Path),
@@ -417,7 +420,7 @@ pub static FAULT: Object = Object {
         key(
             "how",
             Form::Choice(&["fail", "hang", "late", "lost", "lie", "slow"]),
-            "`fail`: refused at once. `hang`: its call never comes back. `late`: its call comes back after the deadline. `lost`: \
+            "What goes wrong with it. `fail`: refused at once. `hang`: its call never comes back. `late`: its call comes back after the deadline. `lost`: \
              the request never arrives. `lie`: answered as done, and it is not. `slow`: it takes `takes_s`.",
             "how: fail",
             ("how: fial", TEXT_BAD_VALUE),

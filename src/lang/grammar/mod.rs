@@ -9,12 +9,14 @@ mod chart;
 mod configuration;
 mod deployment;
 mod monitor;
+mod own_words;
 mod types;
 
 pub use chart::{CONNECTOR, COORDINATOR_FILE, STATE, TRANSITION};
 pub use configuration::{BUFFER, CHANGES, CONFIGURATION, CONFIGURATIONS_FILE, CONFIRM, Primitive, UNDO, primitive};
 pub use deployment::{ACTIVITY, DEPLOY, DEPLOYMENT, FAULT, LIMITS, REACTION, SHUTDOWN, SIMULATED, TRUSTED};
 pub use monitor::{COMPARISON, MONITOR, MONITORS_FILE};
+pub use own_words::{OWN_WORDS, OwnWord};
 pub use types::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 
 use crate::model::Code;
@@ -68,6 +70,8 @@ pub struct Key {
     pub refused: &'static str,
     /// With this code.
     pub code: Code,
+    /// The key that may stand in its place; without that one it must be there.
+    pub instead: &'static str,
     /// What else must stand in the table for either, in YAML.
     pub beside: &'static str,
     /// In which languages it can be written.
@@ -205,6 +209,7 @@ const fn key(
         example,
         refused: refused.0,
         code: refused.1,
+        instead: "",
         beside: "",
         language: Languages::All,
     }
@@ -223,6 +228,11 @@ impl Key {
 
     const fn unit(mut self, unit: &'static str) -> Self {
         self.unit = unit;
+        self
+    }
+
+    const fn instead(mut self, other: &'static str) -> Self {
+        self.instead = other;
         self
     }
 

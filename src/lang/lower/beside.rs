@@ -25,6 +25,8 @@ pub struct Named {
 pub struct Rise {
     event: EventName,
     up: Vec<Named>,
+    /// Where `up` is written.
+    up_at: Origin,
     failed: Vec<Named>,
     within: Duration,
 }
@@ -33,6 +35,8 @@ pub struct Rise {
 pub struct Fall {
     event: EventName,
     down: Vec<Named>,
+    /// Where `down` is written.
+    down_at: Origin,
     within: Duration,
     rest: Vec<(ConfigId, Origin)>,
 }
@@ -98,22 +102,24 @@ fn states(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<Named> {
 pub fn rise(cx: &mut Cx, node: Node) -> Option<Rise> {
     let mut fields = Fields::of(cx, node, &DEPLOY)?;
     let event = fields.name(cx, "event");
+    let up_at = fields.place("up").unwrap_or(fields.origin);
     let up = states(cx, &mut fields, "up");
     let failed = states(cx, &mut fields, "failed");
     let within = fields.time(cx, "within_s");
     fields.finish(cx);
-    Some(Rise { event: event?, up, failed, within: within? })
+    Some(Rise { event: event?, up, up_at, failed, within: within? })
 }
 
 /// `shutdown`
 pub fn fall(cx: &mut Cx, node: Node) -> Option<Fall> {
     let mut fields = Fields::of(cx, node, &SHUTDOWN)?;
     let event = fields.name(cx, "event");
+    let down_at = fields.place("down").unwrap_or(fields.origin);
     let down = states(cx, &mut fields, "down");
     let within = fields.time(cx, "within_s");
     let rest = names(cx, &mut fields, "rest", "`shutdown.rest`");
     fields.finish(cx);
-    Some(Fall { event: event?, down, within: within?, rest })
+    Some(Fall { event: event?, down, down_at, within: within?, rest })
 }
 
 /// Gives each coordinator its states. `own` is the name of the deployment, and of a coordinator without one.
@@ -154,8 +160,8 @@ pub fn join(
         }
     }
     // All of *up* before all of *down*: findings come in the order of the keys.
-    let up: Vec<String> = names.iter().map(|name| one(cx, *name, &rise.up, "up")).collect();
-    let down: Vec<String> = names.iter().map(|name| one(cx, *name, &fall.down, "down")).collect();
+    let up: Vec<String> = names.iter().map(|name| one(cx, *name, (&rise.up, rise.up_at), "up")).collect();
+    let down: Vec<String> = names.iter().map(|name| one(cx, *name, (&fall.down, fall.down_at), "down")).collect();
     let failed = |name: Ident| -> Vec<String> {
         let meant = rise.failed.iter().filter(|f| f.coordinator.is_none_or(|c| c == name));
         meant.map(|f| f.state.clone()).collect()
@@ -171,7 +177,7 @@ pub fn join(
 }
 
 /// The one state that means `what` of one coordinator.
-fn one(cx: &mut Cx, coordinator: Ident, named: &[Named], what: &str) -> String {
+fn one(cx: &mut Cx, coordinator: Ident, (named, at): (&[Named], Origin), what: &str) -> String {
     let of = |name: Option<Ident>| named.iter().filter(move |n| n.coordinator == name);
     let own: Vec<&Named> = of(Some(coordinator)).collect();
     let meant = if own.is_empty() { of(None).collect() } else { own };
@@ -180,7 +186,7 @@ fn one(cx: &mut Cx, coordinator: Ident, named: &[Named], what: &str) -> String {
         [] => {
             // Where the names themselves are wrong, that is said already.
             if !crate::model::finding::has_errors(&cx.findings) {
-                let at = named.first().map_or(Origin::NONE, |n| n.origin);
+                let at = named.first().map_or(at, |n| n.origin);
                 let message = format!("no state is named that means {what} of the coordinator `{coordinator}`");
                 let help = format!("every coordinator has one: write `{what}: [{coordinator}:STATE, …]`");
                 cx.report(Finding::error(codes::DEPLOY_UNKNOWN_STATE, message).at(at).help(help));

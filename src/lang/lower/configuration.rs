@@ -297,14 +297,19 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
 
 fn kind(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKind> {
     let kind = match verb {
-        "create" => {
+        "create" | "replace" => {
             let component = component(cx, &mut fields);
             let ty = required(cx, &mut fields, "type");
             let ty = ty.and_then(|node| name::<TypeName>(cx, &node, "a component type", "youbot.Dynamics"));
             let activity = fields.name(cx, "activity");
             let properties = fields.take(cx, "properties");
             let properties = properties.map(|node| properties_of(cx, node, component)).unwrap_or_default();
-            component.zip(ty).map(|(component, ty)| ChangeKind::Create { component, ty, activity, properties })
+            let map =
+                (verb == "replace").then(|| fields.take(cx, "map").map(|node| ports(cx, node)).unwrap_or_default());
+            component.zip(ty).map(|(component, ty)| match map {
+                None => ChangeKind::Create { component, ty, activity, properties },
+                Some(map) => ChangeKind::Replace { component, ty, activity, properties, map },
+            })
         }
         "destroy" => component(cx, &mut fields).map(|component| ChangeKind::Destroy { component }),
         "connect" | "disconnect" => {
@@ -391,6 +396,19 @@ fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
     let length = fields.whole(cx, "buffer");
     fields.finish(cx);
     u32::try_from(length?).ok().map(Policy::Buffer)
+}
+
+/// What ports are called on the component that replaces theirs.
+fn ports(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Ident> {
+    const EXAMPLE: &str = "map = { force = \"wrench\" }";
+    let mut out = BTreeMap::new();
+    for entry in entries(cx, node, "`map`", EXAMPLE).unwrap_or_default() {
+        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
+        let from = name::<Ident>(cx, &key, "a port", EXAMPLE);
+        let to = name::<Ident>(cx, &entry.value, "a port", EXAMPLE);
+        out.extend(from.zip(to));
+    }
+    out
 }
 
 fn properties_of(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {

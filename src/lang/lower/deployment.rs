@@ -59,10 +59,14 @@ pub struct Draft {
     pub key_origins: BTreeMap<String, Origin>,
 }
 
-/// Notes where every key of the file stands, by its path. Types are left out: they carry their own places.
+/// Notes where every key of the file stands, by its path. Types are left out, but for the others that they name: they carry their
+/// own places.
 fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>) {
     for entry in entries {
         if prefix.is_empty() && matches!(&*entry.key, "types" | "with") {
+            if let (true, Kind::Map(types)) = (entry.key == "types", &entry.value.kind) {
+                types.iter().for_each(|ty| note_orders(ty, out));
+            }
             continue;
         }
         let path = if prefix.is_empty() { entry.key.to_string() } else { format!("{prefix}.{}", entry.key) };
@@ -80,6 +84,14 @@ fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>
             _ => {}
         }
         out.insert(path, entry.origin);
+    }
+}
+
+/// Notes where a type names others.
+fn note_orders(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
+    let Kind::Map(keys) = &ty.value.kind else { return };
+    for entry in keys.iter().filter(|entry| matches!(&*entry.key, "start_after" | "stop_before")) {
+        note_keys(std::slice::from_ref(entry), &format!("types.{}", ty.key), out);
     }
 }
 

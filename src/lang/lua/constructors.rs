@@ -128,7 +128,8 @@ fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'sta
                 ("options", kind) => {
                     let node = Node::new(kind, origin);
                     let example = "{ activity = \"control\", properties = { k = 1.0 } }";
-                    recorder.borrow_mut().cx.wrong(&node, "the third argument of `create`", "a table", example);
+                    let what = format!("the last argument of `{verb}`");
+                    recorder.borrow_mut().cx.wrong(&node, &what, "a table", example);
                 }
                 (name, kind) => entries.push(entry(name, origin, Node::new(kind, origin))),
             }

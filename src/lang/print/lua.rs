@@ -1,10 +1,10 @@
 //! Printing in Lua.
 
 use super::wrap::wrap;
-use super::{float, monitor, seconds};
+use super::{change, float, monitor, seconds};
 use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
-use crate::model::{Call, Change, ChangeKind, Configuration, OnFailure, Origin, Policy, StateList, Statechart, Value};
+use crate::model::{Configuration, OnFailure, Origin, StateList, Statechart, Value};
 use std::fmt::Write as _;
 
 /// Words that Lua keeps for itself.
@@ -45,7 +45,8 @@ pub fn key(text: &str) -> String {
     if plain { text.to_owned() } else { format!("[{}]", quoted(text)) }
 }
 
-fn value(out: &mut String, v: &Value) {
+/// A value, written behind what is there.
+pub fn value(out: &mut String, v: &Value) {
     match v {
         Value::Bool(v) => _ = write!(out, "{v}"),
         // Its digits alone are read as a float, since the minus is not part of a number in Lua.
@@ -81,63 +82,6 @@ fn states(out: &mut String, name: &str, entries: &StateList) {
     _ = writeln!(out, "    {name} = {{ {} }},", list.join(", "));
 }
 
-fn call(out: &mut String, c: &Call) {
-    _ = write!(out, "({}", quoted(&c.operation.to_string()));
-    for v in &c.args {
-        out.push_str(", ");
-        value(out, v);
-    }
-    out.push(')');
-}
-
-fn change(out: &mut String, c: &Change) {
-    _ = write!(out, "    {}", c.kind.verb());
-    let q = |text: &dyn std::fmt::Display| quoted(&text.to_string());
-    match &c.kind {
-        ChangeKind::Create { component, ty, activity, properties } => {
-            _ = write!(out, "({}, {}", q(component), q(ty));
-            let mut options = Vec::new();
-            if let Some(activity) = activity {
-                options.push(format!("activity = {}", q(activity)));
-            }
-            if !properties.is_empty() {
-                let mut text = String::new();
-                for (i, (name, v)) in properties.iter().enumerate() {
-                    _ = write!(text, "{}{} = ", if i == 0 { "" } else { ", " }, key(name.as_str()));
-                    value(&mut text, v);
-                }
-                options.push(format!("properties = {{ {text} }}"));
-            }
-            if !options.is_empty() {
-                _ = write!(out, ", {{ {} }}", options.join(", "));
-            }
-            out.push(')');
-        }
-        ChangeKind::Destroy { component } => _ = write!(out, "({})", q(component)),
-        ChangeKind::Connect { from, to, policy } => {
-            _ = write!(out, "({}, {}", q(from), q(to));
-            if let Policy::Buffer(n) = policy {
-                _ = write!(out, ", {{ buffer = {n} }}");
-            }
-            out.push(')');
-        }
-        ChangeKind::Disconnect { from, to } => _ = write!(out, "({}, {})", q(from), q(to)),
-        ChangeKind::PropertySet { property: member, value: v } | ChangeKind::PortWrite { port: member, value: v } => {
-            _ = write!(out, "({}, ", q(member));
-            value(out, v);
-            out.push(')');
-        }
-        ChangeKind::OperationCall { call: c, undo } => {
-            call(out, c);
-            if let Some(undo) = undo {
-                out.push_str(":undo");
-                call(out, undo);
-            }
-        }
-    }
-    out.push_str(",\n");
-}
-
 /// `ConfiguratorConf { … }`
 pub fn configurations_lua(list: &[Configuration]) -> String {
     let mut out = String::from("ConfiguratorConf {\n");
@@ -171,7 +115,7 @@ pub fn configurations_lua(list: &[Configuration]) -> String {
             out.push_str("    irreversible = true,\n");
         }
         states(&mut out, "pre_conf_state", &c.pre);
-        c.changes.iter().for_each(|c| change(&mut out, c));
+        c.changes.iter().for_each(|c| _ = writeln!(out, "    {},", change::in_lua(&c.kind)));
         states(&mut out, "post_conf_state", &c.post);
         out.push_str("  },\n");
     }

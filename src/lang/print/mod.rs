@@ -1,6 +1,7 @@
 //! Model → text, in both languages. What is printed reads back as the same model, to the last digit; comments and the
 //! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
 
+mod change;
 mod kept;
 mod lua;
 mod monitor;

@@ -2,12 +2,12 @@
 
 use super::monitor::{self, Shared};
 use super::wrap::wrap;
-use super::{float, milliseconds, seconds};
+use super::{change, float, milliseconds, seconds};
 use crate::diagnostics::Language;
 use crate::model::statechart::{Action, Node, State, Transition, Trigger};
 use crate::model::{
-    Call, ChangeKind, ComponentType, Configuration, Coordinator, Deployment, Direction, Effect, OnFailure, Origin,
-    Policy, StateList, Statechart, Tunable, Value, Written,
+    ComponentType, Configuration, Coordinator, Deployment, Direction, Effect, Ident, OnFailure, Origin, StateList,
+    Statechart, Tunable, Value, Written,
 };
 use std::fmt::{Display, Write as _};
 
@@ -44,25 +44,31 @@ pub fn quoted(t: &str) -> String {
     out
 }
 
-fn t(name: &dyn Display) -> String {
+/// What has a name, as a text.
+pub fn t(name: &dyn Display) -> String {
     text(&name.to_string())
 }
 
-fn value(v: &Value) -> String {
+/// A value.
+pub fn value(v: &Value) -> String {
     match v {
         Value::Bool(v) => v.to_string(),
         Value::Int(v) => v.to_string(),
         Value::Float(v) => float(*v),
         Value::Str(v) => text(v),
         Value::Array(list) => format!("[{}]", list.iter().map(value).collect::<Vec<_>>().join(", ")),
-        Value::Record(fields) => {
-            let fields: Vec<_> = fields.iter().map(|(name, v)| format!("{}: {}", t(name), value(v))).collect();
-            format!("{{ {} }}", fields.join(", "))
-        }
+        Value::Record(fields) => value_map(fields.iter().map(|(name, v)| (name, value(v)))),
     }
 }
 
-fn list(texts: impl IntoIterator<Item = String>) -> String {
+/// Named things that are printed already.
+pub fn value_map<'n>(fields: impl Iterator<Item = (&'n Ident, String)>) -> String {
+    let fields: Vec<_> = fields.map(|(name, value)| format!("{}: {value}", t(name))).collect();
+    format!("{{ {} }}", fields.join(", "))
+}
+
+/// A list of what is printed already.
+pub fn list(texts: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", texts.into_iter().collect::<Vec<_>>().join(", "))
 }
 
@@ -70,42 +76,6 @@ fn states(out: &mut String, name: &str, entries: &StateList) {
     if !entries.is_empty() {
         let entries = list(entries.iter().map(|e| quoted(&format!("{}:{}", e.target, e.state))));
         _ = writeln!(out, "    {name}: {entries}");
-    }
-}
-
-fn call(c: &Call) -> String {
-    let args = if c.args.is_empty() { String::new() } else { format!(", args: {}", list(c.args.iter().map(value))) };
-    format!("operation: {}{args}", t(&c.operation))
-}
-
-fn change(kind: &ChangeKind) -> String {
-    match kind {
-        ChangeKind::Create { component, ty, activity, properties } => {
-            let mut out = format!("component: {}, type: {}", t(component), t(ty));
-            if let Some(activity) = activity {
-                _ = write!(out, ", activity: {}", t(activity));
-            }
-            if !properties.is_empty() {
-                let fields: Vec<_> = properties.iter().map(|(name, v)| format!("{}: {}", t(name), value(v))).collect();
-                _ = write!(out, ", properties: {{ {} }}", fields.join(", "));
-            }
-            out
-        }
-        ChangeKind::Destroy { component } => format!("component: {}", t(component)),
-        ChangeKind::Connect { from, to, policy } => {
-            let policy = match policy {
-                Policy::Data => String::new(),
-                Policy::Buffer(n) => format!(", policy: {{ buffer: {n} }}"),
-            };
-            format!("from: {}, to: {}{policy}", t(from), t(to))
-        }
-        ChangeKind::Disconnect { from, to } => format!("from: {}, to: {}", t(from), t(to)),
-        ChangeKind::PropertySet { property, value: v } => format!("property: {}, value: {}", t(property), value(v)),
-        ChangeKind::PortWrite { port, value: v } => format!("port: {}, value: {}", t(port), value(v)),
-        ChangeKind::OperationCall { call: c, undo } => {
-            let undo = undo.as_ref().map_or(String::new(), |undo| format!(", undo: {{ {} }}", call(undo)));
-            format!("{}{undo}", call(c))
-        }
     }
 }
 
@@ -149,7 +119,7 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
         if !c.changes.is_empty() {
             body.push_str("    changes:\n");
             for c in &c.changes {
-                _ = writeln!(body, "      - {}: {{ {} }}", c.kind.verb(), change(&c.kind));
+                _ = writeln!(body, "      - {}", change::in_yaml(&c.kind));
             }
         }
         states(&mut body, "post_conf_state", &c.post);

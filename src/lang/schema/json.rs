@@ -67,6 +67,12 @@ fn object(object: &Object) -> Value {
     if !required.is_empty() {
         out["required"] = json!(required);
     }
+    let either = object.yaml_keys().filter(|key| !key.instead.is_empty());
+    let either: Vec<Value> =
+        either.map(|key| json!({ "anyOf": [{ "required": [key.name] }, { "required": [key.instead] }] })).collect();
+    if !either.is_empty() {
+        out["allOf"] = json!(either);
+    }
     out
 }
 

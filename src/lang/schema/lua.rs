@@ -42,11 +42,11 @@ pub fn annotations() -> String {
             }
         }
     }
-    out.push_str("---@class davit.CreateOptions\n");
-    if let Some(create) = CHANGES.iter().find(|change| change.arguments.contains(&"options")) {
-        options(create).for_each(|key| field(&mut out, key));
+    for change in CHANGES.iter().filter(|change| change.arguments.contains(&"options")) {
+        _ = writeln!(out, "---@class davit.{}Options", class_name(change.object));
+        options(change).for_each(|key| field(&mut out, key));
+        out.push('\n');
     }
-    out.push('\n');
     CHANGES.iter().for_each(|change| primitive(&mut out, change));
     for (name, object) in [
         ("Configuration", &CONFIGURATION),
@@ -107,7 +107,7 @@ fn primitive(out: &mut String, primitive: &Primitive) {
     for argument in primitive.arguments {
         match (*argument, object.key(argument)) {
             ("options", _) => {
-                _ = writeln!(out, "---@param options? davit.CreateOptions");
+                _ = writeln!(out, "---@param options? davit.{}Options", class_name(object));
                 names.push("options");
             }
             (_, Some(key)) => {

@@ -1,6 +1,6 @@
 //! The reference: what one key, one table or one word is, and the pages of all of them.
 
-use crate::lang::grammar::{FILES, File, Form, Key, Languages, Object, Words};
+use crate::lang::grammar::{FILES, File, Form, Key, Languages, OWN_WORDS, Object, OwnWord, Words};
 use crate::lang::spelling::as_yaml;
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use serde::Serialize;
@@ -21,6 +21,9 @@ pub struct Entry {
     pub unit: &'static str,
     /// Whether it must be there.
     pub required: bool,
+    /// The key that may stand in its place, where one of the two must be there.
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub instead: &'static str,
     /// What holds without it.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub default: &'static str,
@@ -31,6 +34,17 @@ pub struct Entry {
     /// A line that is refused, and the code of the finding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<(&'static str, &'static str)>,
+}
+
+impl Entry {
+    /// Behind its name, whether it must be there.
+    pub fn demanded(&self) -> String {
+        match (self.required, self.instead) {
+            (true, _) => " (required)".to_owned(),
+            (false, "") => String::new(),
+            (false, other) => format!(" (required, or `{other}`)"),
+        }
+    }
 }
 
 /// A line as it is written.
@@ -63,6 +77,7 @@ fn of_key(object: &Object, key: &Key) -> Entry {
         form: key.form.words(Words::Plain),
         unit: key.unit_of(),
         required: key.required,
+        instead: key.instead,
         default: key.default,
         doc: key.doc,
         example: Example::of(key.example, key.language),
@@ -78,6 +93,7 @@ fn of_object(object: &Object) -> Entry {
         form: format!("a table with {}", keys.join(", ")),
         unit: "",
         required: false,
+        instead: "",
         default: "",
         doc: object.doc,
         example: Example {
@@ -95,6 +111,7 @@ fn of_word(word: &Word, what: &str) -> Entry {
         form: format!("{what} of the monitors' language"),
         unit: "",
         required: false,
+        instead: "",
         default: "",
         doc: word.doc,
         example: Example::of(word.usage, Languages::All),
@@ -102,9 +119,50 @@ fn of_word(word: &Word, what: &str) -> Entry {
     }
 }
 
-/// Everything that can be written, with where it stands: `timeout`, `configuration.timeout`, `configuration`, `above`.
+fn of_own_word(term: &OwnWord) -> Entry {
+    Entry {
+        name: term.name,
+        of: None,
+        form: term.form.to_owned(),
+        unit: "",
+        required: false,
+        instead: "",
+        default: "",
+        doc: term.doc,
+        example: Example::of(term.example, term.language),
+        refused: None,
+    }
+}
+
+/// The tables that a path leads to, as findings name places: from a table, or a key, over keys. What stands under names of its
+/// own (`types.Gain.ports`) may be written with such a name, or without.
+fn tables(path: &str) -> Vec<&'static Object> {
+    let all: Vec<&'static Object> = FILES.iter().flat_map(File::objects).collect();
+    let mut here: Vec<&'static Object> = Vec::new();
+    for (at, part) in path.split('.').enumerate() {
+        let part = part.split('[').next().unwrap_or(part);
+        let from = if at == 0 { &all } else { &here };
+        let mut next: Vec<&'static Object> = Vec::new();
+        if at == 0 {
+            next.extend(all.iter().filter(|object| object.name == part));
+        }
+        let keys = from.iter().flat_map(|object| object.keys).filter(|key| key.name == part);
+        keys.for_each(|key| key.form.tables(&mut |inner| next.push(inner)));
+        // A name of its own leads no further.
+        if at == 0 || !next.is_empty() {
+            here = next;
+        }
+    }
+    here
+}
+
+/// Everything that can be written, with where it stands: `timeout`, `configuration.timeout`, `type.ports.unit`, `configuration`,
+/// `above`, `e_after`.
 pub fn about(name: &str) -> Vec<Entry> {
+    // A time event as it is written.
+    let name = name.split('(').next().unwrap_or(name);
     let (of, key) = name.rsplit_once('.').map_or((None, name), |(of, key)| (Some(of), key));
+    let around: Vec<&str> = of.map(tables).unwrap_or_default().iter().map(|object| object.name).collect();
     let mut found = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
     for object in FILES.iter().flat_map(File::objects) {
@@ -112,7 +170,7 @@ pub fn about(name: &str) -> Vec<Entry> {
             continue;
         }
         seen.push(object.name);
-        let here = of.is_none_or(|of| of.rsplit('.').next() == Some(object.name));
+        let here = of.is_none() || around.contains(&object.name);
         if of.is_none() && object.name == name {
             found.push(of_object(object));
         }
@@ -122,6 +180,7 @@ pub fn about(name: &str) -> Vec<Entry> {
     if of.is_none() {
         let words = CONDITIONS.iter().map(|word| (word, "a condition")).chain(SIGNALS.iter().map(|w| (w, "a signal")));
         found.extend(words.filter(|(word, _)| word.name == name).map(|(word, what)| of_word(word, what)));
+        found.extend(OWN_WORDS.iter().filter(|term| term.name == name).map(of_own_word));
     }
     found
 }
@@ -131,6 +190,7 @@ pub fn names() -> Vec<&'static str> {
     let objects = FILES.iter().flat_map(File::objects);
     let mut all: Vec<&str> = objects.flat_map(|object| object.names().chain([object.name])).collect();
     all.extend(CONDITIONS.iter().chain(SIGNALS).map(|word| word.name));
+    all.extend(OWN_WORDS.iter().map(|term| term.name));
     all.sort_unstable();
     all.dedup();
     all
@@ -142,6 +202,13 @@ pub fn markdown(file: &File) -> String {
     out.push_str("Made from the table that files are read by; `davit explain KEY` shows the same in a terminal.\n");
     for object in file.objects() {
         table(&mut out, object);
+    }
+    let terms: Vec<&OwnWord> = OWN_WORDS.iter().filter(|term| term.file == file.name).collect();
+    if !terms.is_empty() {
+        out.push_str("\n## Words that are no keys\n\n| word | stands as | meaning |\n|---|---|---|\n");
+        for term in terms {
+            _ = writeln!(out, "| `{}` | {} | {} |", term.name, term.form, term.doc);
+        }
     }
     if file.name == "monitors" {
         words(&mut out, "conditions", "A condition is true or false at every instant.", CONDITIONS);
@@ -158,7 +225,7 @@ fn table(out: &mut String, object: &Object) {
     }
     for key in object.keys.iter().filter(|key| key.language != Languages::None) {
         let entry = of_key(object, key);
-        let mark = if key.required { " (required)" } else { "" };
+        let mark = entry.demanded();
         let form = key.form.words(Words::Linked);
         _ = write!(out, "\n### `{}`{mark}\n\n{}{}.", key.name, form[..1].to_uppercase(), &form[1..]);
         // The unit of a time is in its form.

@@ -1,0 +1,193 @@
+//! What a deployment declares of a type, held against what a library says of the type of that name. The library's counts: it
+//! is what runs. What was written in reliance on the declaration can fail there, or only be another than it says.
+
+use crate::model::codes::TYPE_DIFFERS;
+use crate::model::{
+    Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, OperationType, Origin, PortType,
+    PropertyType, Tunable, TypeName, ValueType,
+};
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+/// Every difference, at the declaration: an error where a plan that the declaration allows could fail when it is carried out.
+pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
+    let mut findings = Findings::new();
+    for declared in &deployment.types {
+        // One that no library has is in the catalogue as it is declared.
+        let Some(library) = catalogue.get(declared.name).filter(|ty| !ty.origin.is_some()) else { continue };
+        let mut of = Compared { ty: declared.name, origin: declared.origin, findings: &mut findings };
+        of.members("ports", "port", (&declared.ports, &library.ports), |of: &PortType| of.origin, port, |_| None);
+        of.members(
+            "properties",
+            "property",
+            (&declared.properties, &library.properties),
+            |of: &PropertyType| of.origin,
+            property,
+            |of| of.default.is_none().then_some("has no default: a `create` that does not give it fails"),
+        );
+        of.members(
+            "operations",
+            "operation",
+            (&declared.operations, &library.operations),
+            |of: &OperationType| of.origin,
+            operation,
+            |_| None,
+        );
+        of.whole(declared, library);
+    }
+    findings
+}
+
+/// A difference: of what, as declared, as the library has it, and whether a plan could fail for it.
+struct Departure {
+    what: &'static str,
+    declared: String,
+    library: String,
+    fails: bool,
+}
+
+/// The differences of two members.
+#[derive(Default)]
+struct Departures(Vec<Departure>);
+
+impl Departures {
+    fn add<T: PartialEq>(&mut self, what: &'static str, pair: (&T, &T), fails: bool, told: impl Fn(&T) -> String) {
+        if pair.0 != pair.1 {
+            self.0.push(Departure { what, declared: told(pair.0), library: told(pair.1), fails });
+        }
+    }
+}
+
+struct Compared<'f> {
+    ty: TypeName,
+    origin: Origin,
+    findings: &'f mut Findings,
+}
+
+impl Compared<'_> {
+    fn members<T>(
+        &mut self,
+        key: &str,
+        one: &str,
+        (declared, library): (&BTreeMap<Ident, T>, &BTreeMap<Ident, T>),
+        origin: impl Fn(&T) -> Origin,
+        compare: impl Fn(&T, &T) -> Departures,
+        needed: impl Fn(&T) -> Option<&'static str>,
+    ) {
+        let ty = self.ty;
+        for (name, own) in declared {
+            let path = format!("types.{ty}.{key}.{name}");
+            let Some(other) = library.get(name) else {
+                let message = format!("the library's `{ty}` has no {one} `{name}`");
+                self.tell(true, message, origin(own), path);
+                continue;
+            };
+            for Departure { what, declared, library, fails } in compare(own, other).0 {
+                let message = format!("`{ty}.{name}`: {what} is declared as {declared}, the library has {library}");
+                self.tell(fails, message, origin(own), path.clone());
+            }
+        }
+        for (name, other) in library.iter().filter(|(name, _)| !declared.contains_key(*name)) {
+            let path = format!("types.{ty}.{key}");
+            let needed = needed(other);
+            let why = needed.map_or_else(String::new, |why| format!(", which {why}"));
+            let message = format!("the library's `{ty}` has a {one} `{name}` that is not declared{why}");
+            self.tell(needed.is_some(), message, self.origin, path);
+        }
+    }
+
+    fn whole(&mut self, declared: &ComponentType, library: &ComponentType) {
+        let mut found = Departures::default();
+        let names = |list: &Vec<TypeName>| words(list.iter());
+        found.add("start_after", (&declared.start_after, &library.start_after), false, names);
+        found.add("stop_before", (&declared.stop_before, &library.stop_before), false, names);
+        found.add("actuator", (&declared.actuator, &library.actuator), false, bool::to_string);
+        found.add("moves", (&declared.moves, &library.moves), false, |moves| {
+            words([("start", moves.start), ("stop", moves.stop)].iter().filter(|(_, is)| *is).map(|(word, _)| *word))
+        });
+        found.add("irreversible", (&declared.irreversible, &library.irreversible), false, |lost| {
+            let all = [("configure", lost.configure), ("stop", lost.stop), ("destroy", lost.destroy)];
+            words(all.iter().filter(|(_, is)| *is).map(|(word, _)| *word))
+        });
+        for Departure { what, declared, library, fails } in found.0 {
+            let message = format!("`{}`: {what} is declared as {declared}, the library has {library}", self.ty);
+            self.tell(fails, message, self.origin, format!("types.{}.{what}", self.ty));
+        }
+    }
+
+    fn tell(&mut self, fails: bool, message: String, at: Origin, path: String) {
+        let make = if fails { Finding::error } else { Finding::warning };
+        let help = format!(
+            "the library's counts, as it is what runs: write what it has (`davit types {}` shows it), or leave the declaration out",
+            self.ty
+        );
+        self.findings.push(make(TYPE_DIFFERS, message).at(at).path(path).help(help));
+    }
+}
+
+fn port(declared: &PortType, library: &PortType) -> Departures {
+    let mut found = Departures::default();
+    found.add("the direction", (&declared.direction, &library.direction), true, |of| of.word().to_owned());
+    found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
+    // One without a unit may be connected to any.
+    found.add("the unit", (&declared.unit, &library.unit), library.unit.is_some(), unit);
+    found.add("buffered", (&declared.buffered, &library.buffered), true, bool::to_string);
+    found.add("required", (&declared.required, &library.required), false, bool::to_string);
+    found
+}
+
+fn property(declared: &PropertyType, library: &PropertyType) -> Departures {
+    let mut found = Departures::default();
+    found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
+    found.add("the unit", (&declared.unit, &library.unit), false, unit);
+    found.add("the default", (&declared.default, &library.default), library.default.is_none(), shown);
+    let narrower = |declared: Option<f64>, library: Option<f64>, is: fn(f64, f64) -> bool| {
+        library.is_some_and(|library| declared.is_none_or(|declared| is(library, declared)))
+    };
+    let bounds = [
+        ("min", declared.min, library.min, narrower(declared.min, library.min, |library, declared| library > declared)),
+        ("max", declared.max, library.max, narrower(declared.max, library.max, |library, declared| library < declared)),
+    ];
+    for (what, own, other, fails) in bounds {
+        found.add(what, (&own, &other), fails, shown);
+    }
+    // In the order of the run states in which it may be set.
+    let tunable = |of: &Tunable| format!("{of:?}").to_lowercase();
+    found.add("tunable", (&declared.tunable, &library.tunable), library.tunable < declared.tunable, tunable);
+    found
+}
+
+fn operation(declared: &OperationType, library: &OperationType) -> Departures {
+    let mut found = Departures::default();
+    let args =
+        |of: &Vec<ValueType>| format!("[{}]", of.iter().map(ValueType::to_string).collect::<Vec<_>>().join(", "));
+    found.add("args", (&declared.args, &library.args), true, args);
+    found.add("returns", (&declared.returns, &library.returns), false, shown);
+    found.add("the effect", (&declared.effect, &library.effect), false, |effect| match effect {
+        Effect::None => "none".to_owned(),
+        Effect::Undo(undo) => format!("undo: {undo}"),
+        Effect::Irreversible => "irreversible".to_owned(),
+    });
+    found.add("moves", (&declared.moves, &library.moves), false, bool::to_string);
+    if declared.settled_by != library.settled_by {
+        let told = |is: bool| if is { "one condition" } else { "none" }.to_owned();
+        let other = if library.settled_by.is_some() && declared.settled_by.is_some() { "another one" } else { "" };
+        let library = if other.is_empty() { told(library.settled_by.is_some()) } else { other.to_owned() };
+        let declared = told(declared.settled_by.is_some());
+        found.0.push(Departure { what: "settled_by", declared, library, fails: false });
+    }
+    found
+}
+
+fn unit(of: &Option<std::sync::Arc<str>>) -> String {
+    of.as_ref().map_or_else(|| "none".to_owned(), |unit| format!("`{unit}`"))
+}
+
+fn shown<T: Display>(of: &Option<T>) -> String {
+    of.as_ref().map_or_else(|| "none".to_owned(), ToString::to_string)
+}
+
+fn words<T: Display>(of: impl Iterator<Item = T>) -> String {
+    let all: Vec<String> = of.map(|word| word.to_string()).collect();
+    if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+}
