@@ -2,7 +2,8 @@
 
 use super::coordinator::ask_of;
 use super::members::Member;
-use crate::model::{Ask, ChangeKind, ConfigId, Configuration, Deployment, MemberRef};
+use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, MemberRef, StateList};
+use crate::stack::claims;
 use crate::statechart::RaiseSite;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -27,32 +28,28 @@ impl Aside {
             return Self::default();
         }
         let mut users: FxHashMap<MemberRef, usize> = FxHashMap::default();
+        let mut replaced: FxHashSet<ComponentName> = FxHashSet::default();
         for configuration in configurations {
             let ports: FxHashSet<MemberRef> = ports(configuration).collect();
             ports.into_iter().for_each(|port| *users.entry(port).or_default() += 1);
+            replaced.extend(configuration.changes.iter().filter_map(|change| match &change.kind {
+                ChangeKind::Replace { component, .. } => Some(*component),
+                _ => None,
+            }));
         }
-        let alone = |configuration: &Configuration| ports(configuration).all(|port| users[&port] == 1);
-        let plain =
-            |configuration: &Configuration| {
-                let makes = |kind: &ChangeKind| matches!(kind, ChangeKind::Create { .. } | ChangeKind::Destroy { .. });
-                let stays = configuration.post.iter().all(|post| {
-                    configuration.pre.iter().any(|pre| (pre.target, pre.state) == (post.target, post.state))
-                });
-                let brought = configuration.pre.iter().all(|pre| {
-                    configuration.post.iter().any(|post| (pre.target, pre.state) == (post.target, post.state))
-                });
-                let asks = |site: &&RaiseSite| ask_of(deployment, site.name) == Some(Ask::Apply(configuration.id));
-                let scoped = sites().filter(asks).all(|site| site.scoped);
-                scoped
-                    && !configuration.safe
-                    && configuration.group.is_none()
-                    && configuration.holds.is_none()
-                    && losable.iter().all(|(id, _)| *id != configuration.id)
-                    && !configuration.changes.iter().any(|change| makes(&change.kind))
-                    && stays
-                    && brought
-            };
-        Self { ids: configurations.iter().filter(|c| plain(c) && alone(c)).map(|c| c.id).collect() }
+        let scoped = |configuration: &Configuration| {
+            let asks = |site: &&RaiseSite| ask_of(deployment, site.name) == Some(Ask::Apply(configuration.id));
+            sites().filter(asks).all(|site| site.scoped)
+        };
+        let watched = |configuration: &Configuration| {
+            configuration.holds.is_some() || losable.iter().any(|(id, _)| *id == configuration.id)
+        };
+        let plain = |c: &&Configuration| {
+            let own = ports(c).all(|port| users[&port] == 1)
+                && claims::components(c).iter().all(|component| !replaced.contains(component));
+            own && scoped(c) && !watched(c) && !c.safe && c.group.is_none() && leaves_structure(c)
+        };
+        Self { ids: configurations.iter().filter(plain).map(|c| c.id).collect() }
     }
 
     /// How many configurations there are whose frames may be.
@@ -78,4 +75,18 @@ fn ports(configuration: &Configuration) -> impl Iterator<Item = MemberRef> + '_ 
         ChangeKind::PortWrite { port, .. } => Some(*port),
         _ => None,
     })
+}
+
+/// Whether a configuration changes nothing but values and connections: components and run states stay as they are.
+fn leaves_structure(configuration: &Configuration) -> bool {
+    use ChangeKind::{Connect, Disconnect, OperationCall, PortWrite, PropertySet};
+    let changes = configuration.changes.iter().all(|change| {
+        let kind = &change.kind;
+        matches!(
+            kind,
+            PropertySet { .. } | PortWrite { .. } | OperationCall { .. } | Connect { .. } | Disconnect { .. }
+        )
+    });
+    let states = |list: &StateList| list.iter().map(|entry| (entry.target, entry.state)).collect::<FxHashSet<_>>();
+    changes && states(&configuration.pre) == states(&configuration.post)
 }
