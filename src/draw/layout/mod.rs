@@ -7,7 +7,9 @@
 
 mod absolute;
 mod chains;
+mod laying;
 mod level;
+mod meeting;
 mod order;
 mod place;
 mod rank;
