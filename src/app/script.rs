@@ -139,7 +139,7 @@ fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure>
     };
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
-    guards.budget.interrupted_by(interrupt(host).asked());
+    guards.budget.count.interrupted_by(interrupt(host).asked());
     let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
     let chunk = chunk.set_mode(mlua::chunk::ChunkMode::Text);
     guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || chunk.exec()).map_err(failed)

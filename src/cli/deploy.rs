@@ -79,9 +79,9 @@ impl ClockKind {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         if self.detach {
-            return detach::run(context).map_err(|failure| failure.as_json(self.json));
+            return detach::run(context).map_err(|failure| failure.in_json(self.json));
         }
-        self.deploy(context).map_err(|failure| failure.as_json(self.json))
+        self.deploy(context).map_err(|failure| failure.in_json(self.json))
     }
 }
 

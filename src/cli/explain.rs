@@ -95,7 +95,7 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
     }
     let entries = schema::about(what);
     if entries.is_empty() {
-        return Err(unknown(what).as_json(json));
+        return Err(unknown(what).in_json(json));
     }
     if json {
         out.json(&entries);

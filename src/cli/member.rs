@@ -34,7 +34,7 @@ impl Run for GetArgs {
         let patience = Patience::within(self.within);
         let client = connect(self.which.name.as_deref());
         let seen = client.and_then(|mut client| client.call("get", &params, patience.left()).map_err(failure));
-        let seen = seen.map_err(|failure| failure.as_json(self.json))?;
+        let seen = seen.map_err(|failure| failure.in_json(self.json))?;
         let there = !seen["value"].is_null();
         if self.json {
             out.json(&seen);
@@ -91,7 +91,7 @@ impl Run for SetArgs {
             let mut client = connect(self.which.name.as_deref())?;
             client.call("get", &json!({ "name": self.member, "within_s": 0 }), patience.left()).map_err(failure)
         };
-        let seen = ask().map_err(|failure| failure.as_json(self.json))?;
+        let seen = ask().map_err(|failure| failure.in_json(self.json))?;
         let value = meant(&self.value, text(&seen["type"]));
         let params = json!({ "name": self.member, "value": value, "force": self.force });
         request(context, "set", params, &self.which, &self.wait, &patience, self.json)

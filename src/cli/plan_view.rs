@@ -1,6 +1,6 @@
 //! Plans as other programs see them.
 
-use super::plan::Planned;
+use crate::app::Application;
 use crate::model::{Ask, Snapshot};
 use crate::plan::{PlannedStep, Stage};
 use crate::system::{Reversibility, Undo};
@@ -25,7 +25,7 @@ pub struct PlanView<'a> {
 
 impl<'a> PlanView<'a> {
     /// The view of one application.
-    pub fn new(planned: &'a Planned) -> Self {
+    pub fn new(planned: &'a Application) -> Self {
         // The configuration that is applied, else the one that is undone.
         let applied = planned.asks.iter().find_map(|ask| match ask {
             Ask::Apply(id) => Some(id.to_string()),

@@ -50,7 +50,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.story(context).map_err(|failure| failure.as_json(json))
+        self.story(context).map_err(|failure| failure.in_json(json))
     }
 }
 

@@ -32,7 +32,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let out = &context.out;
-        let refused = |error| Err(failure(error).as_json(self.json));
+        let refused = |error| Err(failure(error).in_json(self.json));
         match &self.names[..] {
             [] => match look(None) {
                 Ok(Seen::Runs(status)) => {

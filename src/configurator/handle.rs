@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What a configurator is started with.
-pub struct Setup {
+pub struct ConfiguratorSetup {
     /// The configurations that may be asked for.
     pub configurations: Vec<Configuration>,
     /// Those of them that bring the system to rest when it is taken down by force, in this order.
@@ -57,7 +57,7 @@ pub struct Configurator;
 
 impl Configurator {
     /// Starts a configurator on a thread of its own, for a platform on which nothing of the deployment is yet.
-    pub fn start(setup: Setup) -> ConfiguratorHandle {
+    pub fn start(setup: ConfiguratorSetup) -> ConfiguratorHandle {
         let (post, inbox) = inbox::new(&setup.clock);
         let safe_in_order = setup.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
         let configurations: FxHashMap<ConfigId, Configuration> =
@@ -125,7 +125,7 @@ impl ConfiguratorHandle {
     /// Submits requests; never blocks.
     ///
     /// # Errors
-    /// [`Full`] when the queue is full or the configurator has ended; each request that found no room has then been answered
+    /// `Full` when the queue is full or the configurator has ended; each request that found no room has then been answered
     /// *failed*. What is safe has room of its own, also in a batch whose other requests find none.
     pub fn submit(&self, batch: Batch) -> Result<(), Full> {
         if batch.requests.is_empty() {

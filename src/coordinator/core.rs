@@ -150,8 +150,9 @@ impl Hook for Collect<'_> {
     }
 }
 
+#[cfg(any(test, feature = "internals"))]
 impl Core {
-    /// A coordinator that has not begun.
+    /// A coordinator that has not begun, of a chart without functions.
     pub fn new(chart: Arc<Chart>) -> Self {
         Self::with(chart, Nobody)
     }
@@ -167,11 +168,13 @@ impl<F: Hook> Core<F> {
     }
 
     /// The chart, as it was read.
+    #[cfg(any(test, feature = "internals"))]
     pub fn chart(&self) -> &Arc<Chart> {
         &self.chart
     }
 
     /// Where it stands.
+    #[cfg(any(test, feature = "internals"))]
     pub fn machine(&self) -> &Machine {
         &self.machine
     }

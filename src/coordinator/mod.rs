@@ -14,4 +14,4 @@ mod thread;
 
 pub use self::core::{Core, Delivered, Listener, Tag, Trouble};
 pub use inbox::{Class, Dropped, Incoming, Put, Refused};
-pub use thread::{Coordinator, Waited};
+pub use thread::Coordinator;

@@ -2,7 +2,7 @@
 
 use super::source_map::{FileId, Location, SourceMap};
 use crate::model::finding::count;
-use crate::model::{Finding, Origin, Severity, codes};
+use crate::model::{Finding, Origin, Severity};
 use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode,
     SourceSpan, SpanContents,
@@ -92,31 +92,6 @@ pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
         object
     };
     findings.iter().map(one).collect()
-}
-
-/// The page of a code, laid out for a terminal; none for an unknown code.
-pub fn explain(code: &str) -> Option<String> {
-    let page = codes::page(code)?;
-    let mut out = format!("davit::{}: {}\n\n", page.code, page.title);
-    for paragraph in page.text.split("\n\n") {
-        let mut width = 0;
-        for word in paragraph.split_whitespace() {
-            let length = word.chars().count();
-            if width > 0 && width + 1 + length > 80 {
-                out.push('\n');
-                width = 0;
-            } else if width > 0 {
-                out.push(' ');
-                width += 1;
-            }
-            out.push_str(word);
-            width += length;
-        }
-        out.push_str("\n\n");
-    }
-    out.truncate(out.trim_end().len());
-    out.push('\n');
-    Some(out)
 }
 
 /// The place of a finding: inside the element at fault, the first name that the message quotes, if it stands there.

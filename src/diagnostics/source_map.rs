@@ -186,7 +186,7 @@ impl SourceMap {
         Some((file, self.reach(origin, file, &span)))
     }
 
-    /// Where an origin stands; none for [`Origin::NONE`].
+    /// Where an origin stands; none for that of what no text has.
     pub fn locate(&self, origin: Origin) -> Option<Location> {
         let mut words = Vec::new();
         let mut at = origin;

@@ -8,7 +8,7 @@ use crate::model::EventName;
 use crate::model::statechart::FunctionId;
 use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printer, Queue, Said, Trace, View};
 use mlua::thread::ThreadStatus;
-use mlua::{Lua, LuaString, Result, Table, Value};
+use mlua::{Lua, LuaString, Result, Value};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -364,9 +364,4 @@ impl Hook for Calls {
         let text = format!("connectors lead round in a circle at {}: no path is taken", chart.fqn(connector));
         self.bound.voice.say(Printer::Err, &text);
     }
-}
-
-/// A table's address, by which machines and states are known.
-pub fn address(table: &Table) -> usize {
-    table.to_pointer() as usize
 }

@@ -1,10 +1,11 @@
 //! What the Lua part borrows from here: constructors that remember where they were called, and inner machines.
 
-use super::bound::{Bound, Refused};
-use super::calls::{Calls, address};
+use super::bound::{Bound, Status};
+use super::calls::Calls;
 use super::host::{Host, run};
 use super::lower::Spot;
 use super::merge::merge;
+use super::tables::{Refused, address};
 use super::values::to_json;
 use crate::limits;
 use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, Step};
@@ -53,12 +54,14 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let _loading = host.loading(&shown)?;
         Ok(run(lua, &shown, &text)?.pop_front().unwrap_or(Value::Nil))
     })?;
-    shared(lua, host, "json", |_, host, value: Value| Ok(to_json(&value, 0, &mut host.budget.steps())?.to_string()))?;
+    shared(lua, host, "json", |_, host, value: Value| {
+        Ok(to_json(&value, 0, &mut host.budget.count.steps())?.to_string())
+    })?;
     shared(lua, host, "bind", |lua, host, fsm: Table| {
         if host.machines.borrow().len() >= limits::INNER_MACHINES {
             return Ok(Some(format!("a coordinator makes at most {} machines", limits::INNER_MACHINES)));
         }
-        match Bound::new(lua, host, &fsm) {
+        match Bound::new(lua, (&host.budget, &host.voice), &host.native, &fsm) {
             Ok(bound) => {
                 host.machines.borrow_mut().insert(address(&fsm), Rc::new(bound));
                 Ok(None)
@@ -217,7 +220,7 @@ fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let Some(parent) = bound.tables().node_of(&parent) else {
             return Ok(Some("its parent is no state of this machine".to_owned()));
         };
-        let refused = merge(lua, host, &bound, (parent, &object), name.as_deref())?;
+        let refused = merge(lua, &host.native, &bound, (parent, &object), name.as_deref())?;
         if refused.is_none() {
             let mut status = bound.status.borrow_mut();
             status.outbox.iter_mut().for_each(|event| *event = bound.known_now(*event));
@@ -262,7 +265,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let bound = own(host, &fsm, "reset")?;
         let mut machine = taken(&bound)?;
         machine.reset(&bound.tables().chart);
-        *bound.status.borrow_mut() = super::bound::Status { room: limits::CHART_QUEUE, ..Default::default() };
+        *bound.status.borrow_mut() = Status { room: limits::CHART_QUEUE, ..Default::default() };
         bound.show_leaf(None);
         *bound.thread.borrow_mut() = None;
         *bound.machine.borrow_mut() = Some(machine);
@@ -335,8 +338,8 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
             return Err(error);
         }
         let searched = u32::try_from(machine.work().saturating_sub(before)).unwrap_or(u32::MAX);
-        if host.budget.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
-            return Err(host.budget.error());
+        if host.budget.count.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
+            return Err(host.budget.count.error());
         }
         let idle = match turn {
             Step::NotEntered => return Ok(false),

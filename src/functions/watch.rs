@@ -7,7 +7,7 @@
 //! `lua_sethook` in a signal handler ("can be called during a signal", `ldebug.c`; the interpreter's own Ctrl-C does it);
 //! from another thread it would be a data race.
 //!
-//! What is absent: verdicts (`budget.rs` counts and decides) and wall clocks: a thread that waits has no ticks. All that
+//! What is absent: verdicts (`count.rs` counts and decides) and wall clocks: a thread that waits has no ticks. All that
 //! touches Lua behind mlua's back is in this file and in `exact.rs`.
 
 use crate::limits;
@@ -226,7 +226,7 @@ unsafe extern "C-unwind" fn look(state: *mut lua_State, _: *mut ffi::lua_Debug) 
             instructions = limits::CALL_TICK_INSTRUCTIONS;
         }
         if (watch.look)(instructions) {
-            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
+            ffi::lua_pushstring(state, super::count::ENDED.as_ptr());
             ffi::lua_error(state)
         }
     }

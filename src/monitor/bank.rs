@@ -266,14 +266,6 @@ impl Bank {
         watch.program.clear();
     }
 
-    /// Whether a monitor is switched on.
-    ///
-    /// # Panics
-    /// When there is no monitor of that index.
-    pub fn is_enabled(&self, monitor: usize) -> bool {
-        self.watches[monitor].enabled
-    }
-
     /// What a monitor's condition was when last evaluated; none when it is off, or new.
     ///
     /// # Panics

@@ -109,20 +109,8 @@ pub struct Plan {
     pub warnings: Findings,
 }
 
-impl Plan {
-    /// Why the plan cannot be undone, if a step of it cannot.
-    pub fn irreversible(&self) -> Option<&str> {
-        irreversible(&self.steps)
-    }
-
-    /// The steps that undo the plan on the system it leads to, in order.
-    pub fn undo_steps(&self) -> impl Iterator<Item = &Step> {
-        self.steps.iter().rev().flat_map(|s| s.undo.steps())
-    }
-}
-
 /// The reason of the first step that cannot be undone.
-pub(crate) fn irreversible(steps: &[PlannedStep]) -> Option<&str> {
+pub fn irreversible(steps: &[PlannedStep]) -> Option<&str> {
     steps.iter().find_map(|s| match &s.undo {
         Undo::Irreversible(reason) => Some(reason.as_str()),
         _ => None,

@@ -146,17 +146,18 @@ impl Library {
     /// With the component type `C`, under the name that deployments use: `Gain`, `youbot.Dynamics`.
     ///
     /// # Panics
-    /// When the declaration is wrong; see [`Kind::of`].
+    /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with<C: Component>(mut self, type_name: &str) -> Self {
         self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
         self
     }
 
-    /// As [`Library::with`], with the promise of [`Kind::immediate`].
+    /// As [`Library::with`], with the promise that `C` does nothing but declare when it is made, and waits for nothing when it
+    /// is dropped: both are then done without a worker.
     ///
     /// # Panics
-    /// When the declaration is wrong; see [`Kind::of`].
+    /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with_immediate<C: Component>(self, type_name: &str) -> Self {
         self.with_kind(Kind::of::<C>(type_name).immediate())

@@ -316,8 +316,8 @@ pub type EventIn = In<EventName>;
 
 /// An in-port as the configurator sees it.
 pub trait InEnd: Send {
-    /// Makes connection `id`, and gives its writing end and the count of values lost.
-    fn open(&mut self, id: u64, policy: Policy) -> (Box<dyn Feed>, Option<Arc<AtomicU64>>);
+    /// Makes connection `id`, and gives its writing end.
+    fn open(&mut self, id: u64, policy: Policy) -> Box<dyn Feed>;
     /// Ends connection `id`.
     fn close(&mut self, id: u64);
     /// Takes the memory that writes need.
@@ -336,19 +336,19 @@ struct End<T> {
 const WRITTEN: u64 = 0;
 
 impl<T: PortValue> InEnd for End<T> {
-    fn open(&mut self, id: u64, policy: Policy) -> (Box<dyn Feed>, Option<Arc<AtomicU64>>) {
+    fn open(&mut self, id: u64, policy: Policy) -> Box<dyn Feed> {
         let wake = self.beat.is_event_driven().then(|| self.beat.clone());
         match policy {
             Policy::Data => {
                 let (writer, reader) = latest(Slot::EMPTY);
                 self.sender.add(id, Source::Data(reader));
-                (Box::new(Inlet { kind: InletKind::Data(writer), wake }), None)
+                Box::new(Inlet { kind: InletKind::Data(writer), wake })
             }
             Policy::Buffer(n) => {
                 let (producer, consumer) = rtrb::RingBuffer::new(n.max(1) as usize);
                 let lost = Arc::new(AtomicU64::new(0));
                 self.sender.add(id, Source::Fifo(consumer, lost.clone()));
-                (Box::new(Inlet { kind: InletKind::Fifo(producer, lost.clone()), wake }), Some(lost))
+                Box::new(Inlet { kind: InletKind::Fifo(producer, lost), wake })
             }
         }
     }
@@ -431,7 +431,7 @@ mod tests {
         let (mut input, mut in_end) = In::<f64>::new(&b);
         assert_eq!(input.get(), None);
         out.write(1.0);
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         assert_eq!(input.get(), None, "a connection carries what is written from now on");
         a.set_now(Time(1_000));
         out.write(2.0);
@@ -450,7 +450,7 @@ mod tests {
         assert!(in_end.write(Some(&Value::Float(7.0)), Time(3)));
         assert!(!in_end.write(Some(&Value::Bool(true)), Time(3)));
         assert_eq!(input.take(), Some(7.0));
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         assert_eq!(input.get(), None);
         out.write(1.0);
         assert_eq!(input.get(), Some(1.0));
@@ -469,8 +469,8 @@ mod tests {
         let (mut first, mut first_end) = Out::<i64>::new(&a);
         let (mut second, mut second_end) = Out::<i64>::new(&b);
         let (mut input, mut in_end) = In::<i64>::new(&c);
-        first_end.attach(1, in_end.open(1, Policy::Buffer(2)).0);
-        second_end.attach(2, in_end.open(2, Policy::Buffer(2)).0);
+        first_end.attach(1, in_end.open(1, Policy::Buffer(2)));
+        second_end.attach(2, in_end.open(2, Policy::Buffer(2)));
         for (t, value) in [(10, 1), (30, 3), (50, 5)] {
             a.set_now(Time(t));
             first.write(value);
@@ -486,7 +486,7 @@ mod tests {
         let (a, b) = (beat("a"), beat("b"));
         let (mut out, mut out_end) = Out::<[f64; 2]>::new(&a);
         let (mut input, mut in_end) = In::<nalgebra::Vector2<f64>>::new(&b);
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         out.write([1.0, 2.0]);
         assert_eq!(input.get(), Some(nalgebra::Vector2::new(1.0, 2.0)));
     }

@@ -71,8 +71,6 @@ pub struct Outstanding {
     pub ask: Ask,
     /// Who asked.
     pub by: String,
-    /// When.
-    pub at: Time,
 }
 
 /// What a name raised by a coordinator means.
@@ -277,7 +275,7 @@ impl Hub {
 
     /// A request of that number is made.
     pub fn requested(&self, id: RequestId, ask: Ask, by: &str) {
-        let outstanding = Outstanding { ask, by: by.to_owned(), at: self.clock.now() };
+        let outstanding = Outstanding { ask, by: by.to_owned() };
         self.lock().outstanding.insert(id, outstanding);
         self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
     }

@@ -295,7 +295,7 @@ pub struct StatusView {
     /// Events that found a coordinator's inbox, or its own queue, full, since the session began.
     pub dropped: Dropped,
     /// For how many seconds coordinators have been in one function, by name; those that have been for longer than
-    /// [`limits::REACTION_LONG`].
+    /// a second.
     pub slow: BTreeMap<String, f64>,
     /// Seconds of its clock since its start.
     pub at: f64,

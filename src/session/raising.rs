@@ -26,7 +26,7 @@ pub enum NotRaised {
     /// It begins the deployment, which is being stopped.
     #[error("{NO_MORE}")]
     Stopping,
-    /// [`Refused::Full`]: a coordinator that may hear it does not keep up.
+    /// A coordinator that may hear it does not keep up.
     #[error(transparent)]
     Refused(#[from] Refused),
 }
@@ -55,8 +55,8 @@ impl Session {
         self.deliver(event, from, 0, |name| to.contains(&name)).map(drop)
     }
 
-    /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
-    /// [forgotten](Hub::forget).
+    /// The same as [`raise`](Self::raise); the hub (`was_heard`) says with the number that this answers what became of it, until it is
+    /// forgotten.
     ///
     /// # Errors
     /// As [`Session::offer`].

@@ -7,20 +7,18 @@
 use super::doors::Doors;
 use super::owner::Owner;
 use super::place::{self, Known};
-use super::rpc;
 use super::serving::{Calls, Shared};
 use super::subscribers::{Subscribers, ToSubscribers};
 use super::tap::Hears;
 use crate::limits;
 use crate::time::{Clock, lock};
-use serde_json::Value as Json;
 use std::fs;
 use std::io;
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
@@ -112,13 +110,15 @@ impl ControlSocket {
     }
 
     /// Where it listens.
-    pub fn path(&self) -> &Path {
+    #[cfg(any(test, feature = "internals"))]
+    pub fn path(&self) -> &std::path::Path {
         &self.path
     }
 
     /// Sends a notification to all subscribers; never waits.
-    pub fn notify(&self, method: &str, params: &Json) {
-        self.shared.subscribers.send(&rpc::notification(method, params));
+    #[cfg(any(test, feature = "internals"))]
+    pub fn notify(&self, method: &str, params: &serde_json::Value) {
+        self.shared.subscribers.send(&super::rpc::notification(method, params));
     }
 
     /// What to give to a session on `clock`, so that the subscribers hear all that happens.

@@ -188,6 +188,7 @@ impl<T> Tap<T> {
     }
 
     /// How many wait.
+    #[cfg(any(test, feature = "internals"))]
     pub fn waiting(&self) -> usize {
         lock(&self.end.0.state).queue.len()
     }

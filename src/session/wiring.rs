@@ -11,7 +11,7 @@ use super::routes::{Junction, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use super::steps::Steps;
 use crate::configurator::{
-    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, View,
+    Batch, Conditions, Configurator, ConfiguratorHandle, ConfiguratorSetup, Request, Requester, View,
 };
 use crate::coordinator::Dropped;
 use crate::functions::Opener;
@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// What a session is made of.
-pub struct Setup {
+pub struct SessionSetup {
     /// The deployment; it has been checked.
     pub deployment: Arc<Deployment>,
     /// Its coordinators, compiled, in the order of [`Deployment::coordinators`].
@@ -70,8 +70,8 @@ pub struct Session {
 
 impl Session {
     /// Starts the threads of a deployment; nothing happens until it is brought up.
-    pub fn start(setup: Setup) -> Arc<Self> {
-        let Setup { deployment, charts, functions, catalogue, platform, clock } = setup;
+    pub fn start(setup: SessionSetup) -> Arc<Self> {
+        let SessionSetup { deployment, charts, functions, catalogue, platform, clock } = setup;
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();

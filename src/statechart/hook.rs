@@ -37,8 +37,6 @@ pub enum Place {
 pub struct View<'a> {
     /// The chart.
     pub chart: &'a Chart,
-    /// The active states, from the root inwards.
-    pub active: &'a [NodeId],
     /// The active leaf; while a transition is under way as rFSM tells it: on exit still the old one, on entry none.
     pub leaf: Option<NodeId>,
     /// The events of this step.

@@ -292,11 +292,11 @@ impl Machine {
     }
 
     pub(super) fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
-        View { chart, active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
+        View { chart, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
     }
 
     fn find(&mut self, chart: &Chart, node: u32, hook: &mut impl Hook) -> u32 {
-        let mut around = Around { active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue };
+        let mut around = Around { leaf: self.leaf, events: &self.events, queue: &mut self.queue };
         self.search.from(chart, node, &mut around, hook)
     }
 

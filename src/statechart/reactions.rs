@@ -10,7 +10,7 @@ use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NodeId, Span};
 use super::hook::{Hook, Nobody, Raised};
 use super::machine::Machine;
-use super::outcome::{Ended, Mode, Step, Stepped};
+use super::outcome::{Mode, Step};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::time::Time;
@@ -164,26 +164,6 @@ impl Machine {
         } else {
             AtOnce::Goes
         }
-    }
-
-    /// One event, then to rest: [`send`](Self::send) and [`run`](Self::run) in one, and faster where the reaction is known.
-    /// An event for which the queue has no room is dropped and counted.
-    #[inline]
-    pub fn react<H: Hook>(&mut self, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
-        match self.at_once(chart, event, now, hook) {
-            AtOnce::Rests => Stepped { idle: true, transition: true, ended: Ended::Idle },
-            begun => self.react_on(begun, chart, event, now, hook),
-        }
-    }
-
-    /// The rest of a reaction that does not rest at once. Apart, so that the short way needs no registers for it.
-    #[inline(never)]
-    fn react_on<H: Hook>(&mut self, begun: AtOnce, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
-        if begun == AtOnce::Goes {
-            return Stepped { transition: true, ..self.run(chart, now, hook) };
-        }
-        self.send(event);
-        self.run(chart, now, hook)
     }
 }
 

@@ -48,7 +48,6 @@ const OPEN: u32 = NONE - 1;
 
 /// What the functions called by a search may see.
 pub(super) struct Around<'a> {
-    pub active: &'a [NodeId],
     pub leaf: Option<NodeId>,
     pub events: &'a [EventId],
     pub queue: &'a mut Queue,
@@ -56,7 +55,7 @@ pub(super) struct Around<'a> {
 
 impl Around<'_> {
     fn view<'v>(&'v mut self, chart: &'v Chart) -> View<'v> {
-        View { chart, active: self.active, leaf: self.leaf, events: self.events, queue: self.queue }
+        View { chart, leaf: self.leaf, events: self.events, queue: self.queue }
     }
 }
 

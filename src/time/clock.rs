@@ -130,7 +130,7 @@ impl Clock {
     }
 
     /// Blocks for ever: what a component that hangs does in a test. When the clock is [shut down](Clock::shutdown) the
-    /// call unwinds (with [`Released`] as its payload and without a word on stderr), so that no thread is left behind.
+    /// call unwinds (with `Released` as its payload and without a word on stderr), so that no thread is left behind.
     pub fn hang(&self) -> ! {
         match &*self.0 {
             Kind::Real(real) => {

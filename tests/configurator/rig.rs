@@ -196,7 +196,7 @@ impl Rig {
         let sink = answers.clone();
         let progress: Arc<Mutex<Vec<Progress>>> = Arc::default();
         let told = progress.clone();
-        let handle = Configurator::start(Setup {
+        let handle = Configurator::start(ConfiguratorSetup {
             operator: configurations.iter().map(|c| c.id).collect(),
             configurations,
             rest: Vec::new(),

@@ -22,6 +22,8 @@ pub struct Scripted {
     pub polled: usize,
     pub go_on: usize,
     pub sets: Vec<Vec<String>>,
+    /// The active states, from the root inwards.
+    path: Vec<NodeId>,
 }
 
 /// What a scripted `doo` answers.
@@ -49,10 +51,12 @@ impl Scripted {
 impl Hook for Scripted {
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         self.log.push(format!("{}+", chart.name(state)));
+        self.path.push(state);
     }
 
     fn exited(&mut self, chart: &Chart, state: NodeId) {
         self.log.push(format!("{}-", chart.name(state)));
+        self.path.pop();
     }
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
@@ -83,7 +87,7 @@ impl Hook for Scripted {
     }
 
     fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
-        let active = view.active.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
+        let active = self.path.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
         let leaf = view.leaf.map_or("none".to_owned(), |n| view.chart.name(n).to_string());
         let place = match place {
             Place::Entry(_) => "entry",

@@ -173,6 +173,7 @@ impl Drives {
     }
 
     /// Whether positions are known.
+    #[cfg(test)]
     pub fn calibrated(&self) -> bool {
         self.calibrated
     }

@@ -37,9 +37,6 @@ pub const RANGE_LOWER_DEG: [f64; JOINTS] = [-169.0, -65.0, -151.0, -102.5, -167.
 /// Upper ends of the joint ranges, in degrees (U, counted from candle).
 pub const RANGE_UPPER_DEG: [f64; JOINTS] = [169.0, 90.0, 146.0, 102.5, 167.5];
 
-/// Driver angle minus candle angle, in rad (R, T): what the driver reads in the candle pose.
-pub const CANDLE_OFFSET: [f64; JOINTS] = [2.9496, 1.1344, -2.5481, 1.7889, 2.9234];
-
 /// From the frame of joint 5 to the gripper's centre of mass, which is the tool point, in m (R: 0.05716 + 0.0289).
 pub const TOOL_OFFSET: [f64; 3] = [0.0, 0.0, 0.05716 + 0.0289];
 
@@ -108,12 +105,6 @@ pub const SPEED_LIMIT: f64 = 1.571;
 
 /// Gravity, in m/s².
 pub const GRAVITY: f64 = 9.81;
-
-/// Wheel radius, in m (Dv).
-pub const WHEEL_RADIUS: f64 = 0.0475;
-
-/// Half of wheel base plus half of track, in m (Dv: (0.47 + 0.30) / 2).
-pub const WHEEL_LEVER: f64 = 0.385;
 
 /// Time constant with which the base follows a commanded twist, in s (assumed; not identified in any source).
 pub const BASE_LAG: f64 = 0.1;

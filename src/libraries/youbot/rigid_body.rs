@@ -150,6 +150,7 @@ impl ArmModel {
     }
 
     /// Potential energy, in J, zero at the arm's base plane.
+    #[cfg(test)]
     pub fn potential(&self, at: &Posture) -> f64 {
         (0..JOINTS)
             .map(|i| self.links[i].mass * GRAVITY * (at.origins[i] + at.rotations[i] * self.links[i].com).z)
