@@ -7,7 +7,7 @@ use super::keep::Keep;
 use super::last_words;
 use super::output::{Output, Style};
 use super::progress::Progress;
-use super::signals::Watch;
+use super::signals::SignalWatch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED};
@@ -205,7 +205,7 @@ fn watch(
     progress: &Progress,
     leaving: &Leaving,
     in_background: bool,
-) -> Result<Watch, Failure> {
+) -> Result<SignalWatch, Failure> {
     let stop = {
         let (session, progress) = (Arc::downgrade(session), progress.clone());
         move |force| {
@@ -224,7 +224,7 @@ fn watch(
             progress.finish();
         }
     };
-    Watch::start(in_background, stop, leave).map_err(unwatched)
+    SignalWatch::start(in_background, stop, leave).map_err(unwatched)
 }
 
 /// Signals cannot be watched.

@@ -26,7 +26,7 @@ pub struct Args {
     ids: Vec<String>,
     /// What to draw.
     #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
-    what: What,
+    what: Drawn,
     /// The format.
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
@@ -48,7 +48,7 @@ pub struct Args {
 
 /// What is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-enum What {
+enum Drawn {
     /// Components, ports and connections.
     #[default]
     Components,
@@ -78,8 +78,8 @@ enum Format {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
-        let picture = if what == What::Coordinator {
+        let what = if is_deployment(&self.file) { self.what } else { Drawn::Coordinator };
+        let picture = if what == Drawn::Coordinator {
             let mut all = coordinators(&self.file, &self.parameters, self.of.as_deref(), &[])?;
             if all.len() > 1 {
                 return self.several(context, &all);
@@ -113,7 +113,7 @@ impl Run for Args {
                 context.out.findings(&wrong_in_others(&read, told), &read.sources);
             };
             match what {
-                What::Plan => {
+                Drawn::Plan => {
                     let plans = if self.ids.is_empty() { plan_way(&read, Until::Up) } else { plan(&read, &self.ids) };
                     tell_others(plans.as_ref().err());
                     let plans: Vec<_> = plans

@@ -6,7 +6,7 @@ use super::input::Parameters;
 use super::last_words;
 use super::output::Style;
 use super::progress::Progress;
-use super::signals::{self, Watch};
+use super::signals::{self, SignalWatch};
 use super::{Answer, Context, Failure, Run};
 use crate::app::Extensions;
 use crate::app::script::{self, Door, Interrupt, Options, ScriptFailure};
@@ -74,7 +74,7 @@ impl Args {
                 interrupt.stop(force);
                 stopped.line(signals::told(force));
             };
-            Watch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
+            SignalWatch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
         };
         let end = script::run(
             &self.script,

@@ -105,7 +105,7 @@ impl Args {
         let out = &context.out;
         let mut exit = Exit::Done;
         // An input may have no end.
-        let mut lines = Lines { input: BufReader::new(input), left: SIM_BYTES };
+        let mut lines = SimLines { input: BufReader::new(input), left: SIM_BYTES };
         while !output::arrives_nowhere() {
             let line = match lines.next() {
                 Ok(None) => break,
@@ -141,12 +141,12 @@ impl Args {
 }
 
 /// Lines of a text that may have no end.
-struct Lines {
+struct SimLines {
     input: BufReader<Box<dyn Read>>,
     left: u64,
 }
 
-impl Lines {
+impl SimLines {
     fn next(&mut self) -> io::Result<Option<String>> {
         let mut line = Vec::new();
         let read = (&mut self.input).take(SIM_LINE as u64 + 1).read_until(b'\n', &mut line)?;

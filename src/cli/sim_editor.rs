@@ -14,9 +14,9 @@ use std::rc::Rc;
 
 /// Completes words as the session knows them.
 #[derive(Helper, Highlighter, Hinter, Validator)]
-struct Words<C: Fn(&str) -> (usize, Vec<String>)>(C);
+struct SimWords<C: Fn(&str) -> (usize, Vec<String>)>(C);
 
-impl<C: Fn(&str) -> (usize, Vec<String>)> Completer for Words<C> {
+impl<C: Fn(&str) -> (usize, Vec<String>)> Completer for SimWords<C> {
     type Candidate = String;
 
     fn complete(&self, line: &str, at: usize, _: &rustyline::Context<'_>) -> rustyline::Result<(usize, Vec<String>)> {
@@ -39,7 +39,7 @@ pub fn edit<'c, F: Hook>(context: &Context, make: impl Fn() -> Result<Sim<'c, F>
     let config = Config::builder().max_history_size(crate::limits::SIM_LINES).map_err(|e| unreadable(&e))?.build();
     let mut editor = Editor::with_config(config).map_err(|e| unreadable(&e))?;
     let known = session.clone();
-    editor.set_helper(Some(Words(move |line: &str| known.borrow().complete(line))));
+    editor.set_helper(Some(SimWords(move |line: &str| known.borrow().complete(line))));
     let out = &context.out;
     out.line("a line is a set of events; Tab completes; `help` lists the commands; Ctrl-D ends");
     loop {

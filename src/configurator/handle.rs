@@ -94,8 +94,14 @@ impl Configurator {
             World::new(System::new(Arc::new(setup.catalogue)), stack),
         );
         let thread = setup.clock.spawn("configurator", move || engine.live());
-        let inner =
-            Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };
+        let inner = HandleInner {
+            post,
+            clock: setup.clock,
+            safe,
+            awaited,
+            answers: setup.answers,
+            thread: Mutex::new(Some(thread)),
+        };
         ConfiguratorHandle { inner: Arc::new(inner) }
     }
 }
@@ -103,10 +109,10 @@ impl Configurator {
 /// A running configurator. Cheap to clone; when the last clone is dropped it ends.
 #[derive(Clone)]
 pub struct ConfiguratorHandle {
-    inner: Arc<Inner>,
+    inner: Arc<HandleInner>,
 }
 
-struct Inner {
+struct HandleInner {
     post: Post,
     clock: Clock,
     safe: FxHashSet<ConfigId>,
@@ -115,7 +121,7 @@ struct Inner {
     thread: Mutex<Option<Join>>,
 }
 
-impl Drop for Inner {
+impl Drop for HandleInner {
     fn drop(&mut self) {
         self.post.command(InTurn::Stop);
     }

@@ -38,7 +38,7 @@ pub(super) enum Whose {
     Safe,
 }
 
-struct Job {
+struct PoolJob {
     ticket: Ticket,
     call: Call,
     deadline: Time,
@@ -48,7 +48,7 @@ pub(super) struct Pool {
     clock: Clock,
     platform: Arc<dyn Platform>,
     post: Post,
-    jobs: (Sender<Job>, Receiver<Job>),
+    jobs: (Sender<PoolJob>, Receiver<PoolJob>),
     /// Workers that wait for a job or are at one, not counting those given up.
     workers: usize,
     busy: usize,
@@ -148,7 +148,7 @@ impl Pool {
             self.hire();
         }
         if let Err(TrySendError::Full(job) | TrySendError::Closed(job)) =
-            self.jobs.0.try_send(Job { ticket, call, deadline })
+            self.jobs.0.try_send(PoolJob { ticket, call, deadline })
         {
             self.refuse(ticket, &job.call, "no worker is free");
         }
@@ -203,7 +203,7 @@ impl Pool {
     fn hire(&mut self) {
         let (jobs, post, platform) = (self.jobs.1.clone(), self.post.clone(), self.platform.clone());
         let worker = move || {
-            while let Ok(Job { ticket, call, deadline }) = jobs.recv() {
+            while let Ok(PoolJob { ticket, call, deadline }) = jobs.recv() {
                 post.send(Mail::Reply(ticket, perform(&*platform, call, deadline)));
             }
         };

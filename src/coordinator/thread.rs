@@ -16,10 +16,10 @@ use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 /// are gone.
 #[derive(Clone)]
 pub struct Coordinator {
-    shared: Arc<Shared>,
+    shared: Arc<CoordinatorShared>,
 }
 
-struct Shared {
+struct CoordinatorShared {
     clock: Clock,
     chart: Arc<Chart>,
     /// The chart, once a model with functions has added to it.
@@ -63,7 +63,7 @@ impl Coordinator {
         open: impl FnOnce() -> Result<F, String> + Send + 'static,
     ) -> Self {
         let inbox = Inbox::new(chart.events().iter().copied());
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(CoordinatorShared {
             clock: clock.clone(),
             chart,
             grown: OnceLock::new(),
@@ -199,7 +199,7 @@ impl std::fmt::Debug for Coordinator {
     }
 }
 
-impl Shared {
+impl CoordinatorShared {
     fn leaf(&self) -> Option<NodeId> {
         let number = self.leaf.load(Ordering::SeqCst).checked_sub(1)?;
         self.chart.node(number).or_else(|| self.chart().node(number))
@@ -241,7 +241,7 @@ impl Shared {
                 return Err(format!("its functions cannot be run: {text}"));
             }
         };
-        let mut listener = Told { shared: self, listener };
+        let mut listener = Publisher { shared: self, listener };
         let began = self.clock.now();
         self.react(began, || {
             core.start(began, &mut listener);
@@ -320,12 +320,12 @@ impl Round {
 }
 
 /// Between core and listener: publishes where the chart stands, and lets nothing through once detached.
-struct Told<'a, L> {
-    shared: &'a Shared,
+struct Publisher<'a, L> {
+    shared: &'a CoordinatorShared,
     listener: &'a mut L,
 }
 
-impl<L> Told<'_, L> {
+impl<L> Publisher<'_, L> {
     /// Calls the listener, unless the coordinator has been detached: that waits for the end of the call.
     fn tell(&mut self, call: impl FnOnce(&mut L)) {
         let _telling = lock(&self.shared.telling);
@@ -335,7 +335,7 @@ impl<L> Told<'_, L> {
     }
 }
 
-impl<L: Listener> Listener for Told<'_, L> {
+impl<L: Listener> Listener for Publisher<'_, L> {
     fn raised(&mut self, chart: &Chart, batch: &[Raised]) {
         self.tell(|listener| listener.raised(chart, batch));
     }

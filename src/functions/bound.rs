@@ -49,7 +49,7 @@ pub struct Bound {
     /// Resumes the coroutine of a `doo`.
     pub go_on: Function,
     /// Words that functions are called with.
-    pub words: Words,
+    pub words: CallWords,
     /// The model has a `dbg` printer of its own.
     pub traces: Cell<bool>,
     /// The printer of those that have none.
@@ -66,7 +66,7 @@ pub struct Bound {
 }
 
 /// Words that functions are called with.
-pub struct Words {
+pub struct CallWords {
     pub entry: LuaString,
     pub exit: LuaString,
     pub effect: LuaString,
@@ -104,7 +104,7 @@ impl Bound {
             shown_leaf: Cell::new(None),
             thread: RefCell::default(),
             events: RefCell::default(),
-            words: Words {
+            words: CallWords {
                 entry: word("entry")?,
                 exit: word("exit")?,
                 effect: word("effect")?,

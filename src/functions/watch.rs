@@ -20,9 +20,9 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering::Relaxed, compiler_fence};
 
 /// A thread of Lua that runs, or that waits for one it resumed. Lives on the stack for so long.
-struct Running {
+struct RunningThread {
     state: *mut lua_State,
-    resumed_by: *mut Running,
+    resumed_by: *mut RunningThread,
 }
 
 /// Watches the calls of one Lua state.
@@ -41,9 +41,9 @@ pub struct Watch {
     seen: AtomicU64,
     counting: AtomicBool,
     /// The innermost one that runs.
-    running: AtomicPtr<Running>,
+    running: AtomicPtr<RunningThread>,
     /// Held for as long as it ticks.
-    timer: Option<Timer>,
+    timer: Option<TickTimer>,
 }
 
 thread_local! {
@@ -63,10 +63,14 @@ impl Watch {
     /// Watches the calls of `lua` on this thread from now on; `look` is told of every so many instructions of a call that
     /// takes long. None: the operating system gives no timer.
     pub fn start(lua: &Lua, look: impl Fn(u32) -> bool + 'static) -> Option<Self> {
-        Self::with(lua, look, Timer::start).filter(|watch| watch.timer.is_some())
+        Self::with(lua, look, TickTimer::start).filter(|watch| watch.timer.is_some())
     }
 
-    fn with(lua: &Lua, look: impl Fn(u32) -> bool + 'static, timer: impl FnOnce() -> Option<Timer>) -> Option<Self> {
+    fn with(
+        lua: &Lua,
+        look: impl Fn(u32) -> bool + 'static,
+        timer: impl FnOnce() -> Option<TickTimer>,
+    ) -> Option<Self> {
         CURRENT.with(|_| ());
         let mut main = ptr::null_mut();
         let asked: Result<()> = {
@@ -115,7 +119,7 @@ impl Watch {
         }
         // Held while the handler may look at the state.
         let Some(lua) = self.lua.try_upgrade() else { return call() };
-        let mut main = Running { state: self.main, resumed_by: ptr::null_mut() };
+        let mut main = RunningThread { state: self.main, resumed_by: ptr::null_mut() };
         self.calls.set(self.calls.get().wrapping_add(1));
         self.running.store(&raw mut main, Relaxed);
         let before = CURRENT.with(|current| current.swap(ptr::from_ref(self).cast_mut(), Relaxed));
@@ -158,7 +162,7 @@ impl Watch {
 
     /// Resumes or closes a thread of Lua: while `resume` runs, ticks reach it too. It must not leave by a jump of Lua's.
     fn entered<R>(&self, state: *mut lua_State, resume: impl FnOnce() -> R) -> R {
-        struct Leave<'a>(&'a Watch, *mut Running);
+        struct Leave<'a>(&'a Watch, *mut RunningThread);
         impl Drop for Leave<'_> {
             fn drop(&mut self) {
                 self.0.running.store(self.1, Relaxed);
@@ -166,7 +170,7 @@ impl Watch {
             }
         }
         let resumed_by = self.running.load(Relaxed);
-        let mut entry = Running { state, resumed_by };
+        let mut entry = RunningThread { state, resumed_by };
         compiler_fence(std::sync::atomic::Ordering::SeqCst);
         self.running.store(&raw mut entry, Relaxed);
         compiler_fence(std::sync::atomic::Ordering::SeqCst);
@@ -288,9 +292,9 @@ pub fn functions(lua: &Lua) -> Result<(Function, Function)> {
 }
 
 /// A timer that signals this thread after every [`limits::CALL_TICK`] of its processor time.
-struct Timer(libc::timer_t);
+struct TickTimer(libc::timer_t);
 
-impl Timer {
+impl TickTimer {
     fn start() -> Option<Self> {
         let signal = signal()?;
         let period = libc::timespec { tv_sec: 0, tv_nsec: limits::CALL_TICK.subsec_nanos().into() };
@@ -312,7 +316,7 @@ impl Timer {
     }
 }
 
-impl Drop for Timer {
+impl Drop for TickTimer {
     fn drop(&mut self) {
         // SAFETY: made by `start`, deleted once. A signal that is still on its way finds no call under way.
         unsafe { libc::timer_delete(self.0) };

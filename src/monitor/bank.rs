@@ -106,14 +106,14 @@ pub struct Bank {
     /// Of which the value matters, not only when it comes.
     valued: Vec<bool>,
     samples: Vec<Sample>,
-    watches: Vec<Watch>,
+    watches: Vec<WatchedMonitor>,
     last: Time,
     troubles: Troubles,
 }
 
 /// One monitor at work.
 #[derive(Debug, Clone)]
-struct Watch {
+struct WatchedMonitor {
     program: Program,
     /// Its inputs in the bank, and what they held when it was last evaluated.
     slots: Box<[usize]>,
@@ -182,7 +182,7 @@ impl Bank {
                     slot
                 })
                 .collect();
-            Watch {
+            WatchedMonitor {
                 program,
                 held: vec![Sample::default(); slots.len()].into(),
                 slots,
@@ -286,7 +286,7 @@ impl Bank {
     /// When a step is due though no sample comes: a time passes, a rate falls, an event is to be repeated, a monitor that
     /// runs at a rate has its turn. Never before the last step.
     pub fn next_wake(&self) -> Option<Time> {
-        let times = self.watches.iter().filter(|w| w.enabled).map(Watch::wake);
+        let times = self.watches.iter().filter(|w| w.enabled).map(WatchedMonitor::wake);
         times.min().filter(|wake| *wake != Time::NEVER).map(|wake| wake.max(self.last))
     }
 
@@ -315,7 +315,7 @@ fn time_of(position: u64) -> Time {
     if position == u64::MAX { Time::NEVER } else { Time(position / 2 + position % 2) }
 }
 
-impl Watch {
+impl WatchedMonitor {
     fn wake(&self) -> Time {
         match (self.verdict, self.sampling) {
             (None, _) => self.waits,

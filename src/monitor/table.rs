@@ -31,21 +31,21 @@ pub struct Columns {
 }
 
 /// A cell: its text without blanks and quotes, and where it stands, in bytes.
-struct Cell<'a> {
+struct TableCell<'a> {
     text: &'a str,
     start: usize,
 }
 
 /// The cells of a line.
-fn cells(line: &str) -> impl Iterator<Item = Cell<'_>> {
+fn cells(line: &str) -> impl Iterator<Item = TableCell<'_>> {
     line.split(',').map(move |raw| {
         let trimmed = raw.trim();
         let text = trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed);
-        Cell { text, start: text.as_ptr() as usize - line.as_ptr() as usize }
+        TableCell { text, start: text.as_ptr() as usize - line.as_ptr() as usize }
     })
 }
 
-fn problem(code: Code, line: &str, cell: &Cell<'_>, message: String, help: impl Into<String>) -> Problem {
+fn problem(code: Code, line: &str, cell: &TableCell<'_>, message: String, help: impl Into<String>) -> Problem {
     let count = |text: &str| u32::try_from(text.chars().count()).unwrap_or(u32::MAX);
     Problem { code, message, column: count(&line[..cell.start]), length: count(cell.text).max(1), help: help.into() }
 }
@@ -67,7 +67,8 @@ impl Columns {
     /// When there is no column `time`, or a name is missing or stands twice.
     pub fn new(line: &str) -> Result<Self, Problem> {
         let line = clean(line);
-        let wrong = |cell: &Cell<'_>, message: String, help: &str| problem(SAMPLES_COLUMNS, line, cell, message, help);
+        let wrong =
+            |cell: &TableCell<'_>, message: String, help: &str| problem(SAMPLES_COLUMNS, line, cell, message, help);
         let mut names: Vec<String> = Vec::new();
         for cell in cells(line) {
             if cell.text.is_empty() {
@@ -87,7 +88,7 @@ impl Columns {
             names.push(cell.text.to_owned());
         }
         let Some(time) = names.iter().position(|name| name == "time") else {
-            let whole = Cell { text: line, start: 0 };
+            let whole = TableCell { text: line, start: 0 };
             let help = if names.len() == 1 && line.contains([';', '\t']) {
                 "columns are separated by commas"
             } else {
@@ -153,7 +154,7 @@ impl Columns {
             }
         }
         if count != self.names.len() {
-            let whole = Cell { text: line, start: 0 };
+            let whole = TableCell { text: line, start: 0 };
             let message = format!("this line has {count} cells, the first one {}", self.names.len());
             let help = "every line has as many cells as there are columns; one without a new sample is left empty";
             return Err(problem(SAMPLES_COLUMNS, line, &whole, message, help));

@@ -66,7 +66,7 @@ pub struct In<T> {
     beat: Option<Arc<Beat>>,
 }
 
-enum Found {
+enum FoundSource {
     Data,
     Fifo,
     Written,
@@ -82,34 +82,34 @@ impl<T: PortValue> In<T> {
     pub(crate) fn new(beat: &Arc<Beat>) -> (Self, Box<dyn InEnd>) {
         let (sender, list) = links();
         let port = Self { links: list, popped: Slot::EMPTY, beat: Some(beat.clone()) };
-        (port, Box::new(End::<T> { sender, written: None, beat: beat.clone() }))
+        (port, Box::new(InPortEnd::<T> { sender, written: None, beat: beat.clone() }))
     }
 
     /// Reads: the value, when it was written, and whether it has been read before.
     pub fn sample(&mut self) -> Option<Sample<'_, T>> {
         self.links.refresh();
-        let mut found = Found::Nothing;
+        let mut found = FoundSource::Nothing;
         for link in self.links.iter_mut() {
             match link {
                 Source::Data(_) => {
-                    found = Found::Data;
+                    found = FoundSource::Data;
                     break;
                 }
                 Source::Fifo(..) => {
-                    found = Found::Fifo;
+                    found = FoundSource::Fifo;
                     break;
                 }
-                Source::Written(_) => found = Found::Written,
+                Source::Written(_) => found = FoundSource::Written,
             }
         }
         let (slot, fresh) = match found {
-            Found::Nothing => return None,
-            Found::Fifo => {
+            FoundSource::Nothing => return None,
+            FoundSource::Fifo => {
                 let fresh = self.pop();
                 (&self.popped, fresh)
             }
-            Found::Data | Found::Written => {
-                let data = matches!(found, Found::Data);
+            FoundSource::Data | FoundSource::Written => {
+                let data = matches!(found, FoundSource::Data);
                 let reader = self.links.iter_mut().find_map(|link| match link {
                     Source::Data(reader) if data => Some(reader),
                     Source::Written(reader) if !data => Some(reader),
@@ -240,14 +240,14 @@ impl<T: PortValue> Feed for Inlet<T> {
     }
 }
 
-enum Target<T> {
+enum PortTarget<T> {
     Same(Inlet<T>),
     Converted(Box<dyn Feed>),
 }
 
 /// An out-port. A write goes to all its connections; without any it goes nowhere.
 pub struct Out<T> {
-    links: Links<Target<T>>,
+    links: Links<PortTarget<T>>,
     beat: Option<Arc<Beat>>,
 }
 
@@ -257,7 +257,7 @@ impl<T: PortValue> Out<T> {
     }
 
     pub(crate) fn new(beat: &Arc<Beat>) -> (Self, Box<dyn OutEnd>) {
-        let (sender, list) = links::<Target<T>>();
+        let (sender, list) = links::<PortTarget<T>>();
         (Self { links: list, beat: Some(beat.clone()) }, Box::new(sender))
     }
 
@@ -279,8 +279,8 @@ impl<T: PortValue> Out<T> {
         self.links.refresh();
         for link in self.links.iter_mut() {
             match link {
-                Target::Same(inlet) => inlet.put(value, at),
-                Target::Converted(feed) => feed.put_value(&value.to_value(), at),
+                PortTarget::Same(inlet) => inlet.put(value, at),
+                PortTarget::Converted(feed) => feed.put_value(&value.to_value(), at),
             }
         }
     }
@@ -326,7 +326,7 @@ pub trait InEnd: Send {
     fn write(&mut self, value: Option<&Value>, at: Time) -> bool;
 }
 
-struct End<T> {
+struct InPortEnd<T> {
     sender: Sender<Source<T>>,
     written: Option<Writer<Slot<T>>>,
     beat: Arc<Beat>,
@@ -335,7 +335,7 @@ struct End<T> {
 /// The number of the pseudo-connection that carries written values; connections are counted from 1.
 const WRITTEN: u64 = 0;
 
-impl<T: PortValue> InEnd for End<T> {
+impl<T: PortValue> InEnd for InPortEnd<T> {
     fn open(&mut self, id: u64, policy: Policy) -> Box<dyn Feed> {
         let wake = self.beat.is_event_driven().then(|| self.beat.clone());
         match policy {
@@ -390,15 +390,15 @@ pub(crate) trait OutEnd: Send {
     fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap>;
 }
 
-impl<T: PortValue> OutEnd for Sender<Target<T>> {
+impl<T: PortValue> OutEnd for Sender<PortTarget<T>> {
     fn attach(&mut self, id: u64, feed: Box<dyn Feed>) {
         let target = if feed.as_any().is::<Inlet<T>>() {
             match feed.into_any().downcast::<Inlet<T>>() {
-                Ok(inlet) => Target::Same(*inlet),
+                Ok(inlet) => PortTarget::Same(*inlet),
                 Err(_) => unreachable!("recognised just now"),
             }
         } else {
-            Target::Converted(feed)
+            PortTarget::Converted(feed)
         };
         self.add(id, target);
     }
@@ -409,7 +409,7 @@ impl<T: PortValue> OutEnd for Sender<Target<T>> {
 
     fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap> {
         let (writer, reader) = latest((Slot::EMPTY, 0));
-        self.add(id, Target::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
+        self.add(id, PortTarget::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
         Box::new(Tapped { reader })
     }
 }

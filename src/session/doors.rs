@@ -15,12 +15,12 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 /// The connections there are, and whether there may be more.
 #[derive(Default)]
 pub(super) struct Doors {
-    inside: Mutex<Inside>,
+    inside: Mutex<InsideDoor>,
     closed: Condvar,
 }
 
 #[derive(Default)]
-struct Inside {
+struct InsideDoor {
     closed: bool,
     places: usize,
     kept: usize,
@@ -28,15 +28,15 @@ struct Inside {
 }
 
 /// One that is let in, and finds no thread: the system has none left.
-type Waiting = (Arc<Connection>, Place);
+type Waiting = (Arc<Connection>, DoorPlace);
 
 /// A place, until it is dropped.
-struct Place {
+struct DoorPlace {
     doors: Arc<Doors>,
     kept: bool,
 }
 
-impl Drop for Place {
+impl Drop for DoorPlace {
     fn drop(&mut self) {
         let mut inside = lock(&self.doors.inside);
         *(if self.kept { &mut inside.kept } else { &mut inside.places }) -= 1;
@@ -61,24 +61,24 @@ impl Doors {
     }
 
     /// A place, an ordinary one if there is one left.
-    fn place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+    fn place(self: &Arc<Self>, shared: &Shared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         let kept = inside.places >= shared.bounds.connections;
         if kept && inside.kept >= shared.bounds.kept {
             return None;
         }
         *(if kept { &mut inside.kept } else { &mut inside.places }) += 1;
-        Some(Place { doors: self.clone(), kept })
+        Some(DoorPlace { doors: self.clone(), kept })
     }
 
     /// A place of those that are kept.
-    fn kept_place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+    fn kept_place(self: &Arc<Self>, shared: &Shared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         if inside.kept >= shared.bounds.kept {
             return None;
         }
         inside.kept += 1;
-        Some(Place { doors: self.clone(), kept: true })
+        Some(DoorPlace { doors: self.clone(), kept: true })
     }
 
     fn enter(&self, connection: &Arc<Connection>) {
@@ -122,7 +122,7 @@ impl Doors {
     /// Waits a little, or until the doors are closed.
     fn pause(&self, shared: &Shared) {
         let inside = lock(&self.inside);
-        let still = |inside: &mut Inside| !inside.closed;
+        let still = |inside: &mut InsideDoor| !inside.closed;
         drop(
             self.closed.wait_timeout_while(inside, shared.bounds.pause, still).unwrap_or_else(PoisonError::into_inner),
         );

@@ -58,7 +58,7 @@ pub(super) struct Halt {
     safety: FxHashSet<EventName>,
     /// The safe configurations, in the order written.
     safe: Vec<ConfigId>,
-    state: Mutex<State>,
+    state: Mutex<HaltState>,
 }
 
 /// What a safety event does that acts by itself.
@@ -70,7 +70,7 @@ pub(super) struct Heeded<'h> {
 }
 
 #[derive(Default)]
-struct State {
+struct HaltState {
     /// Stopping has begun.
     began: bool,
     stage: Option<Stage>,

@@ -27,7 +27,7 @@ pub struct Hub {
     clock: Clock,
     /// For those who wait outside.
     real: Clock,
-    state: Mutex<State>,
+    state: Mutex<HubState>,
     /// Whether events were dropped that nobody was told of.
     untold: AtomicBool,
     /// Wakes whoever drives the session.
@@ -41,7 +41,7 @@ pub struct Hub {
     halt: Halt,
 }
 
-struct State {
+struct HubState {
     phase: Phase,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
@@ -96,7 +96,7 @@ impl Hub {
         Self {
             clock: clock.clone(),
             real: Clock::real(),
-            state: Mutex::new(State {
+            state: Mutex::new(HubState {
                 phase: Phase::Down,
                 next: 1,
                 outstanding: FxHashMap::default(),
@@ -138,7 +138,7 @@ impl Hub {
         self.halt.has_begun()
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, HubState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

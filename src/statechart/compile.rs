@@ -44,7 +44,7 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
 }
 
 /// A resolved transition, not yet in its place.
-struct Edge<'m> {
+struct ChartEdge<'m> {
     written: &'m Transition,
     src: u32,
     tgt: u32,
@@ -63,7 +63,7 @@ struct Builder<'m> {
     children: FxHashMap<(u32, Ident), u32>,
     /// All transitions with their scopes and numbers there, in rFSM's order: a scope's own before those of the states in it.
     written: Vec<(u32, usize, &'m Transition)>,
-    edges: Vec<Edge<'m>>,
+    edges: Vec<ChartEdge<'m>>,
     events: Vec<EventName>,
     /// Where each was listed first.
     event_origins: Vec<Origin>,
@@ -312,7 +312,7 @@ impl<'m> Builder<'m> {
                 );
             }
         }
-        self.edges.push(Edge { written: transition, src, tgt, pn: transition.pn });
+        self.edges.push(ChartEdge { written: transition, src, tgt, pn: transition.pn });
     }
 }
 

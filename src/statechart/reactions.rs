@@ -38,13 +38,13 @@ struct Reaction {
 /// What is known of one node. Its first row stands here itself: most leaves have only one or two, and to find the leaf, then
 /// its rows, then the row would be three looks into memory that wait for each other.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+struct KnownReactions {
     first: Reaction,
     /// The other rows, sorted by event.
     more: Span,
 }
 
-impl Known {
+impl KnownReactions {
     /// Nothing is known.
     const NONE: Self = {
         let none = Span { start: 0, len: 0 };
@@ -66,7 +66,7 @@ impl Known {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reactions {
     /// By node; nothing is known but of leaves.
-    of: Vec<Known>,
+    of: Vec<KnownReactions>,
     rows: Vec<Reaction>,
     around: Vec<NodeId>,
     raised: Vec<(EventName, NodeId, Option<NodeId>)>,
@@ -170,7 +170,7 @@ impl Machine {
 impl Reactions {
     /// Asks the engine what each event that a leaf or a state around it lists does to that leaf.
     pub(super) fn of(chart: &Chart) -> Self {
-        let mut reactions = Self { of: vec![Known::NONE; chart.nodes.len()], ..Self::default() };
+        let mut reactions = Self { of: vec![KnownReactions::NONE; chart.nodes.len()], ..Self::default() };
         if !chart.pure {
             return Self::default();
         }
@@ -215,7 +215,7 @@ impl Reactions {
                 }
             }
             if let Some(first) = first {
-                reactions.of[leaf.index()] = Known { first, more: span(start, reactions.rows.len()) };
+                reactions.of[leaf.index()] = KnownReactions { first, more: span(start, reactions.rows.len()) };
             }
             firsts += usize::from(first.is_some());
             let size = firsts + reactions.rows.len() + reactions.around.len() + reactions.raised.len();

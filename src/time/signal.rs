@@ -4,7 +4,7 @@
 //! one: the waiting thread is parked, and un-parking it is one atomic exchange (and a system call when it sleeps).
 
 use super::clock::{Clock, Kind};
-use super::simulated::Wait;
+use super::simulated::WaitUntil;
 use super::{Time, lock};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -15,20 +15,20 @@ use std::time::Instant;
 #[derive(Clone)]
 pub struct Signal {
     clock: Clock,
-    inner: Arc<Inner>,
+    inner: Arc<SignalInner>,
 }
 
-struct Inner {
+struct SignalInner {
     set: AtomicBool,
     /// On the real clock.
     waiter: OnceLock<Thread>,
     /// On a simulated clock.
-    wait: Mutex<Option<Wait>>,
+    wait: Mutex<Option<WaitUntil>>,
 }
 
 impl Signal {
     pub(super) fn new(clock: &Clock) -> Self {
-        let inner = Inner { set: AtomicBool::new(false), waiter: OnceLock::new(), wait: Mutex::new(None) };
+        let inner = SignalInner { set: AtomicBool::new(false), waiter: OnceLock::new(), wait: Mutex::new(None) };
         Self { clock: clock.clone(), inner: Arc::new(inner) }
     }
 

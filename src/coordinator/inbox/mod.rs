@@ -134,7 +134,7 @@ type Single = (List, EventName, Option<NodeId>);
 
 /// Rooms that were taken and not used yet.
 #[derive(Debug, Default)]
-struct Held {
+struct HeldRoom {
     answers: usize,
     outside: usize,
 }
@@ -164,7 +164,7 @@ const BOUNDS: Bounds = Bounds {
 pub(super) struct Inbox {
     bounds: Bounds,
     lists: Lists,
-    held: Held,
+    held: HeldRoom,
     /// Answers that wait, which share a list with notices.
     answers: usize,
     /// Urgent events and notices that wait, by what there may be one of.
@@ -193,7 +193,7 @@ impl Inbox {
         Self {
             bounds,
             lists: Lists::with_room(room + limits::INBOX_SINGLES),
-            held: Held::default(),
+            held: HeldRoom::default(),
             answers: 0,
             singles: FxHashMap::with_capacity_and_hasher(2 * limits::INBOX_SINGLES, rustc_hash::FxBuildHasher),
             newest,

@@ -1,7 +1,7 @@
 //! From coordinates relative to each level to those of the picture.
 
 use super::super::picture::{Direction, Shape};
-use super::level::{Levels, Slot, slot_of};
+use super::level::{LaidBox, Levels, slot_of};
 use super::{Rect, Route, Run};
 
 impl Levels<'_> {
@@ -28,7 +28,7 @@ impl Levels<'_> {
         routes: &mut [Route],
         parts: &mut [Vec<(i64, Vec<Run>)>],
     ) {
-        let rect = |s: &Slot| match self.picture.direction {
+        let rect = |s: &LaidBox| match self.picture.direction {
             Direction::Right => Rect { x: s.along + along, y: s.across + across, w: s.len, h: s.wide },
             Direction::Down => Rect { x: s.across + across, y: s.along + along, w: s.wide, h: s.len },
         };

@@ -1,16 +1,16 @@
 //! The coordinates of a level whose items have found their places: its items, the runs of its edges, and labels.
 
 use super::chains::Chain;
-use super::level::{Laid, Part, Slot};
-use super::meeting::{Ends, Meeting};
+use super::level::{EdgePart, Laid, LaidBox};
+use super::meeting::{ChainEnds, EdgeMeeting};
 use super::{Run, label_size};
 use crate::draw::picture::Direction;
 use std::collections::BTreeMap;
 
 /// A level in which everything has its place.
 pub(super) struct Laying<'a> {
-    pub(super) meeting: &'a Meeting<'a>,
-    pub(super) ends: &'a Ends,
+    pub(super) meeting: &'a EdgeMeeting<'a>,
+    pub(super) ends: &'a ChainEnds,
     /// Of all vertices, across.
     pub(super) middles: &'a [f64],
     /// What they are moved by.
@@ -24,8 +24,8 @@ pub(super) struct Laying<'a> {
 
 impl Laying<'_> {
     /// The places of the items.
-    pub(super) fn items(&self) -> Vec<(usize, Slot)> {
-        let Meeting { picture, items, own, layered, .. } = self.meeting;
+    pub(super) fn items(&self) -> Vec<(usize, LaidBox)> {
+        let EdgeMeeting { picture, items, own, layered, .. } = self.meeting;
         let slot = |(i, node): (usize, &usize)| {
             let v = layered.vertices[i];
             let along = match picture.direction {
@@ -34,7 +34,7 @@ impl Laying<'_> {
                 Direction::Right => self.start[v.layer],
             };
             let across = self.middles[i] - v.wide / 2.0 + self.offset;
-            (*node, Slot { along, across, len: own[i].len, wide: own[i].wide })
+            (*node, LaidBox { along, across, len: own[i].len, wide: own[i].wide })
         };
         items.iter().enumerate().map(slot).collect()
     }
@@ -51,7 +51,7 @@ impl Laying<'_> {
     }
 
     /// The parts of edges in this level, but for loops.
-    pub(super) fn parts(&self, items: &[(usize, Slot)]) -> Vec<Part> {
+    pub(super) fn parts(&self, items: &[(usize, LaidBox)]) -> Vec<EdgePart> {
         let part = |(c, chain): (usize, &Chain)| {
             let mut runs = self.runs(c, chain, items);
             if chain.backwards {
@@ -63,13 +63,13 @@ impl Laying<'_> {
             if let Some(turns) = chain.turns {
                 self.turn(chain, turns, items, &mut runs);
             }
-            Part { edge: chain.edge, stage: chain.stage, runs, label: self.label(chain), looped: None }
+            EdgePart { edge: chain.edge, stage: chain.stage, runs, label: self.label(chain), looped: None }
         };
         self.meeting.layered.chains.iter().enumerate().map(part).collect()
     }
 
     /// A chain's way along, layer by layer.
-    fn runs(&self, c: usize, chain: &Chain, items: &[(usize, Slot)]) -> Vec<Run> {
+    fn runs(&self, c: usize, chain: &Chain, items: &[(usize, LaidBox)]) -> Vec<Run> {
         let n = chain.vertices.len();
         let run = |(k, &v): (usize, &usize)| {
             let vertex = self.meeting.layered.vertices[v];
@@ -89,7 +89,7 @@ impl Laying<'_> {
     }
 
     /// The ends of a connection that runs backwards: they turn round beside its items.
-    fn turn(&self, chain: &Chain, (a, b): (usize, usize), items: &[(usize, Slot)], runs: &mut Vec<Run>) {
+    fn turn(&self, chain: &Chain, (a, b): (usize, usize), items: &[(usize, LaidBox)], runs: &mut Vec<Run>) {
         let vertices = &self.meeting.layered.vertices;
         let at = |item: usize, source: bool| {
             let fixed = self.meeting.fixed(chain, item, source).unwrap_or(0.0);
@@ -102,10 +102,10 @@ impl Laying<'_> {
         runs.push(back);
     }
 
-    fn label(&self, chain: &Chain) -> Option<Slot> {
+    fn label(&self, chain: &Chain) -> Option<LaidBox> {
         let v = chain.label?;
         let vertex = self.meeting.layered.vertices[v];
-        Some(Slot {
+        Some(LaidBox {
             along: f64::midpoint(self.start[vertex.layer], self.end[vertex.layer]) - vertex.len / 2.0 + 3.0,
             across: self.middles[v] - vertex.wide / 2.0 + self.offset,
             len: vertex.len - 6.0,
@@ -115,22 +115,22 @@ impl Laying<'_> {
 }
 
 /// Loops (edge, node) beside their items. Of several of one node the labels stand side by side.
-pub(super) fn add_loops(meeting: &Meeting<'_>, loops: &[(usize, usize)], laid: &mut Laid) {
+pub(super) fn add_loops(meeting: &EdgeMeeting<'_>, loops: &[(usize, usize)], laid: &mut Laid) {
     let mut taken: BTreeMap<usize, f64> = BTreeMap::new();
     for &(edge, node) in loops {
         let (_, slot) = *laid.items.iter().find(|(item, _)| *item == node).expect("a loop of an item");
         let (w, h) = label_size(&meeting.picture.edges[edge].label);
         let taken = taken.entry(node).or_insert(24.0);
         let label = match meeting.picture.direction {
-            Direction::Down => Slot {
+            Direction::Down => LaidBox {
                 along: slot.along + slot.len / 2.0 - h / 2.0,
                 across: slot.across + slot.wide + *taken,
                 len: h,
                 wide: w,
             },
-            Direction::Right => Slot { along: slot.along + slot.len + *taken, across: slot.across, len: w, wide: h },
+            Direction::Right => LaidBox { along: slot.along + slot.len + *taken, across: slot.across, len: w, wide: h },
         };
         *taken += w + 6.0;
-        laid.parts.push(Part { edge, stage: 0, runs: Vec::new(), label: Some(label), looped: Some(node) });
+        laid.parts.push(EdgePart { edge, stage: 0, runs: Vec::new(), label: Some(label), looped: Some(node) });
     }
 }

@@ -2,7 +2,7 @@
 
 use super::chains::{Border, Layered, Side, Vertex, spans};
 use super::laying::{Laying, add_loops};
-use super::meeting::Meeting;
+use super::meeting::EdgeMeeting;
 use super::rank::ranks;
 use super::{Run, header, label_size, text_size};
 use crate::draw::picture::{Direction, Picture, Shape, Subject};
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// The place of an item in its level: its start and its extent, along and across.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Slot {
+pub(super) struct LaidBox {
     pub(super) along: f64,
     pub(super) across: f64,
     pub(super) len: f64,
@@ -19,20 +19,20 @@ pub(super) struct Slot {
 
 /// The part of an edge in one level.
 #[derive(Debug, Clone)]
-pub(super) struct Part {
+pub(super) struct EdgePart {
     pub(super) edge: usize,
     /// Parts are joined in this order: from the innermost level of the source outwards, then inwards to the target.
     pub(super) stage: i64,
     pub(super) runs: Vec<Run>,
-    pub(super) label: Option<Slot>,
+    pub(super) label: Option<LaidBox>,
     pub(super) looped: Option<usize>,
 }
 
 /// A level with coordinates, relative to its own start.
 #[derive(Debug, Default)]
 pub(super) struct Laid {
-    pub(super) items: Vec<(usize, Slot)>,
-    pub(super) parts: Vec<Part>,
+    pub(super) items: Vec<(usize, LaidBox)>,
+    pub(super) parts: Vec<EdgePart>,
 }
 
 /// All levels of a picture.
@@ -134,7 +134,7 @@ impl<'a> Levels<'a> {
         let (own, ports) = self.boxes(&items, &rank, &edges);
         let vertices = with_loops(picture, &own, &edges.loops, &index);
         let layered = Layered::new(picture, vertices, &rank, &edges.inner, &edges.borders, &index);
-        let mut meeting = Meeting { picture, items: &items, own: &own, ports: &ports, layered };
+        let mut meeting = EdgeMeeting { picture, items: &items, own: &own, ports: &ports, layered };
         meeting.put_in_order();
         let ends = meeting.ends();
         let middles = meeting.middles(&ends);

@@ -8,7 +8,7 @@ use crate::draw::picture::{Direction, Picture};
 use std::collections::BTreeMap;
 
 /// A level whose edges are chains of vertices, the first of which are its items.
-pub(super) struct Meeting<'a> {
+pub(super) struct EdgeMeeting<'a> {
     pub(super) picture: &'a Picture,
     pub(super) items: &'a [usize],
     /// The box of each item alone, without the loops beside it.
@@ -19,12 +19,12 @@ pub(super) struct Meeting<'a> {
 }
 
 /// By chain: how far from the middle of its first and of its last vertex it begins and ends.
-pub(super) struct Ends {
+pub(super) struct ChainEnds {
     pub(super) first: Vec<f64>,
     pub(super) last: Vec<f64>,
 }
 
-impl Ends {
+impl ChainEnds {
     /// How far from its middle the chain `c`, of `n` vertices, meets the vertex `k`.
     fn at(&self, c: usize, k: usize, n: usize) -> f64 {
         if k == 0 {
@@ -40,7 +40,7 @@ impl Ends {
 /// (place of the other end, chain, whether it is the chain's first vertex) of those that share one side of an item.
 type Users = Vec<(usize, usize, bool)>;
 
-impl Meeting<'_> {
+impl EdgeMeeting<'_> {
     /// Where a chain meets an item, from the item's middle: at a port's row, or at the place on a group's border. None: not
     /// known yet.
     pub(super) fn fixed(&self, chain: &Chain, v: usize, source: bool) -> Option<f64> {
@@ -99,10 +99,10 @@ impl Meeting<'_> {
     }
 
     /// Where the chains begin and end. Those without a port share the side of their item in the order of their other ends.
-    pub(super) fn ends(&self) -> Ends {
+    pub(super) fn ends(&self) -> ChainEnds {
         let (chains, count) = (&self.layered.chains, self.items.len());
         let place_in_layer = self.place_in_layer();
-        let mut ends = Ends { first: vec![0.0; chains.len()], last: vec![0.0; chains.len()] };
+        let mut ends = ChainEnds { first: vec![0.0; chains.len()], last: vec![0.0; chains.len()] };
         let mut sharing: BTreeMap<(usize, Side), Users> = BTreeMap::new();
         for (c, chain) in chains.iter().enumerate() {
             let n = chain.vertices.len();
@@ -134,7 +134,7 @@ impl Meeting<'_> {
     }
 
     /// Divides one side of an item among those that meet it there.
-    fn share(&self, item: usize, mut users: Users, ends: &mut Ends) {
+    fn share(&self, item: usize, mut users: Users, ends: &mut ChainEnds) {
         users.sort_unstable();
         #[allow(clippy::cast_precision_loss)]
         let n = users.len() as f64;
@@ -147,7 +147,7 @@ impl Meeting<'_> {
     }
 
     /// The middles of all vertices, across.
-    pub(super) fn middles(&self, ends: &Ends) -> Vec<f64> {
+    pub(super) fn middles(&self, ends: &ChainEnds) -> Vec<f64> {
         let Layered { vertices, layers, chains, near } = &self.layered;
         let count = self.items.len();
         let mut ties = Vec::new();
@@ -173,7 +173,7 @@ impl Meeting<'_> {
     }
 
     /// By layer: how far the edges that leave it have to go across.
-    pub(super) fn reach(&self, ends: &Ends, middles: &[f64]) -> Vec<f64> {
+    pub(super) fn reach(&self, ends: &ChainEnds, middles: &[f64]) -> Vec<f64> {
         let mut reach = vec![0.0f64; self.layered.layers.len()];
         for (c, chain) in self.layered.chains.iter().enumerate() {
             let n = chain.vertices.len();

@@ -108,7 +108,7 @@ const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
 #[derive(Debug, Clone, Copy)]
-enum Task {
+enum DriveTask {
     Idle,
     Moving { from: J5, to: J5, elapsed: f64, duration: f64 },
     Calibrating { elapsed: f64, met: [bool; JOINTS] },
@@ -136,7 +136,7 @@ pub struct Drives {
     /// They were told to brake, and that was not taken back.
     braked: bool,
     calibrated: bool,
-    task: Task,
+    task: DriveTask,
     target: J5,
     target_speed: J5,
     outside: bool,
@@ -159,7 +159,7 @@ impl Drives {
             resumes: false,
             braked: false,
             calibrated: false,
-            task: Task::Idle,
+            task: DriveTask::Idle,
             target,
             target_speed: J5::zeros(),
             outside: false,
@@ -180,7 +180,7 @@ impl Drives {
 
     /// Whether a motion or a calibration is under way.
     pub fn busy(&self) -> bool {
-        !matches!(self.task, Task::Idle)
+        !matches!(self.task, DriveTask::Idle)
     }
 
     /// Changes what they do.
@@ -229,7 +229,7 @@ impl Drives {
 
     /// Whatever is under way ends: a quick stop, then the drives hold the arm where it came to rest. The base stands.
     pub fn hold(&mut self) {
-        self.task = Task::Idle;
+        self.task = DriveTask::Idle;
         self.target = self.arm.q;
         self.target_speed = self.arm.qd;
         self.resumes |= self.mode == Mode::Torque;
@@ -265,7 +265,7 @@ impl Drives {
         self.hold();
         self.resumes = false;
         self.calibrated = false;
-        self.task = Task::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
+        self.task = DriveTask::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
         Ok(())
     }
 
@@ -300,7 +300,7 @@ impl Drives {
         let from = self.arm.q;
         // A quintic's peak speed is 15/8 of its mean.
         let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
-        self.task = Task::Moving { from, to, elapsed: 0.0, duration };
+        self.task = DriveTask::Moving { from, to, elapsed: 0.0, duration };
         Ok(())
     }
 
@@ -354,11 +354,11 @@ impl Drives {
 
     fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(Happening)) {
         match &mut self.task {
-            Task::Idle => {
+            DriveTask::Idle => {
                 self.target_speed = slowed(&self.target_speed, dt);
                 self.target += self.target_speed * dt;
             }
-            Task::Moving { from, to, elapsed, duration } => {
+            DriveTask::Moving { from, to, elapsed, duration } => {
                 *elapsed += dt;
                 let s = (*elapsed / *duration).min(1.0);
                 let way = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
@@ -370,7 +370,7 @@ impl Drives {
                     self.target_speed = J5::zeros();
                     // The motion has ended when the arm is there, not when it should be.
                     if (self.arm.q - to).amax() < ARRIVAL_ERROR {
-                        self.task = Task::Idle;
+                        self.task = DriveTask::Idle;
                         report(Happening::Arrived);
                     } else if over > ARRIVAL_TIME {
                         self.hold();
@@ -378,7 +378,7 @@ impl Drives {
                     }
                 }
             }
-            Task::Calibrating { elapsed, met } => {
+            DriveTask::Calibrating { elapsed, met } => {
                 *elapsed += dt;
                 for i in 0..JOINTS {
                     if met[i] {
@@ -390,7 +390,7 @@ impl Drives {
                     met[i] = behind > CONTACT_ERROR && self.arm.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
                 }
                 if met.iter().all(|m| *m) {
-                    self.task = Task::Idle;
+                    self.task = DriveTask::Idle;
                     let found = (1..4).all(|i| self.is_at_stop(i));
                     self.mode = if found { Mode::MotorStop } else { Mode::Positioning };
                     self.handover.begin();
@@ -454,7 +454,7 @@ impl Drives {
 
     /// Switches the drives off and lets the arm settle for a second; answers how far the tool came down, in m.
     pub fn switch_off(&mut self) -> f64 {
-        self.task = Task::Idle;
+        self.task = DriveTask::Idle;
         self.mode = Mode::MotorStop;
         self.torque = J5::zeros();
         self.handover = Handover::default();

@@ -20,7 +20,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 pub struct Keeper {
     last: Last,
     tap: Tap<Kept>,
-    beat: Arc<Beat>,
+    beat: Arc<KeptBeat>,
 }
 
 /// What a life says last: once, whoever says it first.
@@ -57,7 +57,7 @@ impl From<Arc<Entry>> for Kept {
 
 /// What ends the thread that says that the process lives.
 #[derive(Default)]
-struct Beat {
+struct KeptBeat {
     over: Mutex<bool>,
     ended: Condvar,
 }
@@ -92,10 +92,10 @@ impl Keeper {
         life.set_len(0)?;
         say(&life, &serde_json::to_string(&began).expect("plain data"))?;
         let begins = json!({ "at": 0.0, "what": "began", "when": began.began.to_string(), "pid": began.pid });
-        let mut writer = Writer { log, story: Story::default(), missing: 0, begins: Some(begins) };
+        let mut writer = KeptWriter { log, story: Story::default(), missing: 0, begins: Some(begins) };
         writer.begin();
         let tap = Tap::new("davit-keeps", limits::TAP, clock, move |news| writer.keep(news))?;
-        let beat = Arc::new(Beat::default());
+        let beat = Arc::new(KeptBeat::default());
         let lives = (life.clone(), beat.clone());
         std::thread::Builder::new().name("davit-lives".to_owned()).spawn(move || live(&lives.0, &lives.1))?;
         Ok(Self { last: Last { life, said: Arc::default() }, tap, beat })
@@ -175,7 +175,7 @@ fn say(mut life: &File, line: &str) -> io::Result<()> {
 }
 
 /// Says that the process lives, until it is over.
-fn live(life: &File, beat: &Beat) {
+fn live(life: &File, beat: &KeptBeat) {
     let mut over = lock(&beat.over);
     while !*over {
         let _ = life.set_modified(Wall::now().into());
@@ -183,7 +183,7 @@ fn live(life: &File, beat: &Beat) {
     }
 }
 
-struct Writer {
+struct KeptWriter {
     log: Rotating,
     story: Story,
     /// Entries that could not be written since the last that could.
@@ -192,7 +192,7 @@ struct Writer {
     begins: Option<Json>,
 }
 
-impl Writer {
+impl KeptWriter {
     fn keep(&mut self, news: News<Kept>) {
         match news {
             News::Missed(entries) => {
