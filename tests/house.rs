@@ -385,6 +385,59 @@ fn examples_name_no_rooms() {
     assert!(wrong.is_empty(), "rooms are private, use what `src/lib.rs` offers:\n{}", wrong.join("\n"));
 }
 
+/// Names of types, with the files in which each is: what a room calls so, for whoever reads it in the next one.
+fn type_names() -> BTreeMap<String, Vec<String>> {
+    let mut names: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (file, text) in sources("src").into_iter().filter(|(file, _)| !file.contains("/tests")) {
+        // Types of tests, and those inside of functions, are seen by nobody else: they are indented.
+        for line in code_lines(&text) {
+            let line = line.strip_prefix("pub").map_or(line.as_str(), |rest| {
+                rest.strip_prefix('(').and_then(|rest| rest.split_once(')')).map_or(rest, |(_, rest)| rest).trim_start()
+            });
+            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
+            let is_type = !line.starts_with(' ') && words.next().is_some_and(|word| TYPES.contains(&word));
+            if let Some(name) = words.next().filter(|_| is_type) {
+                names.entry(name.to_owned()).or_default().push(file.clone());
+            }
+        }
+    }
+    names
+}
+
+const TYPES: &[&str] = &["struct", "enum", "trait", "type", "union"];
+
+/// Names that several types may have: each a file's own, in the same place of its room.
+const MANY: &[(&str, &str)] = &[("Args", "what a command line may say: one of each command, and seen by no other")];
+
+/// One name, one type. Those that still have several are listed in `tests/golden/names_twice.txt`, with how many: that list
+/// gets only shorter.
+#[test]
+fn one_name_is_one_type() {
+    let names = type_names();
+    assert!(names.len() > 500, "the sources were not understood: {} types", names.len());
+    let listed = std::fs::read_to_string(root().join("tests/golden/names_twice.txt")).expect("the list is there");
+    let listed: BTreeMap<&str, usize> = (listed.lines())
+        .filter_map(|line| line.split_once(' '))
+        .map(|(name, count)| (name, count.parse().expect("a number")))
+        .collect();
+    let mut wrong = Vec::new();
+    for (name, files) in &names {
+        let allowed = listed.get(name.as_str()).copied().unwrap_or(1);
+        if files.len() > allowed && MANY.iter().all(|(many, _)| many != name) {
+            wrong.push(format!("`{name}` is in {}: give the newest a name of its own", files.join(", ")));
+        }
+    }
+    for (name, allowed) in listed {
+        let found = names.get(name).map_or(0, Vec::len);
+        if found < allowed || found < 2 {
+            wrong.push(format!(
+                "`{name} {allowed}` is listed, and there are {found}: shorten `tests/golden/names_twice.txt`"
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "names of several types:\n{}", wrong.join("\n"));
+}
+
 #[test]
 fn files_hold_one_idea() {
     let long: Vec<String> = sources("src")

@@ -72,7 +72,7 @@ struct ScriptHost {
     /// By what it is reached from outside.
     door: Option<Box<dyn Any>>,
     /// What goes wrong, and where it does.
-    faults: faults::Faults,
+    faults: faults::ScriptFaults,
     /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
     mark: u64,
     taken: Vec<u64>,
@@ -99,7 +99,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
         folder,
         session: None,
         door: None,
-        faults: faults::Faults::default(),
+        faults: faults::ScriptFaults::default(),
         mark: 0,
         taken: Vec::new(),
         refused: None,

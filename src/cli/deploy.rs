@@ -6,7 +6,7 @@ use super::input::Input;
 use super::keep::Keep;
 use super::last_words;
 use super::output::{Output, Style};
-use super::progress::Progress;
+use super::progress::ProgressView;
 use super::signals::SignalWatch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
@@ -89,7 +89,7 @@ impl Args {
     fn deploy(&self, context: &Context) -> Answer {
         let checked = self.input.check(context)?;
         let clock = self.clock.make(self.pace);
-        let progress = Progress::new(context.out, self.json, &clock).map_err(short)?;
+        let progress = ProgressView::new(context.out, self.json, &clock).map_err(short)?;
         let exit = self.foreground(context, &checked, &clock, &progress)?;
         clock.shutdown();
         last_words::unread(progress.end());
@@ -101,7 +101,7 @@ impl Args {
         context: &Context,
         checked: &Checked,
         clock: &Clock,
-        progress: &Progress,
+        progress: &ProgressView,
     ) -> Result<Exit, Failure> {
         let _participant = clock.enter();
         let (name, in_background) = (checked.deployment.name, self.in_background);
@@ -202,7 +202,7 @@ type Leaving = Arc<Mutex<Vec<Leave>>>;
 
 fn watch(
     session: &Arc<Session>,
-    progress: &Progress,
+    progress: &ProgressView,
     leaving: &Leaving,
     in_background: bool,
 ) -> Result<SignalWatch, Failure> {
@@ -245,7 +245,7 @@ pub(super) fn short(error: std::io::Error) -> Failure {
     )
 }
 
-fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {
+fn tell_up(out: &Output, progress: &ProgressView, session: &Session, in_background: bool) {
     let status = session.status();
     let what = match (&status.system, &status.stack) {
         (Some(system), Some(stack)) => format!(
@@ -266,7 +266,7 @@ fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: 
     progress.line(out.paint(Style::Dim, way));
 }
 
-fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in_background: bool) -> Exit {
+fn tell_not_up(out: &Output, progress: &ProgressView, name: &str, not_up: &NotUp, in_background: bool) -> Exit {
     progress.line(format!("{} {}: {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "not up"), not_up.why));
     for reason in &not_up.reasons {
         progress.line(format!("  {reason}"));
@@ -280,7 +280,7 @@ fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in
     Exit::of_stop(&not_up.ended, well)
 }
 
-fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
+fn tell_ended(out: &Output, progress: &ProgressView, name: &str, ended: &Ended) {
     for note in &ended.left {
         progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
     }

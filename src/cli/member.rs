@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, Wait, Which, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, WaitFor, Which, connect, failure, seconds};
 use super::request::request;
 use super::status::text;
 use super::{Answer, Context, Run};
@@ -78,7 +78,7 @@ pub struct SetArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,

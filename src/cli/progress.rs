@@ -8,7 +8,7 @@ use super::log::duration;
 use super::output::{Output, Style};
 use crate::limits;
 use crate::model::finding::count;
-use crate::session::log::Entry;
+use crate::session::log::LogEntry;
 use crate::session::tap::{Hears, News, Tap};
 use crate::session::{Happening, Phase};
 use crate::time::Clock;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// How a deployment's story is told. Clones tell the same one.
 #[derive(Clone)]
-pub struct Progress {
+pub struct ProgressView {
     tap: Tap<ToldLine>,
     json: bool,
     simulated: bool,
@@ -29,7 +29,7 @@ pub struct Progress {
 /// What is told.
 enum ToldLine {
     /// Something happened.
-    Entry(Arc<Entry>),
+    Entry(Arc<LogEntry>),
     /// A line of the command's own.
     Line(String),
     /// The same for programs.
@@ -40,13 +40,13 @@ enum ToldLine {
     UpInBackground,
 }
 
-impl From<Arc<Entry>> for ToldLine {
-    fn from(entry: Arc<Entry>) -> Self {
+impl From<Arc<LogEntry>> for ToldLine {
+    fn from(entry: Arc<LogEntry>) -> Self {
         Self::Entry(entry)
     }
 }
 
-impl Progress {
+impl ProgressView {
     /// Tells it on stdout: as one JSON object a line if `json`, else as text. Of a deployment on `clock`.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl Progress {
         }
     }
 
-    /// From now on nothing is told but by [`Progress::line`], [`Progress::json_line`] and what happens.
+    /// From now on nothing is told but by [`ProgressView::line`], [`ProgressView::json_line`] and what happens.
     pub fn finish(&self) {
         self.tap.put_own(ToldLine::Finish);
     }
@@ -167,7 +167,7 @@ impl Screen {
         }
     }
 
-    fn tell(&mut self, entry: &Entry) {
+    fn tell(&mut self, entry: &LogEntry) {
         if self.json {
             self.out.json_line(entry);
             return;

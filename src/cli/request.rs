@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::log::duration;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, Wait, Which, ask, seconds};
+use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
 use crate::configurator::WAY_OUT;
@@ -98,7 +98,7 @@ pub struct ApplyArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -130,7 +130,7 @@ pub struct UndoArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -164,7 +164,7 @@ pub struct CommitArgs {
 
 impl Run for CommitArgs {
     fn run(self, context: &Context) -> Answer {
-        let wait = Wait { no_wait: false, wait: true, within: self.within };
+        let wait = WaitFor { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
         let patience = Patience::within(wait.within);
         request(context, "commit", params, &Which { name: self.name }, &wait, &patience, self.json)
@@ -177,7 +177,7 @@ pub(super) fn request(
     method: &str,
     mut params: Json,
     which: &Which,
-    wait: &Wait,
+    wait: &WaitFor,
     patience: &Patience,
     json: bool,
 ) -> Result<Exit, Failure> {

@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::input::Parameters;
 use super::last_words;
 use super::output::Style;
-use super::progress::Progress;
+use super::progress::ProgressView;
 use super::signals::{self, SignalWatch};
 use super::{Answer, Context, Failure, Run};
 use crate::app::Extensions;
@@ -58,7 +58,7 @@ impl Args {
     fn story(self, context: &Context) -> Answer {
         let platform = self.platform.as_deref().map(|name| known(name, &context.extensions)).transpose()?;
         let clock = self.clock.make(0.0);
-        let progress = Progress::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
+        let progress = ProgressView::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
         let say = {
             let progress = progress.clone();
             let (out, clock, json) = (context.out, clock.clone(), self.json);

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::sim_session::Session;
+use super::sim_session::SimSession;
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_EVENTS_UNREADABLE;
 use crate::statechart::{Hook, Sim};
@@ -34,7 +34,7 @@ pub fn edit<'c, F: Hook>(context: &Context, make: impl Fn() -> Result<Sim<'c, F>
         Failure::usage(CLI_EVENTS_UNREADABLE, format!("the terminal cannot be read: {error}"), help)
     };
     super::signals::give_terminal_back().map_err(|why| unreadable(&why))?;
-    let session = Session::new(make).map_err(|why| unreadable(&why))?;
+    let session = SimSession::new(make).map_err(|why| unreadable(&why))?;
     let session = Rc::new(RefCell::new(session));
     let config = Config::builder().max_history_size(crate::limits::SIM_LINES).map_err(|e| unreadable(&e))?.build();
     let mut editor = Editor::with_config(config).map_err(|e| unreadable(&e))?;

@@ -1,7 +1,7 @@
 //! Starting a configurator, and what others hold of it while its thread runs.
 
 use super::conditions::Conditions;
-use super::control::{AtOnce, Command, Drift, InTurn, Recovery, TakenDown, View};
+use super::control::{ConfiguratorView, ControlCommand, Drift, InTurn, Recovery, TakenDown, UrgentCommand};
 use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
@@ -179,8 +179,8 @@ impl ConfiguratorHandle {
     }
 
     /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.
-    pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<View>> {
-        self.ask(deadline, |reply| AtOnce::View { system, reply })
+    pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<ConfiguratorView>> {
+        self.ask(deadline, |reply| UrgentCommand::View { system, reply })
     }
 
     /// The difference between the picture and the platform.
@@ -197,12 +197,12 @@ impl ConfiguratorHandle {
     /// meanwhile. `listed`: it may be applied without force. Answers whether it was taken in by `deadline`.
     pub fn define(&self, configuration: Configuration, listed: bool, deadline: Time) -> bool {
         let configuration = Box::new(configuration);
-        self.ask(deadline, |reply| AtOnce::Define { configuration, listed, reply }).is_some()
+        self.ask(deadline, |reply| UrgentCommand::Define { configuration, listed, reply }).is_some()
     }
 
     /// Stopping begins: what is in force now is known apart from what comes since, and operators' requests are refused.
     pub fn stopping(&self) {
-        self.inner.post.command(AtOnce::Stopping);
+        self.inner.post.command(UrgentCommand::Stopping);
     }
 
     /// The event that ends the deployment was raised: until it is down, or (`false`) the one that begins it is raised, an undo
@@ -239,7 +239,7 @@ impl ConfiguratorHandle {
     /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
     /// are down and nothing is there any more, what was in force is forgotten.
     pub fn down(&self, coordinator: Requester) {
-        self.inner.post.command(AtOnce::Down(coordinator));
+        self.inner.post.command(UrgentCommand::Down(coordinator));
     }
 
     /// Forgets the stack: the *down* state was reached with an empty system.
@@ -255,7 +255,11 @@ impl ConfiguratorHandle {
         thread.is_none_or(|thread| thread.join(deadline).is_ok())
     }
 
-    fn ask<T, C: Into<Command>>(&self, deadline: Time, command: impl FnOnce(crate::time::Sender<T>) -> C) -> Option<T> {
+    fn ask<T, C: Into<ControlCommand>>(
+        &self,
+        deadline: Time,
+        command: impl FnOnce(crate::time::Sender<T>) -> C,
+    ) -> Option<T> {
         let (reply, answer) = self.inner.clock.channel(1);
         if !self.inner.post.command(command(reply)) {
             return None;

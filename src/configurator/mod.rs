@@ -48,7 +48,7 @@ mod teardown;
 pub use crate::stack::answer::WAY_OUT;
 pub use crate::stack::{Requester, Scope, Why};
 pub use conditions::{Conditions, Truth};
-pub use control::{Drift, FrameView, Recovery, TakenDown, View};
+pub use control::{ConfiguratorView, Drift, FrameView, Recovery, TakenDown};
 pub use handle::{Configurator, ConfiguratorHandle, ConfiguratorSetup};
 pub use progress::{AnswerSink, Progress, ProgressSink, StepEnd, StepName};
 pub use request::{Answer, Batch, Full, Reason, Request, Residual};

@@ -3,7 +3,7 @@
 use super::count::Count;
 use super::exact;
 #[cfg(target_os = "linux")]
-use super::watch::Watch;
+use super::watch::CallWatch;
 use mlua::{Lua, Result};
 use std::cell::Cell;
 #[cfg(target_os = "linux")]
@@ -22,7 +22,7 @@ pub struct Budget {
     depth: Cell<u32>,
     /// Finds the calls that take long; none: all are counted.
     #[cfg(target_os = "linux")]
-    watch: OnceCell<Watch>,
+    watch: OnceCell<CallWatch>,
 }
 
 impl Budget {
@@ -46,7 +46,7 @@ impl Budget {
         {
             let count = Rc::downgrade(&self.count);
             let look = move |instructions| count.upgrade().is_some_and(|count| count.ticked(instructions));
-            if let Some(watch) = Watch::start(lua, look)
+            if let Some(watch) = CallWatch::start(lua, look)
                 && exact::end(lua).is_ok()
             {
                 let _ = self.watch.set(watch);

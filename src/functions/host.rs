@@ -13,7 +13,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 /// Text by the name a model gives: the name that findings give it, and the text.
-pub type Reader = Box<dyn FnMut(&str) -> std::result::Result<(String, String), String>>;
+pub type FileReader = Box<dyn FnMut(&str) -> std::result::Result<(String, String), String>>;
 
 /// What everything of one state shares.
 pub struct Host {
@@ -27,7 +27,7 @@ pub struct Host {
     /// Machines by the address of their root.
     pub machines: RefCell<FxHashMap<usize, Rc<Bound>>>,
     pub gettime: RefCell<Option<Function>>,
-    pub reader: RefCell<Reader>,
+    pub reader: RefCell<FileReader>,
     /// Files that are being run, each loaded by the one before it.
     pub loading: RefCell<Vec<String>>,
     /// The time of inner machines whose model says none.

@@ -1,6 +1,6 @@
 //! rFSM without a coordinator, for tests.
 
-use super::host::{Host, Reader, run};
+use super::host::{FileReader, Host, run};
 use super::open::NotOpened;
 use super::values::to_json;
 use super::world::state;
@@ -24,7 +24,7 @@ impl Lab {
     /// # Errors
     /// When Lua has no memory for it.
     pub fn new(files: BTreeMap<String, String>, open: Openings) -> Result<Self, NotOpened> {
-        let reader: Reader = Box::new(move |name| {
+        let reader: FileReader = Box::new(move |name| {
             files
                 .get(name)
                 .map(|text| (name.to_owned(), text.clone()))

@@ -1,7 +1,7 @@
 //! What the Lua part borrows from here: constructors that remember where they were called, and inner machines.
 
 use super::bound::{Bound, Status};
-use super::calls::Calls;
+use super::calls::Functions;
 use super::host::{Host, run};
 use super::lower::Spot;
 use super::merge::merge;
@@ -278,7 +278,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
             return Ok(()); // a connector, or nothing of this machine: there is nothing to leave
         };
         let mut machine = taken(&bound)?;
-        machine.leave(&tables.chart, node, &mut Calls { lua: lua.clone(), bound: bound.clone(), _host: None });
+        machine.leave(&tables.chart, node, &mut Functions { lua: lua.clone(), bound: bound.clone(), _host: None });
         bound.status.borrow_mut().leaf = machine.leaf();
         bound.show_leaf(machine.leaf());
         *bound.machine.borrow_mut() = Some(machine);
@@ -323,7 +323,7 @@ fn flush(bound: &Bound) {
 
 /// rFSM's step: turns until `steps` of them counted or nothing is left to do.
 fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps: f64) -> Result<bool> {
-    let mut calls = Calls { lua: lua.clone(), bound: bound.clone(), _host: None };
+    let mut calls = Functions { lua: lua.clone(), bound: bound.clone(), _host: None };
     bound.look_for_dbg();
     let mut left = steps;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and the budget ends it long before

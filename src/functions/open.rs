@@ -1,12 +1,12 @@
 //! From a program to its chart, and from a program to functions that can be called.
 
 use super::aside::{self, Field};
-use super::calls::Calls;
+pub use super::calls::Functions;
 use super::errors::{Short, message_of, short_of, undefined_global};
-use super::host::{Host, Reader};
+use super::host::{FileReader, Host};
 use super::lower::{self, Problem, Spot};
 use super::tables::address;
-use super::unset::Watch;
+use super::unset::UnsetWatch;
 use super::world::{run_program, state};
 use crate::limits;
 use crate::model::program::{Beside, Program};
@@ -15,8 +15,6 @@ use crate::statechart::{Printer, Said};
 use crate::time::Clock;
 use mlua::{Function, Lua, Table, Value};
 use std::sync::Arc;
-
-pub use super::calls::Calls as Functions;
 
 /// Why a program gives no machine.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -82,12 +80,12 @@ pub struct Reads {
 /// [`NotOpened`]: a text does not parse, fails, is over its budget, or gives no state.
 pub fn read(
     program: &Program,
-    reader: Reader,
+    reader: FileReader,
     place: &mut dyn FnMut(Option<&Spot>, &str) -> Origin,
 ) -> Result<Reads, NotOpened> {
     let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
     let (lua, host) = state(program.open, reader).map_err(failed)?;
-    let watch = Watch::begin(&lua, &host.native).map_err(failed)?;
+    let watch = UnsetWatch::begin(&lua, &host.native).map_err(failed)?;
     let template = template(&lua, &host, program);
     let unset = watch.end(&host.native).map_err(failed)?;
     let template = template?;
@@ -150,7 +148,7 @@ impl Opener {
         let program = &*self.program;
         let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
         let files = program.files.clone();
-        let reader: Reader = Box::new(move |name| match files.get(name) {
+        let reader: FileReader = Box::new(move |name| match files.get(name) {
             Some((shown, text)) => Ok((shown.clone(), text.to_string())),
             None => Err(format!("`{name}` was not loaded before")),
         });
@@ -184,6 +182,6 @@ impl Opener {
             host.budget.count_late(&lua);
         }
         bound.machine.borrow_mut().take();
-        Ok(Calls { lua, bound, _host: Some(host) })
+        Ok(Functions { lua, bound, _host: Some(host) })
     }
 }

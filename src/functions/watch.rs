@@ -29,7 +29,7 @@ struct RunningThread {
 ///
 /// What the signal handler reads is atomic. The handler runs on the thread that writes it, so relaxed accesses do; fences
 /// keep the compiler from moving them over what they announce.
-pub struct Watch {
+pub struct CallWatch {
     lua: WeakLua,
     main: *mut lua_State,
     /// Counts so many instructions; whether the budget is used up.
@@ -48,18 +48,18 @@ pub struct Watch {
 
 thread_local! {
     /// Whose call is under way on this thread. Without a destructor, so that a signal handler may read it.
-    static CURRENT: AtomicPtr<Watch> = const { AtomicPtr::new(ptr::null_mut()) };
+    static CURRENT: AtomicPtr<CallWatch> = const { AtomicPtr::new(ptr::null_mut()) };
 }
 
 /// The watch whose call is under way on this thread.
-fn current<'a>() -> Option<&'a Watch> {
+fn current<'a>() -> Option<&'a CallWatch> {
     let watch = CURRENT.with(|current| current.load(Relaxed));
-    // SAFETY: `Watch::during` put it there from a borrow that lives until it has taken it away again, and all who ask are
+    // SAFETY: `CallWatch::during` put it there from a borrow that lives until it has taken it away again, and all who ask are
     // called inside of that: the handler on the same thread, and what Lua calls.
     unsafe { watch.cast_const().as_ref() }
 }
 
-impl Watch {
+impl CallWatch {
     /// Watches the calls of `lua` on this thread from now on; `look` is told of every so many instructions of a call that
     /// takes long. None: the operating system gives no timer.
     pub fn start(lua: &Lua, look: impl Fn(u32) -> bool + 'static) -> Option<Self> {
@@ -102,8 +102,8 @@ impl Watch {
     /// Makes an outermost call into the state. Calls inside it belong to it.
     pub fn during<R>(&self, call: impl FnOnce() -> R) -> R {
         struct Under<'a> {
-            watch: &'a Watch,
-            before: *mut Watch,
+            watch: &'a CallWatch,
+            before: *mut CallWatch,
             _lua: Lua,
         }
         impl Drop for Under<'_> {
@@ -162,7 +162,7 @@ impl Watch {
 
     /// Resumes or closes a thread of Lua: while `resume` runs, ticks reach it too. It must not leave by a jump of Lua's.
     fn entered<R>(&self, state: *mut lua_State, resume: impl FnOnce() -> R) -> R {
-        struct Leave<'a>(&'a Watch, *mut RunningThread);
+        struct Leave<'a>(&'a CallWatch, *mut RunningThread);
         impl Drop for Leave<'_> {
             fn drop(&mut self) {
                 self.0.running.store(self.1, Relaxed);
@@ -331,7 +331,7 @@ fn signal() -> Option<c_int> {
         // SAFETY: the handler reads a thread-local without destructor, atomics, and calls `lua_sethook`: no allocation, no
         // lock, no panic. Whoever else sends the signal, to whatever thread, causes at most one tick.
         let registered =
-            unsafe { signal_hook::low_level::register(signal, || current().into_iter().for_each(Watch::tick)) };
+            unsafe { signal_hook::low_level::register(signal, || current().into_iter().for_each(CallWatch::tick)) };
         registered.ok().map(|_| signal)
     })
 }
@@ -343,7 +343,7 @@ mod tests {
     use std::rc::Rc;
 
     /// A state whose function `tick` is a tick, the only ones there are, and whose calls are over after so many looks.
-    fn watched(looks: u64) -> (Lua, Watch, Rc<Cell<u64>>) {
+    fn watched(looks: u64) -> (Lua, CallWatch, Rc<Cell<u64>>) {
         let lua = Lua::new();
         let seen = Rc::new(Cell::new(0));
         let counted = seen.clone();
@@ -351,7 +351,7 @@ mod tests {
             counted.set(counted.get() + 1);
             counted.get() >= looks
         };
-        let watch = Watch::with(&lua, look, || None).expect("a main thread");
+        let watch = CallWatch::with(&lua, look, || None).expect("a main thread");
         let tick = lua.create_function(|_, ()| {
             current().expect("a call").tick();
             Ok(())
@@ -439,7 +439,7 @@ mod tests {
             counted.set(counted.get() + u64::from(instructions));
             false
         };
-        let watch = Watch::with(&lua, look, || None).expect("a main thread");
+        let watch = CallWatch::with(&lua, look, || None).expect("a main thread");
         let tick = lua.create_function(|_, ()| {
             current().expect("a call").tick();
             Ok(())

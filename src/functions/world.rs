@@ -1,7 +1,7 @@
 //! The Lua state of a coordinator with functions: what is there, under which names, what is closed, and how a program is run in it.
 
 use super::guards;
-use super::host::{Host, RFSM_KEY, Reader, run};
+use super::host::{FileReader, Host, RFSM_KEY, run};
 use super::native;
 use super::values::to_lua;
 use crate::limits;
@@ -17,7 +17,7 @@ const PLUGINS: &str = include_str!("lua/plugins.lua");
 const BASE: &str = include_str!("lua/base.lua");
 
 /// A state with everything in it that a model finds, and nothing run yet.
-pub fn state(open: Openings, reader: Reader) -> Result<(Lua, Rc<Host>)> {
+pub fn state(open: Openings, reader: FileReader) -> Result<(Lua, Rc<Host>)> {
     let mut libraries = StdLib::TABLE | StdLib::STRING | StdLib::MATH | StdLib::COROUTINE | StdLib::UTF8;
     if open.io {
         libraries |= StdLib::IO;

@@ -9,7 +9,7 @@ use crate::time::Time;
 
 /// What is wrong with a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct TableProblem {
     /// Its code.
     pub code: Code,
     /// One sentence.
@@ -45,9 +45,15 @@ fn cells(line: &str) -> impl Iterator<Item = TableCell<'_>> {
     })
 }
 
-fn problem(code: Code, line: &str, cell: &TableCell<'_>, message: String, help: impl Into<String>) -> Problem {
+fn problem(code: Code, line: &str, cell: &TableCell<'_>, message: String, help: impl Into<String>) -> TableProblem {
     let count = |text: &str| u32::try_from(text.chars().count()).unwrap_or(u32::MAX);
-    Problem { code, message, column: count(&line[..cell.start]), length: count(cell.text).max(1), help: help.into() }
+    TableProblem {
+        code,
+        message,
+        column: count(&line[..cell.start]),
+        length: count(cell.text).max(1),
+        help: help.into(),
+    }
 }
 
 /// A text without its line end and a mark of byte order.
@@ -65,7 +71,7 @@ impl Columns {
     ///
     /// # Errors
     /// When there is no column `time`, or a name is missing or stands twice.
-    pub fn new(line: &str) -> Result<Self, Problem> {
+    pub fn new(line: &str) -> Result<Self, TableProblem> {
         let line = clean(line);
         let wrong =
             |cell: &TableCell<'_>, message: String, help: &str| problem(SAMPLES_COLUMNS, line, cell, message, help);
@@ -114,7 +120,12 @@ impl Columns {
     ///
     /// # Errors
     /// When it has another number of cells, no time or one before that of the last line, or a cell that is no number.
-    pub fn line(&mut self, line: &str, wanted: &[bool], cell: &mut dyn FnMut(usize, f64)) -> Result<Time, Problem> {
+    pub fn line(
+        &mut self,
+        line: &str,
+        wanted: &[bool],
+        cell: &mut dyn FnMut(usize, f64),
+    ) -> Result<Time, TableProblem> {
         let line = clean(line);
         let mut at = None;
         let mut count = 0;
@@ -166,9 +177,9 @@ impl Columns {
 }
 
 /// What is wrong with a recording without lines.
-pub fn empty(header: bool) -> Problem {
+pub fn empty(header: bool) -> TableProblem {
     let message = if header { "there is no line after the first" } else { "the file is empty" };
-    Problem {
+    TableProblem {
         code: SAMPLES_EMPTY,
         message: message.to_owned(),
         column: 0,

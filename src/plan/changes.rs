@@ -5,7 +5,7 @@
 //! the written order was.
 
 use super::StepId;
-use super::builder::Builder;
+use super::builder::PlanBuilder;
 use super::conflicts::{Sorted, Use, clash};
 use super::meant::Meant;
 use crate::model::{Change, ChangeKind, ComponentName, MemberRef, Origin, RunState, Step, Wanted};
@@ -44,7 +44,7 @@ impl Waits {
     }
 }
 
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
+pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let mut classes: [Vec<u32>; 5] = Default::default();
     for (i, change) in changes.iter().enumerate() {
@@ -85,7 +85,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
 }
 
 fn disconnect(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     w: &mut Waits,
     from: MemberRef,
     to: MemberRef,
@@ -104,7 +104,7 @@ fn disconnect(
     }
 }
 
-fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, origin: Origin) {
+fn destroy(b: &mut PlanBuilder<'_, '_, '_>, w: &mut Waits, component: ComponentName, origin: Origin) {
     let mut after = After::new();
     if let Some(state) = b.view.component(component).map(|n| n.state)
         && state != RunState::Faulted
@@ -122,7 +122,7 @@ fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName,
     }
 }
 
-fn create(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, meant: Meant, origin: Origin) {
+fn create(b: &mut PlanBuilder<'_, '_, '_>, w: &mut Waits, component: ComponentName, meant: Meant, origin: Origin) {
     let Meant { step: what, wrong, .. } = meant;
     let Step::Create { ty, .. } = &what else { return };
     let known = b.view.types().get(*ty).is_some();
@@ -150,7 +150,7 @@ fn create(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, 
 }
 
 /// The change that a rival change competes with, unless that one is wrong by itself.
-fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
+fn rival<'c>(b: &PlanBuilder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
     let configuration = b.configuration;
     let Use::Rival(first) = usage else { return None };
     let first = &configuration.changes[first];
@@ -158,7 +158,7 @@ fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
 }
 
 fn set(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     w: &Waits,
     property: MemberRef,
     what: Step,
@@ -195,7 +195,7 @@ fn set(
     }
 }
 
-fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, change: &Change, usage: Use) {
+fn write(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, change: &Change, usage: Use) {
     let mut after = After::new();
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
@@ -220,7 +220,7 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, ch
     }
 }
 
-fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Change) {
+fn operation(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Change) {
     let mut after = After::new();
     for component in change.kind.components() {
         w.created(component, &mut after);
@@ -229,7 +229,7 @@ fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Chan
 }
 
 fn connect(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     w: &Waits,
     from: MemberRef,
     to: MemberRef,

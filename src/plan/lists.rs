@@ -1,16 +1,16 @@
 //! The pre- and post-state lists: entries in order, `_default` expanded at its place.
 
-use super::builder::Builder;
+use super::builder::PlanBuilder;
 use super::conflicts::Sorted;
 use super::footprint::{Access, Slot};
 use super::order::{self, Move};
-use super::{Stage, StepId};
+use super::{PlanStage, StepId};
 use crate::model::codes;
 use crate::model::{ComponentName, Finding, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
 use crate::system::{View, Violation};
 use rustc_hash::FxHashSet;
 
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage, sorted: &Sorted) {
+pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, list: &StateList, stage: PlanStage, sorted: &Sorted) {
     b.stage = stage;
     let mut frontier: Vec<StepId> = Vec::new();
     for entry in list.iter() {
@@ -22,7 +22,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage,
 }
 
 fn named(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     component: ComponentName,
     entry: StateEntry,
     sorted: &Sorted,
@@ -44,18 +44,18 @@ fn named(
     }
 }
 
-fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
+fn unknown(b: &mut PlanBuilder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
         // One that is destroyed and created again concerns the component that was there before.
-        (Stage::Pre, Some(create), None) => {
+        (PlanStage::Pre, Some(create), None) => {
             let message =
                 format!("`{component}` is created by this configuration and does not exist before the changes");
             Finding::error(codes::PRE_ON_CREATED, message)
                 .also(changes[*create].origin, "created here")
                 .help("put the entry into post_conf_state")
         }
-        (Stage::Post, None, Some(destroy)) if !b.blamed.contains(&component) => {
+        (PlanStage::Post, None, Some(destroy)) if !b.blamed.contains(&component) => {
             let message =
                 format!("`{component}` is destroyed by this configuration and does not exist after the changes");
             Finding::error(codes::POST_ON_DESTROYED, message)
@@ -68,12 +68,12 @@ fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEn
     b.findings.push(finding.at(entry.origin));
 }
 
-fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
+fn expand(b: &mut PlanBuilder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
     let named: FxHashSet<ComponentName> = list.named().collect();
     let scope = b.configuration.id.prefix();
     let wanted = RunState::from(entry.state);
     // Before the changes it is a matter of standing still, and what has faulted does: to bring it out of that could only fail.
-    let stands = |state| state == RunState::Faulted && b.stage == Stage::Pre && wanted == RunState::Stopped;
+    let stands = |state| state == RunState::Faulted && b.stage == PlanStage::Pre && wanted == RunState::Stopped;
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
         if node.state != wanted

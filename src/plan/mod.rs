@@ -40,7 +40,7 @@ impl Context {
 /// The stage a step belongs to. Stages are barriers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Stage {
+pub enum PlanStage {
     /// The pre-state list.
     Pre,
     /// The changes.
@@ -58,7 +58,7 @@ pub struct PlannedStep {
     /// Its number: its place in the list.
     pub id: StepId,
     /// The stage it belongs to (for an inverse: the stage of the step it undoes).
-    pub stage: Stage,
+    pub stage: PlanStage,
     /// Barriers: a step begins only when all steps of smaller waves are done. Never decreases along the list.
     pub wave: u32,
     /// Steps of the same wave that must be done before; all have smaller numbers.

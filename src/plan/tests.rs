@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, PlannedStep, Refusal, Stage, irreversible, plan};
+use super::{Context, Plan, PlanStage, PlannedStep, Refusal, irreversible, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -197,8 +197,8 @@ fn the_clean_example_is_planned_in_derived_order() {
     let after: Vec<Vec<u32>> = plan.steps.iter().map(|s| s.after.to_vec()).collect();
     assert_eq!(after[4], [3, 1], "destroy waits for cleanup and for the disconnect");
     assert_eq!((after[5].as_slice(), after[6].as_slice(), after[7].as_slice()), (&[4][..], &[5][..], &[5, 1][..]));
-    assert_eq!(plan.steps[0].stage, Stage::Pre);
-    assert_eq!(plan.steps[10].stage, Stage::Post);
+    assert_eq!(plan.steps[0].stage, PlanStage::Pre);
+    assert_eq!(plan.steps[10].stage, PlanStage::Post);
     assert!(plan.warnings.is_empty() && irreversible(&plan.steps).is_none());
 }
 

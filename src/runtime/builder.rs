@@ -30,7 +30,7 @@ pub(crate) type OperationFn<C> = Box<dyn Fn(&mut C, &mut Context, &[Value]) -> O
 pub(crate) type CallerFn = Arc<dyn Fn(&[Value]) -> Reply + Send + Sync>;
 
 /// What all components of a type share, in terms of their Rust type.
-pub(crate) struct Table<C> {
+pub(crate) struct MemberTable<C> {
     /// Ports in the order of declaration, with the index in the order of names.
     ports: Vec<(Ident, usize)>,
     properties: Vec<(Ident, usize)>,
@@ -60,7 +60,7 @@ enum BuilderMode<C> {
 
 struct Description<C> {
     ty: ComponentType,
-    words: Words,
+    words: MemberWords,
     ports: Vec<Ident>,
     properties: Vec<Ident>,
     operations: Vec<(Ident, Option<OperationFn<C>>)>,
@@ -68,7 +68,7 @@ struct Description<C> {
 }
 
 #[derive(Default)]
-pub(super) struct Words {
+pub(super) struct MemberWords {
     pub(super) doc: String,
     pub(super) unit: Option<Arc<str>>,
     pub(super) min: Option<f64>,
@@ -82,7 +82,7 @@ pub(super) struct Words {
 }
 
 struct MakingMembers<C> {
-    table: Arc<Table<C>>,
+    table: Arc<MemberTable<C>>,
     beat: Arc<Beat>,
     values: Vec<Value>,
     made: Ends,
@@ -105,10 +105,10 @@ pub(super) fn ident(name: &str) -> Ident {
 
 impl<C: Component> Builder<C> {
     /// The type as its constructor declares it.
-    pub(crate) fn describe_type(name: &str, new: impl FnOnce(&mut Self) -> C) -> (ComponentType, Table<C>) {
+    pub(crate) fn describe_type(name: &str, new: impl FnOnce(&mut Self) -> C) -> (ComponentType, MemberTable<C>) {
         let description = Description {
             ty: ComponentType::new(name, ""),
-            words: Words::default(),
+            words: MemberWords::default(),
             ports: Vec::new(),
             properties: Vec::new(),
             operations: Vec::new(),
@@ -128,7 +128,7 @@ impl<C: Component> Builder<C> {
                 assert!(d.ty.operations.contains_key(undo), "{name}: there is no operation `{undo}` to undo another");
             }
         }
-        let table = Table {
+        let table = MemberTable {
             ports: indexed(&d.ports, &ports),
             properties: indexed(&d.properties, &properties),
             operations: d.operations.into_iter().map(|(_, f)| f).collect(),
@@ -142,7 +142,7 @@ impl<C: Component> Builder<C> {
     /// # Errors
     /// In words, when a value does not fit its property's Rust type.
     pub(crate) fn make(
-        table: &Arc<Table<C>>,
+        table: &Arc<MemberTable<C>>,
         beat: &Arc<Beat>,
         values: Vec<Value>,
         new: impl FnOnce(&mut Self) -> C,
@@ -173,7 +173,7 @@ impl<C: Component> Builder<C> {
         }
     }
 
-    pub(super) fn words(&mut self, f: impl FnOnce(&mut Words)) -> &mut Self {
+    pub(super) fn words(&mut self, f: impl FnOnce(&mut MemberWords)) -> &mut Self {
         if let BuilderMode::Describe(d) = &mut self.mode {
             f(&mut d.words);
         }

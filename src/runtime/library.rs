@@ -1,7 +1,7 @@
 //! Libraries: named sets of component types. A catalogue starts nothing.
 
 use super::beat::Beat;
-use super::builder::{Builder, Ends, Table, hook_index};
+use super::builder::{Builder, Ends, MemberTable, hook_index};
 use super::call::Reply;
 use super::component::{Component, Context, HookResult};
 use crate::model::{Catalogue, ComponentType, Ident, Transition, TypeName, Value};
@@ -18,7 +18,7 @@ pub(crate) trait Body: Send {
 
 struct Typed<C> {
     component: C,
-    table: Arc<Table<C>>,
+    table: Arc<MemberTable<C>>,
 }
 
 impl<C: Component> Body for Typed<C> {

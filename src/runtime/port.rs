@@ -7,7 +7,7 @@
 use super::beat::Beat;
 use super::latest::{Reader, Writer, latest};
 use super::links::{Links, Sender, links};
-use super::probe::{Tap, Tapped};
+use super::probe::{ProbeTap, Tapped};
 use super::value::PortValue;
 use crate::model::{EventName, Policy, Value};
 use crate::time::Time;
@@ -18,12 +18,12 @@ use std::time::Duration;
 
 /// A value with the moment it was written; none: never written.
 #[derive(Debug, Clone)]
-pub(super) struct Slot<T> {
+pub(super) struct Stamped<T> {
     pub(super) value: Option<T>,
     pub(super) at: Time,
 }
 
-impl<T: Clone> Slot<T> {
+impl<T: Clone> Stamped<T> {
     const EMPTY: Self = Self { value: None, at: Time(0) };
 
     fn set(&mut self, value: &T, at: Time) {
@@ -37,10 +37,10 @@ impl<T: Clone> Slot<T> {
 
 /// Where an in-port's values come from.
 enum Source<T> {
-    Data(Reader<Slot<T>>),
+    Data(Reader<Stamped<T>>),
     Fifo(rtrb::Consumer<(T, Time)>, Arc<AtomicU64>),
     /// What `port_write` writes; in force while nothing else is there.
-    Written(Reader<Slot<T>>),
+    Written(Reader<Stamped<T>>),
 }
 
 /// What an in-port was read to hold.
@@ -62,7 +62,7 @@ pub struct Sample<'a, T> {
 pub struct In<T> {
     links: Links<Source<T>>,
     /// The value popped last from a queue.
-    popped: Slot<T>,
+    popped: Stamped<T>,
     beat: Option<Arc<Beat>>,
 }
 
@@ -76,12 +76,12 @@ enum FoundSource {
 impl<T: PortValue> In<T> {
     /// A port of nobody: what a description of a type holds.
     pub(crate) fn loose() -> Self {
-        Self { links: links().1, popped: Slot::EMPTY, beat: None }
+        Self { links: links().1, popped: Stamped::EMPTY, beat: None }
     }
 
     pub(crate) fn new(beat: &Arc<Beat>) -> (Self, Box<dyn InEnd>) {
         let (sender, list) = links();
-        let port = Self { links: list, popped: Slot::EMPTY, beat: Some(beat.clone()) };
+        let port = Self { links: list, popped: Stamped::EMPTY, beat: Some(beat.clone()) };
         (port, Box::new(InPortEnd::<T> { sender, written: None, beat: beat.clone() }))
     }
 
@@ -136,7 +136,7 @@ impl<T: PortValue> In<T> {
         }
         match oldest.and_then(|(_, queue)| queue.pop().ok()) {
             Some((value, at)) => {
-                self.popped = Slot { value: Some(value), at };
+                self.popped = Stamped { value: Some(value), at };
                 true
             }
             None => false,
@@ -185,9 +185,9 @@ pub struct Inlet<T> {
 }
 
 enum InletKind<T> {
-    Data(Writer<Slot<T>>),
+    Data(Writer<Stamped<T>>),
     /// A probe: the latest value, and how often there was one.
-    Tap(Writer<(Slot<T>, u64)>, u64),
+    Tap(Writer<(Stamped<T>, u64)>, u64),
     Fifo(rtrb::Producer<(T, Time)>, Arc<AtomicU64>),
 }
 
@@ -328,7 +328,7 @@ pub trait InEnd: Send {
 
 struct InPortEnd<T> {
     sender: Sender<Source<T>>,
-    written: Option<Writer<Slot<T>>>,
+    written: Option<Writer<Stamped<T>>>,
     beat: Arc<Beat>,
 }
 
@@ -340,7 +340,7 @@ impl<T: PortValue> InEnd for InPortEnd<T> {
         let wake = self.beat.is_event_driven().then(|| self.beat.clone());
         match policy {
             Policy::Data => {
-                let (writer, reader) = latest(Slot::EMPTY);
+                let (writer, reader) = latest(Stamped::EMPTY);
                 self.sender.add(id, Source::Data(reader));
                 Box::new(Inlet { kind: InletKind::Data(writer), wake })
             }
@@ -359,7 +359,7 @@ impl<T: PortValue> InEnd for InPortEnd<T> {
 
     fn prepare(&mut self) {
         if self.written.is_none() {
-            let (writer, reader) = latest(Slot::EMPTY);
+            let (writer, reader) = latest(Stamped::EMPTY);
             self.sender.add(WRITTEN, Source::Written(reader));
             self.written = Some(writer);
         }
@@ -373,7 +373,7 @@ impl<T: PortValue> InEnd for InPortEnd<T> {
         };
         self.prepare();
         if let Some(writer) = &mut self.written {
-            writer.write(|slot| *slot = Slot { value, at });
+            writer.write(|slot| *slot = Stamped { value, at });
         }
         self.beat.poke();
         true
@@ -387,7 +387,7 @@ pub(crate) trait OutEnd: Send {
     /// Removes connection or probe `id`.
     fn detach(&mut self, id: u64);
     /// Adds the probe `id`; every write wakes `wake`.
-    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap>;
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn ProbeTap>;
 }
 
 impl<T: PortValue> OutEnd for Sender<PortTarget<T>> {
@@ -407,8 +407,8 @@ impl<T: PortValue> OutEnd for Sender<PortTarget<T>> {
         self.remove(id);
     }
 
-    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap> {
-        let (writer, reader) = latest((Slot::EMPTY, 0));
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn ProbeTap> {
+        let (writer, reader) = latest((Stamped::EMPTY, 0));
         self.add(id, PortTarget::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
         Box::new(Tapped { reader })
     }

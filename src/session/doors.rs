@@ -3,7 +3,7 @@
 use super::connection::Connection;
 use super::place;
 use super::rpc::{self, RpcError};
-use super::serving::{Shared, serve, too_many};
+use super::serving::{ServingShared, serve, too_many};
 use crate::time::lock;
 use serde_json::Value as Json;
 use std::fs::File;
@@ -61,7 +61,7 @@ impl Doors {
     }
 
     /// A place, an ordinary one if there is one left.
-    fn place(self: &Arc<Self>, shared: &Shared) -> Option<DoorPlace> {
+    fn place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         let kept = inside.places >= shared.bounds.connections;
         if kept && inside.kept >= shared.bounds.kept {
@@ -72,7 +72,7 @@ impl Doors {
     }
 
     /// A place of those that are kept.
-    fn kept_place(self: &Arc<Self>, shared: &Shared) -> Option<DoorPlace> {
+    fn kept_place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         if inside.kept >= shared.bounds.kept {
             return None;
@@ -88,7 +88,7 @@ impl Doors {
     }
 
     /// Lets clients in until the doors are closed.
-    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<Shared>) {
+    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<ServingShared>) {
         // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
         let mut spare = File::open("/dev/null").ok();
         // There before there is none left: an emergency stop needs no thread.
@@ -120,7 +120,7 @@ impl Doors {
     }
 
     /// Waits a little, or until the doors are closed.
-    fn pause(&self, shared: &Shared) {
+    fn pause(&self, shared: &ServingShared) {
         let inside = lock(&self.inside);
         let still = |inside: &mut InsideDoor| !inside.closed;
         drop(
@@ -128,7 +128,13 @@ impl Doors {
         );
     }
 
-    fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>, waiting: &SyncSender<Waiting>) {
+    fn admit(
+        self: &Arc<Self>,
+        number: u32,
+        stream: UnixStream,
+        shared: &Arc<ServingShared>,
+        waiting: &SyncSender<Waiting>,
+    ) {
         if !place::is_own(&stream) {
             let why = "this socket is for the processes of its own user";
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
@@ -157,13 +163,13 @@ impl Doors {
 }
 
 /// Answers one connection to its end.
-fn attend(connection: &Arc<Connection>, shared: &Shared, kept: bool) {
+fn attend(connection: &Arc<Connection>, shared: &ServingShared, kept: bool) {
     let _ = serve(connection, shared, kept);
     shared.subscribers.remove(connection.number);
     connection.cut();
 }
 
-fn refuse(number: u32, stream: UnixStream, shared: &Shared, why: RpcError) {
+fn refuse(number: u32, stream: UnixStream, shared: &ServingShared, why: RpcError) {
     // A line of a new connection finds room: nobody waits here.
     if let Ok(connection) = Connection::new(number, stream, shared.bounds.write) {
         let _ = connection.send(&rpc::answer(&Json::Null, Err(why)));

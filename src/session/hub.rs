@@ -5,7 +5,7 @@
 
 use super::halt::Halt;
 use super::lanes::Lanes;
-use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
+use super::log::{Answered, Fault, Happening, Log, LogEntry, Phase};
 use super::names::Unlisted;
 use super::tap::Hears;
 use crate::coordinator::{Put, Refused};
@@ -206,7 +206,7 @@ impl Hub {
                 state.heard.push(event, is_report);
             }
             state.epoch += 1;
-            let entry = Arc::new(Entry { at: now.as_secs_f64(), what });
+            let entry = Arc::new(LogEntry { at: now.as_secs_f64(), what });
             state.log.push(entry.clone(), is_report);
             // Under the lock, so that all hear it in one order.
             state.taps.iter().for_each(|tap| tap.hear(&entry));
@@ -382,7 +382,7 @@ impl Hub {
     }
 
     /// The newest entries of the log, oldest first.
-    pub fn log(&self, last: usize) -> Vec<Arc<Entry>> {
+    pub fn log(&self, last: usize) -> Vec<Arc<LogEntry>> {
         self.lock().log.last(last)
     }
 

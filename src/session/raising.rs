@@ -3,7 +3,7 @@
 use super::Session;
 use super::log::Happening;
 use super::names::NotFromOutside;
-use super::parts::Part;
+use super::parts::CoordinatorPart;
 use super::routes::{Acted, NO_MORE, make_safe};
 use crate::coordinator::{Class, Refused};
 use crate::model::{EventName, Ident};
@@ -105,7 +105,7 @@ impl Session {
         }
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
-        let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts().len()), false);
+        let (mut held, mut gone): (Vec<&CoordinatorPart>, bool) = (Vec::with_capacity(self.parts().len()), false);
         for part in self.parts().iter().filter(|part| to(part.name)) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::log::Happening;
-use crate::configurator::{Drift, Recovery, Residual, View};
+use crate::configurator::{ConfiguratorView, Drift, Recovery, Residual};
 use crate::model::{ComponentName, Step};
 use serde::Serialize;
 use std::fmt;
@@ -68,7 +68,7 @@ impl Difference {
 
     /// Everything that is not as it should be, each once: all that is broken, what partial frames hold, and components that
     /// still have not come back from a call.
-    pub(super) fn of_view(view: &View) -> Vec<Self> {
+    pub(super) fn of_view(view: &ConfiguratorView) -> Vec<Self> {
         let residuals = view.residuals.iter().map(|residual| &**residual).chain(&view.partial);
         let mut all: Vec<Self> = Vec::new();
         let quarantined = view.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
@@ -181,7 +181,7 @@ mod tests {
             quarantined: quarantined.iter().map(|text| name(text)).collect(),
             ..Residual::of(Reason::Busy)
         };
-        let view = View {
+        let view = ConfiguratorView {
             system: None,
             stack: Vec::new(),
             broken: None,

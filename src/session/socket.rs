@@ -6,8 +6,8 @@
 
 use super::doors::Doors;
 use super::owner::Owner;
-use super::place::{self, Known};
-use super::serving::{Calls, Shared};
+use super::place::{self, KnownName};
+use super::serving::{ServedCalls, ServingShared};
 use super::subscribers::{Subscribers, ToSubscribers};
 use super::tap::Hears;
 use crate::limits;
@@ -28,11 +28,11 @@ pub use super::serving::{Bounds, Service};
 pub struct ControlSocket {
     path: PathBuf,
     /// The file it made.
-    file: Known,
+    file: KnownName,
     /// The listening socket, to end it.
     listening: UnixStream,
     doors: Arc<Doors>,
-    shared: Arc<Shared>,
+    shared: Arc<ServingShared>,
     observer: Mutex<Option<ToSubscribers>>,
     accepting: Option<JoinHandle<()>>,
     /// Held longest.
@@ -84,11 +84,11 @@ impl ControlSocket {
             _ => {}
         }
         let listener = UnixListener::bind(&path).map_err(io)?;
-        let file = Known::at(&path).map_err(io)?;
+        let file = KnownName::at(&path).map_err(io)?;
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
         let subscribers = Arc::new(Subscribers::new(bounds.queue));
-        let shared = Arc::new(Shared { bounds, subscribers, calls: Calls::default(), service });
+        let shared = Arc::new(ServingShared { bounds, subscribers, calls: ServedCalls::default(), service });
         let doors = Arc::new(Doors::default());
         let accepting = {
             let (doors, shared) = (doors.clone(), shared.clone());

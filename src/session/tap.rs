@@ -8,7 +8,7 @@
 //! simulation waits for the observer ([`Tap::keep_pace`]), and nothing is lost, unless the observer takes nothing at all
 //! for [`limits::TAP_PATIENCE`].
 
-use super::log::Entry;
+use super::log::LogEntry;
 use crate::limits;
 use crate::time::{Clock, Time, lock};
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ use std::time::Duration;
 /// Something that hears all that happens. Never waits, but where it is asked to keep pace.
 pub trait Hears: Send + Sync {
     /// Called in the thread that acts, in the order in which things happen.
-    fn hear(&self, entry: &Arc<Entry>);
+    fn hear(&self, entry: &Arc<LogEntry>);
 
     /// Called in simulated time, behind it and without any lock of the session: may wait for a slow observer.
     fn keep_pace(&self) {}
@@ -194,8 +194,8 @@ impl<T> Tap<T> {
     }
 }
 
-impl<T: From<Arc<Entry>> + Send> Hears for Tap<T> {
-    fn hear(&self, entry: &Arc<Entry>) {
+impl<T: From<Arc<LogEntry>> + Send> Hears for Tap<T> {
+    fn hear(&self, entry: &Arc<LogEntry>) {
         self.put(T::from(entry.clone()));
     }
 

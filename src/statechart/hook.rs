@@ -24,7 +24,7 @@ pub struct Raised {
 
 /// Where a function of a model is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum ActionPlace {
     /// On the entry of a state.
     Entry(NodeId),
     /// On the exit of a state, which is already inactive then.
@@ -184,7 +184,7 @@ pub trait Hook {
     }
 
     /// Runs an entry, exit or effect function.
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         let _ = (function, place, view);
     }
 
@@ -355,7 +355,7 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.predicate(function, event, view)
     }
 
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         self.functions.action(function, place, view);
     }
 

@@ -36,12 +36,12 @@ pub struct Stepped {
     /// At least one transition was taken, the first entry counted.
     pub transition: bool,
     /// Why it ended.
-    pub ended: Ended,
+    pub ended: RunEnd,
 }
 
 /// Why stepping ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ended {
+pub enum RunEnd {
     /// Nothing left to do.
     Idle,
     /// As many steps as asked for.

@@ -17,7 +17,7 @@ use crate::time::Time;
 
 /// What one event does to one leaf at rest.
 #[derive(Debug, Clone, Copy)]
-struct Reaction {
+struct ReactionRow {
     event: EventId,
     /// The leaf it ends in.
     leaf: NodeId,
@@ -39,7 +39,7 @@ struct Reaction {
 /// its rows, then the row would be three looks into memory that wait for each other.
 #[derive(Debug, Clone, Copy)]
 struct KnownReactions {
-    first: Reaction,
+    first: ReactionRow,
     /// The other rows, sorted by event.
     more: Span,
 }
@@ -48,7 +48,7 @@ impl KnownReactions {
     /// Nothing is known.
     const NONE: Self = {
         let none = Span { start: 0, len: 0 };
-        let first = Reaction {
+        let first = ReactionRow {
             event: EventId::NEVER,
             leaf: NodeId::ROOT,
             keep: 0,
@@ -64,10 +64,10 @@ impl KnownReactions {
 
 /// The reactions of a chart.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Reactions {
+pub(super) struct ReactionTable {
     /// By node; nothing is known but of leaves.
     of: Vec<KnownReactions>,
-    rows: Vec<Reaction>,
+    rows: Vec<ReactionRow>,
     around: Vec<NodeId>,
     raised: Vec<(EventName, NodeId, Option<NodeId>)>,
 }
@@ -127,7 +127,7 @@ impl Machine {
 
     /// What a row says, step by step.
     #[inline(never)]
-    fn play<H: Hook>(&mut self, chart: &Chart, row: Reaction, now: Time, hook: &mut H) -> AtOnce {
+    fn play<H: Hook>(&mut self, chart: &Chart, row: ReactionRow, now: Time, hook: &mut H) -> AtOnce {
         let all = &chart.reactions;
         self.path.truncate(row.keep as usize);
         for state in row.around.of(&all.around) {
@@ -152,7 +152,7 @@ impl Machine {
 
     /// Time events after a reaction: those of the entered states begin anew, and those that are due are raised.
     #[cold]
-    fn time_after(&mut self, chart: &Chart, row: Reaction, now: Time) -> AtOnce {
+    fn time_after(&mut self, chart: &Chart, row: ReactionRow, now: Time) -> AtOnce {
         for state in row.around.of(&chart.reactions.around).iter().chain([&row.leaf]) {
             self.restart_timer(chart, *state, now, &mut Nobody);
         }
@@ -167,7 +167,7 @@ impl Machine {
     }
 }
 
-impl Reactions {
+impl ReactionTable {
     /// Asks the engine what each event that a leaf or a state around it lists does to that leaf.
     pub(super) fn of(chart: &Chart) -> Self {
         let mut reactions = Self { of: vec![KnownReactions::NONE; chart.nodes.len()], ..Self::default() };
@@ -234,7 +234,7 @@ impl Reactions {
         event: EventId,
         machine: &Machine,
         notes: &Notes,
-    ) -> Option<Reaction> {
+    ) -> Option<ReactionRow> {
         let leaf = machine.leaf?;
         let (entered, around) = notes.entered.split_last()?;
         debug_assert_eq!(*entered, leaf, "a transition ends in the leaf it enters last");
@@ -250,7 +250,7 @@ impl Reactions {
             _ => None,
         };
         let simple = around.is_empty() && chart.depth(from) == keep && name.is_some() && chart.timers.is_empty();
-        Some(Reaction {
+        Some(ReactionRow {
             event,
             leaf,
             keep: u32::try_from(keep).expect("less deep than ids are many"),

@@ -3,7 +3,7 @@
 use super::Machine;
 use super::chart::{Chart, NodeId};
 use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
-use super::outcome::{Ended, Mode, Stepped};
+use super::outcome::{Mode, RunEnd, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
 use crate::model::finding::{count, nearest};
@@ -167,7 +167,7 @@ impl<'c, F: Hook> Sim<'c, F> {
         if trace.left_out > 0 {
             end(format!("left out: {}", count(trace.left_out, "more note")));
         }
-        if stepped.ended == Ended::Endless {
+        if stepped.ended == RunEnd::Endless {
             end(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
         }
         Observation {

@@ -25,7 +25,7 @@ enum StepState {
 
 /// A list of steps and how far it is.
 #[derive(Debug)]
-pub(super) struct Run {
+pub(super) struct StepsRun {
     pub list: Arc<Vec<PlannedStep>>,
     state: Vec<StepState>,
     /// As long as no step is blocking the list's own order serves, from here on.
@@ -47,7 +47,7 @@ pub(super) struct Run {
     /// How long each step may take, or all of them.
     limits: SmallVec<[Limit; 1]>,
     /// Steps that came in after a safe configuration had begun.
-    pub late: Vec<Late>,
+    pub late: Vec<LateStep>,
     pub late_from_now: bool,
     /// Whether it is noted when steps were done, and those, with the revision of the model that they led to.
     pub notes: bool,
@@ -56,7 +56,7 @@ pub(super) struct Run {
 
 /// A step that came in after a safe configuration had begun.
 #[derive(Debug)]
-pub(super) struct Late {
+pub(super) struct LateStep {
     pub step: u32,
     /// What takes it back to what was there when it came in.
     pub undo: Undo,
@@ -64,7 +64,7 @@ pub(super) struct Late {
     pub revision: u64,
 }
 
-impl Run {
+impl StepsRun {
     /// With one limit for all steps, or one for each.
     pub fn new(list: Arc<Vec<PlannedStep>>, limits: SmallVec<[Limit; 1]>) -> Self {
         Self {
@@ -426,7 +426,7 @@ impl Run {
             _ => None,
         };
         let undo = step::inverse(&planned.step, call.as_ref(), live);
-        self.late.push(Late { step: i, undo, revision: live.revision() });
+        self.late.push(LateStep { step: i, undo, revision: live.revision() });
     }
 
     pub fn did_not_happen(&mut self, i: u32, cause: Cause, live: &mut System) {

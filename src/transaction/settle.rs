@@ -1,8 +1,8 @@
 //! Unknown outcomes, settled by what was read back; what cannot be settled is named.
 
 use super::messages::{Poll, Question};
-use super::run::Run;
-use super::{Asked, Phase, Transaction};
+use super::run::StepsRun;
+use super::{OpenQuestion, Transaction, TransactionPhase};
 use crate::model::{ComponentName, Effect, RunState, Snapshot, Step};
 use crate::system::touch::components;
 use crate::system::{System, View as _};
@@ -24,7 +24,8 @@ fn is_asked(step: &Step, live: &System) -> bool {
 impl Transaction {
     /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
     pub(super) fn settle(&mut self, live: &mut System) -> Option<Poll> {
-        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
+        if self.in_hand().unread.is_empty()
+            || matches!(self.phase, TransactionPhase::Looking | TransactionPhase::LookingAgain | TransactionPhase::Over)
         {
             return None;
         }
@@ -84,7 +85,7 @@ impl Transaction {
                 _ if self.taken_down => Some(None),
                 Some(asked) => asked.told,
                 None => {
-                    self.asked.push(Asked { question, told: None });
+                    self.asked.push(OpenQuestion { question, told: None });
                     return Some(Poll::Ask(question));
                 }
             };
@@ -115,7 +116,7 @@ fn unread(step: &Step, live: &System) -> Option<SettledAs> {
     Some(if leaves_nothing { SettledAs::DidNot } else { SettledAs::Nobody })
 }
 
-impl Run {
+impl StepsRun {
     /// Settles what can be settled without reading. Answers whether something is left that must be read.
     pub(super) fn settle_blind(&mut self, live: &mut System) -> bool {
         let mut at = 0;

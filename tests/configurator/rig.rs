@@ -300,7 +300,7 @@ impl Rig {
         self.platform.quarantined()
     }
 
-    pub fn view(&self) -> Arc<View> {
+    pub fn view(&self) -> Arc<ConfiguratorView> {
         self.handle.view(true, self.clock.now() + Duration::from_secs(10)).expect("a view")
     }
 

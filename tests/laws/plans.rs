@@ -216,7 +216,7 @@ proptest! {
         // Irreversible steps come last in their wave, except for what depends on them.
         for (i, s) in push.steps.iter().enumerate().filter(|(_, s)| s.reversibility == Reversibility::Irreversible) {
             let mut follows = vec![s.id];
-            for later in push.steps[i + 1..].iter().filter(|l| l.wave == s.wave && l.stage == davit::plan::Stage::Changes) {
+            for later in push.steps[i + 1..].iter().filter(|l| l.wave == s.wave && l.stage == davit::plan::PlanStage::Changes) {
                 if later.after.iter().any(|id| follows.contains(id)) {
                     follows.push(later.id);
                 }

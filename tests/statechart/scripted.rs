@@ -4,7 +4,7 @@ use davit::model::finding::Origin;
 use davit::model::names::EventName;
 use davit::model::statechart::{Action, FunctionId, Statechart};
 use davit::statechart::{
-    Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Place, Queue, Raised, Step, View, compile,
+    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Queue, Raised, Step, View, compile,
 };
 use davit::time::Time;
 use std::collections::{BTreeMap, VecDeque};
@@ -86,13 +86,13 @@ impl Hook for Scripted {
         self.call(function, view) != 0
     }
 
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         let active = self.path.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
         let leaf = view.leaf.map_or("none".to_owned(), |n| view.chart.name(n).to_string());
         let place = match place {
-            Place::Entry(_) => "entry",
-            Place::Exit(_) => "exit",
-            Place::Effect(_) => "effect",
+            ActionPlace::Entry(_) => "entry",
+            ActionPlace::Exit(_) => "exit",
+            ActionPlace::Effect(_) => "effect",
         };
         self.log.push(format!("{place}{}[{active},{leaf}]", function.0));
         self.call(function, view);

@@ -141,7 +141,7 @@ struct HeldRoom {
 
 /// How much of each class may wait, and how long one goes before another; see those of the same names in [`limits`].
 #[derive(Debug, Clone, Copy)]
-struct Bounds {
+struct InboxBounds {
     answers: usize,
     report: usize,
     outside: usize,
@@ -150,7 +150,7 @@ struct Bounds {
     asked: usize,
 }
 
-const BOUNDS: Bounds = Bounds {
+const BOUNDS: InboxBounds = InboxBounds {
     answers: limits::INBOX_ANSWERS,
     report: limits::INBOX_REPORT,
     outside: limits::INBOX_OUTSIDE,
@@ -162,7 +162,7 @@ const BOUNDS: Bounds = Bounds {
 /// All classes.
 #[derive(Debug)]
 pub(super) struct Inbox {
-    bounds: Bounds,
+    bounds: InboxBounds,
     lists: Lists,
     held: HeldRoom,
     /// Answers that wait, which share a list with notices.
@@ -187,7 +187,7 @@ impl Inbox {
         Self::within(BOUNDS, declared)
     }
 
-    fn within(bounds: Bounds, declared: impl IntoIterator<Item = EventName>) -> Self {
+    fn within(bounds: InboxBounds, declared: impl IntoIterator<Item = EventName>) -> Self {
         let newest: FxHashMap<EventName, Option<u32>> = declared.into_iter().map(|name| (name, None)).collect();
         let room = bounds.answers + bounds.report + newest.len() + bounds.outside;
         Self {

@@ -3,7 +3,7 @@
 use super::chains::Chain;
 use super::level::{EdgePart, Laid, LaidBox};
 use super::meeting::{ChainEnds, EdgeMeeting};
-use super::{Run, label_size};
+use super::{LineRun, label_size};
 use crate::draw::picture::Direction;
 use std::collections::BTreeMap;
 
@@ -69,7 +69,7 @@ impl Laying<'_> {
     }
 
     /// A chain's way along, layer by layer.
-    fn runs(&self, c: usize, chain: &Chain, items: &[(usize, LaidBox)]) -> Vec<Run> {
+    fn runs(&self, c: usize, chain: &Chain, items: &[(usize, LaidBox)]) -> Vec<LineRun> {
         let n = chain.vertices.len();
         let run = |(k, &v): (usize, &usize)| {
             let vertex = self.meeting.layered.vertices[v];
@@ -83,21 +83,22 @@ impl Laying<'_> {
             } else if k + 1 == n && chain.ends_at_border {
                 to = self.size;
             }
-            Run { from, to, across, heading: 1.0 }
+            LineRun { from, to, across, heading: 1.0 }
         };
         chain.vertices.iter().enumerate().map(run).collect()
     }
 
     /// The ends of a connection that runs backwards: they turn round beside its items.
-    fn turn(&self, chain: &Chain, (a, b): (usize, usize), items: &[(usize, LaidBox)], runs: &mut Vec<Run>) {
+    fn turn(&self, chain: &Chain, (a, b): (usize, usize), items: &[(usize, LaidBox)], runs: &mut Vec<LineRun>) {
         let vertices = &self.meeting.layered.vertices;
         let at = |item: usize, source: bool| {
             let fixed = self.meeting.fixed(chain, item, source).unwrap_or(0.0);
             items[item].1.across + self.meeting.own[item].wide / 2.0 + fixed
         };
         let (sa, sb) = (items[a].1, items[b].1);
-        let out = Run { from: sa.along + sa.len, to: self.end[vertices[a].layer], across: at(a, true), heading: 1.0 };
-        let back = Run { from: self.start[vertices[b].layer], to: sb.along, across: at(b, false), heading: 1.0 };
+        let out =
+            LineRun { from: sa.along + sa.len, to: self.end[vertices[a].layer], across: at(a, true), heading: 1.0 };
+        let back = LineRun { from: self.start[vertices[b].layer], to: sb.along, across: at(b, false), heading: 1.0 };
         runs.insert(0, out);
         runs.push(back);
     }

@@ -4,7 +4,7 @@ use super::chains::{Border, Layered, Side, Vertex, spans};
 use super::laying::{Laying, add_loops};
 use super::meeting::EdgeMeeting;
 use super::rank::ranks;
-use super::{Run, header, label_size, text_size};
+use super::{LineRun, header, label_size, text_size};
 use crate::draw::picture::{Direction, Picture, Shape, Subject};
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub(super) struct EdgePart {
     pub(super) edge: usize,
     /// Parts are joined in this order: from the innermost level of the source outwards, then inwards to the target.
     pub(super) stage: i64,
-    pub(super) runs: Vec<Run>,
+    pub(super) runs: Vec<LineRun>,
     pub(super) label: Option<LaidBox>,
     pub(super) looped: Option<usize>,
 }
