@@ -6,7 +6,7 @@ use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
 use super::progress::{AnswerSink, ProgressSink};
-use super::request::{Answer, Batch, Full, Reason, Request, Residual};
+use super::request::{Answer, Batch, QueueFull, Reason, Request, Residual};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
 use crate::plan::Context;
@@ -131,9 +131,9 @@ impl ConfiguratorHandle {
     /// Submits requests; never blocks.
     ///
     /// # Errors
-    /// `Full` when the queue is full or the configurator has ended; each request that found no room has then been answered
+    /// `QueueFull` when the queue is full or the configurator has ended; each request that found no room has then been answered
     /// *failed*. What is safe has room of its own, also in a batch whose other requests find none.
-    pub fn submit(&self, batch: Batch) -> Result<(), Full> {
+    pub fn submit(&self, batch: Batch) -> Result<(), QueueFull> {
         if batch.requests.is_empty() {
             return Ok(());
         }
@@ -153,7 +153,7 @@ impl ConfiguratorHandle {
             let reason = Some(Arc::new(Reason::Full));
             (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
         }
-        Err(Full)
+        Err(QueueFull)
     }
 
     /// Tells what the platform reported; never blocks. Faults and late returns change the picture of the system, a raised

@@ -51,4 +51,4 @@ pub use conditions::{Conditions, Truth};
 pub use control::{ConfiguratorView, Drift, FrameView, Recovery, TakenDown};
 pub use handle::{Configurator, ConfiguratorHandle, ConfiguratorSetup};
 pub use progress::{AnswerSink, Progress, ProgressSink, StepEnd, StepName};
-pub use request::{Answer, Batch, Full, Reason, Request, Residual};
+pub use request::{Answer, Batch, QueueFull, Reason, Request, Residual};

@@ -1,6 +1,6 @@
 //! The coordinator's own thread.
 
-use super::core::{Core, Listener, Trouble};
+use super::core::{ChartTrouble, Core, Listener};
 use super::inbox::{Class, Dropped, Inbox, Incoming, Put, Refused};
 use super::{Delivered, Tag};
 use crate::limits;
@@ -379,7 +379,7 @@ impl<L: Listener> Listener for Publisher<'_, L> {
         self.tell(|listener| listener.said(said));
     }
 
-    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
         self.tell(|listener| listener.trouble(chart, trouble));
     }
 }

@@ -28,7 +28,7 @@ pub struct Status {
 }
 
 /// A machine's tables.
-pub struct Bound {
+pub struct BoundMachine {
     pub budget: Rc<Budget>,
     pub voice: Rc<Voice>,
     /// They only grow, and a call that is under way keeps those it began with.
@@ -79,7 +79,7 @@ pub struct CallWords {
     pub act_leaf: LuaString,
 }
 
-impl Bound {
+impl BoundMachine {
     /// Compiles a machine's tables. `native`: the functions of the Lua part.
     pub fn new(
         lua: &Lua,

@@ -1,6 +1,6 @@
 //! The hook: how the engine calls a machine's functions, with what rFSM gives them.
 
-use super::bound::Bound;
+use super::bound::BoundMachine;
 use super::host::Host;
 use super::tracing;
 use crate::limits;
@@ -17,7 +17,7 @@ pub struct Functions {
     /// What a coordinator's functions share; an inner machine's is held by the outermost one's. It goes before the state.
     pub(super) _host: Option<Rc<Host>>,
     pub(super) lua: Lua,
-    pub(super) bound: Rc<Bound>,
+    pub(super) bound: Rc<BoundMachine>,
 }
 
 impl std::fmt::Debug for Functions {

@@ -19,7 +19,7 @@ const LOOPS: &str = include_str!("lua/loops.lua");
 pub struct Guards {
     /// Of all calls.
     pub budget: Rc<Budget>,
-    _memory: work::Counted,
+    _memory: work::CountedMemory,
 }
 
 /// Puts a budget and its guards on a state that has the libraries it will have. `native` is given what the Lua part borrows.

@@ -1,6 +1,6 @@
 //! What everything of one Lua state shares: its budget, what it prints, its machines, and the files that are being run.
 
-use super::bound::Bound;
+use super::bound::BoundMachine;
 use super::budget::Budget;
 use super::guards::Guards;
 use super::lower::Spot;
@@ -25,7 +25,7 @@ pub struct Host {
     /// Number of the spot by table (weak), 1-based.
     pub spot_of: Table,
     /// Machines by the address of their root.
-    pub machines: RefCell<FxHashMap<usize, Rc<Bound>>>,
+    pub machines: RefCell<FxHashMap<usize, Rc<BoundMachine>>>,
     pub gettime: RefCell<Option<Function>>,
     pub reader: RefCell<FileReader>,
     /// Files that are being run, each loaded by the one before it.

@@ -3,7 +3,7 @@
 //! The Lua part has put the tables in their places and asks here for the chart. Questions are answered by the chart as it
 //! is from then on; a step that is under way goes on with the one it began with.
 
-use super::bound::Bound;
+use super::bound::BoundMachine;
 use super::lower::{self, Lowered};
 use crate::model::{EventName, Origin};
 use crate::statechart::{Addition, Chart, EventId, NodeId};
@@ -14,7 +14,7 @@ use std::rc::Rc;
 pub fn merge(
     lua: &Lua,
     native: &Table,
-    bound: &Bound,
+    bound: &BoundMachine,
     (parent, object): (NodeId, &Table),
     name: Option<&str>,
 ) -> Result<Option<String>> {

@@ -1,6 +1,6 @@
 //! What the Lua part borrows from here: constructors that remember where they were called, and inner machines.
 
-use super::bound::{Bound, Status};
+use super::bound::{BoundMachine, Status};
 use super::calls::Functions;
 use super::host::{Host, run};
 use super::lower::Spot;
@@ -8,7 +8,7 @@ use super::merge::merge;
 use super::tables::{Refused, address};
 use super::values::to_json;
 use crate::limits;
-use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, Step};
+use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, TurnResult};
 use crate::time::Time;
 use mlua::{Function, Lua, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
@@ -61,7 +61,7 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         if host.machines.borrow().len() >= limits::INNER_MACHINES {
             return Ok(Some(format!("a coordinator makes at most {} machines", limits::INNER_MACHINES)));
         }
-        match Bound::new(lua, (&host.budget, &host.voice), &host.native, &fsm) {
+        match BoundMachine::new(lua, (&host.budget, &host.voice), &host.native, &fsm) {
             Ok(bound) => {
                 host.machines.borrow_mut().insert(address(&fsm), Rc::new(bound));
                 Ok(None)
@@ -128,7 +128,7 @@ fn constructor(lua: &Lua, host: &Rc<Host>) -> Result<Function> {
 }
 
 /// The machine of a root.
-fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<Bound>> {
+fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<BoundMachine>> {
     host.machines
         .borrow()
         .get(&address(fsm))
@@ -137,7 +137,7 @@ fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<Bound>> {
 }
 
 /// The machine a state belongs to, and which state of it.
-fn state_of(host: &Host, state: &Table) -> Result<(Rc<Bound>, NodeId)> {
+fn state_of(host: &Host, state: &Table) -> Result<(Rc<BoundMachine>, NodeId)> {
     let mut root = state.clone();
     for _ in 0..=limits::CHART_DEPTH {
         match root.raw_get::<Option<Table>>("_parent")? {
@@ -296,7 +296,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
 }
 
 /// A machine that Lua steps.
-fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<Bound>> {
+fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<BoundMachine>> {
     let bound = machine_of(host, fsm)?;
     if bound.driven.get() {
         return Err(mlua::Error::runtime(format!("rfsm.{what}: the coordinator is stepped by Davit")));
@@ -304,13 +304,13 @@ fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<Bound>> {
     Ok(bound)
 }
 
-fn taken(bound: &Bound) -> Result<Machine> {
+fn taken(bound: &BoundMachine) -> Result<Machine> {
     let machine = bound.machine.borrow_mut().take();
     machine.ok_or_else(|| mlua::Error::runtime("this machine is being stepped just now"))
 }
 
 /// What was sent to a machine that is not being stepped goes straight into its queue.
-fn flush(bound: &Bound) {
+fn flush(bound: &BoundMachine) {
     if let Some(machine) = bound.machine.borrow_mut().as_mut() {
         let mut status = bound.status.borrow_mut();
         for event in status.outbox.drain(..) {
@@ -322,7 +322,7 @@ fn flush(bound: &Bound) {
 }
 
 /// rFSM's step: turns until `steps` of them counted or nothing is left to do.
-fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps: f64) -> Result<bool> {
+fn drive(lua: &Lua, host: &Host, bound: &Rc<BoundMachine>, machine: &mut Machine, steps: f64) -> Result<bool> {
     let mut calls = Functions { lua: lua.clone(), bound: bound.clone(), _host: None };
     bound.look_for_dbg();
     let mut left = steps;
@@ -342,10 +342,10 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
             return Err(host.budget.count.error());
         }
         let idle = match turn {
-            Step::NotEntered => return Ok(false),
-            Step::Unmatched => continue,
-            Step::Entered | Step::Taken => false,
-            Step::Quiet { idle } => idle,
+            TurnResult::NotEntered => return Ok(false),
+            TurnResult::Unmatched => continue,
+            TurnResult::Entered | TurnResult::Taken => false,
+            TurnResult::Quiet { idle } => idle,
         };
         left -= 1.0;
         if left < 1.0 {

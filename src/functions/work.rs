@@ -22,14 +22,14 @@ thread_local! {
 }
 
 /// For as long as this lives, the memory that a state asks for is counted.
-pub struct Counted {
+pub struct CountedMemory {
     lua: WeakLua,
     plain: ffi::lua_Alloc,
 }
 
 /// Counts the memory that a state asks for, for who is in a call (`exact::during`). The state's limit of memory must have
 /// been set before.
-pub fn count_memory(lua: &Lua) -> Result<Counted> {
+pub fn count_memory(lua: &Lua) -> Result<CountedMemory> {
     let mut plain: Option<ffi::lua_Alloc> = None;
     {
         let plain = &mut plain;
@@ -46,10 +46,10 @@ pub fn count_memory(lua: &Lua) -> Result<Counted> {
         }
     }
     let plain = plain.ok_or_else(|| mlua::Error::runtime("no allocator"))?;
-    Ok(Counted { lua: lua.weak(), plain })
+    Ok(CountedMemory { lua: lua.weak(), plain })
 }
 
-impl Drop for Counted {
+impl Drop for CountedMemory {
     fn drop(&mut self) {
         // mlua frees the allocator's data only when it finds its own allocator.
         let Some(lua) = self.lua.try_upgrade() else { return };

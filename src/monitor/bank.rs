@@ -1,7 +1,7 @@
 //! All monitors of a deployment, over inputs that are sampled once.
 
 use super::compile::{PIECES, compile};
-use super::program::Program;
+use super::program::CompiledCondition;
 use crate::model::monitor::{Condition, Counter, Monitor, PortSignal, Sampling};
 use crate::model::{ComponentName, EventName, Ident, MemberRef, Origin, RunState};
 use crate::time::Time;
@@ -114,7 +114,7 @@ pub struct Bank {
 /// One monitor at work.
 #[derive(Debug, Clone)]
 struct WatchedMonitor {
-    program: Program,
+    program: CompiledCondition,
     /// Its inputs in the bank, and what they held when it was last evaluated.
     slots: Box<[usize]>,
     held: Box<[Sample]>,

@@ -3,7 +3,7 @@
 use super::bank::Sample;
 use super::grade::Grade;
 use super::ring::{Ring, grain};
-use super::window::{Since, Window};
+use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
 
 /// A number, from samples and from numbers before it in the list.
@@ -185,7 +185,7 @@ pub enum Truth {
     /// The smallest in a window: the window holds the contraries.
     Historically(usize, Window),
     /// The first since the second.
-    Since(usize, usize, Since),
+    Since(usize, usize, SinceWindow),
     /// The history is this many positions long.
     Lived(u64, Option<u64>),
 }

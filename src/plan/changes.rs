@@ -17,7 +17,7 @@ type After = SmallVec<[StepId; 4]>;
 
 /// Steps that later ones may have to wait for.
 #[derive(Default)]
-struct Waits {
+struct ChangeWaits {
     create: FxHashMap<ComponentName, StepId>,
     destroy: FxHashMap<ComponentName, StepId>,
     /// The last of the chained disconnects of an in-port.
@@ -25,7 +25,7 @@ struct Waits {
     cuts_of: FxHashMap<ComponentName, Vec<StepId>>,
 }
 
-impl Waits {
+impl ChangeWaits {
     fn created(&self, component: ComponentName, after: &mut After) {
         if !self.create.is_empty()
             && let Some(id) = self.create.get(&component)
@@ -63,7 +63,7 @@ pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, sorted: &Sorted) {
     if classes[2].len() + classes[4].len() > 64 {
         b.view.reserve(classes[2].len(), classes[4].len());
     }
-    let mut waits = Waits::default();
+    let mut waits = ChangeWaits::default();
     waits.create.reserve(classes[2].len());
     for i in classes.iter().flatten() {
         let change = &changes[*i as usize];
@@ -86,7 +86,7 @@ pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, sorted: &Sorted) {
 
 fn disconnect(
     b: &mut PlanBuilder<'_, '_, '_>,
-    w: &mut Waits,
+    w: &mut ChangeWaits,
     from: MemberRef,
     to: MemberRef,
     origin: Origin,
@@ -104,7 +104,7 @@ fn disconnect(
     }
 }
 
-fn destroy(b: &mut PlanBuilder<'_, '_, '_>, w: &mut Waits, component: ComponentName, origin: Origin) {
+fn destroy(b: &mut PlanBuilder<'_, '_, '_>, w: &mut ChangeWaits, component: ComponentName, origin: Origin) {
     let mut after = After::new();
     if let Some(state) = b.view.component(component).map(|n| n.state)
         && state != RunState::Faulted
@@ -122,7 +122,13 @@ fn destroy(b: &mut PlanBuilder<'_, '_, '_>, w: &mut Waits, component: ComponentN
     }
 }
 
-fn create(b: &mut PlanBuilder<'_, '_, '_>, w: &mut Waits, component: ComponentName, meant: Meant, origin: Origin) {
+fn create(
+    b: &mut PlanBuilder<'_, '_, '_>,
+    w: &mut ChangeWaits,
+    component: ComponentName,
+    meant: Meant,
+    origin: Origin,
+) {
     let Meant { step: what, wrong, .. } = meant;
     let Step::Create { ty, .. } = &what else { return };
     let known = b.view.types().get(*ty).is_some();
@@ -159,7 +165,7 @@ fn rival<'c>(b: &PlanBuilder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
 
 fn set(
     b: &mut PlanBuilder<'_, '_, '_>,
-    w: &Waits,
+    w: &ChangeWaits,
     property: MemberRef,
     what: Step,
     change: &Change,
@@ -195,7 +201,7 @@ fn set(
     }
 }
 
-fn write(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, change: &Change, usage: Use) {
+fn write(b: &mut PlanBuilder<'_, '_, '_>, w: &ChangeWaits, port: MemberRef, what: Step, change: &Change, usage: Use) {
     let mut after = After::new();
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
@@ -220,7 +226,7 @@ fn write(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step
     }
 }
 
-fn operation(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Change) {
+fn operation(b: &mut PlanBuilder<'_, '_, '_>, w: &ChangeWaits, meant: Meant, change: &Change) {
     let mut after = After::new();
     for component in change.kind.components() {
         w.created(component, &mut after);
@@ -230,7 +236,7 @@ fn operation(b: &mut PlanBuilder<'_, '_, '_>, w: &Waits, meant: Meant, change: &
 
 fn connect(
     b: &mut PlanBuilder<'_, '_, '_>,
-    w: &Waits,
+    w: &ChangeWaits,
     from: MemberRef,
     to: MemberRef,
     what: Step,

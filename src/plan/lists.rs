@@ -3,7 +3,7 @@
 use super::builder::PlanBuilder;
 use super::conflicts::Sorted;
 use super::footprint::{Access, Slot};
-use super::order::{self, Move};
+use super::order::{self, OrderMove};
 use super::{PlanStage, StepId};
 use crate::model::codes;
 use crate::model::{ComponentName, Finding, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
@@ -99,7 +99,7 @@ fn expand(b: &mut PlanBuilder<'_, '_, '_>, list: &StateList, entry: StateEntry, 
     // The number of the start or stop of each move; a move without one (never running) is waited for by nobody.
     let mut keys: Vec<Option<StepId>> = Vec::with_capacity(moves.len());
     let mut waits: Vec<StepId> = Vec::new();
-    for Move { component, after } in &moves {
+    for OrderMove { component, after } in &moves {
         let node = b.view.component(*component).expect("it was just seen");
         let (state, actuator) = (node.state, node.ty.actuator);
         let mut own = None;

@@ -42,13 +42,13 @@ impl<C: Component> Body for Typed<C> {
 }
 
 /// A component with the configurator's ends of its members and the values of its properties.
-pub(crate) struct Made {
+pub(crate) struct MadeComponent {
     pub(crate) body: Box<dyn Body>,
     pub(crate) ends: Ends,
     pub(crate) values: Vec<Value>,
 }
 
-type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<Made, String> + Send + Sync>;
+type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<MadeComponent, String> + Send + Sync>;
 
 /// A component type that this program can make.
 pub struct Kind {
@@ -94,7 +94,7 @@ impl Kind {
         let operations = ty.operations.keys().copied().collect();
         let make: Maker = Box::new(move |beat, values| {
             let (component, ends, values) = Builder::make(&table, beat, values, &new)?;
-            Ok(Made { body: Box::new(Typed { component, table: table.clone() }), ends, values })
+            Ok(MadeComponent { body: Box::new(Typed { component, table: table.clone() }), ends, values })
         });
         Self { ty: Arc::new(ty), hooks, immediate: false, ports, properties, operations, make }
     }
@@ -122,7 +122,7 @@ impl Kind {
         self.hooks.contains(&true)
     }
 
-    pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<Made, String> {
+    pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<MadeComponent, String> {
         (self.make)(beat, values)
     }
 }

@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 /// A client, at the other end of a stream.
-pub(super) struct Connection {
+pub(super) struct SocketConnection {
     /// Its number among all, from 2 (scripts have the number 1).
     pub number: u32,
     stream: UnixStream,
@@ -18,7 +18,7 @@ pub(super) struct Connection {
     writing: Mutex<()>,
 }
 
-impl Connection {
+impl SocketConnection {
     /// Its client may take so long to accept what is written to it.
     pub fn new(number: u32, stream: UnixStream, write: Duration) -> io::Result<Self> {
         // A client that does not read must not hold a thread for ever.
@@ -71,7 +71,7 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub fn of(connection: &'a Connection) -> Self {
+    pub fn of(connection: &'a SocketConnection) -> Self {
         Lines { stream: &connection.stream, clock: Clock::real(), buffer: Vec::new(), seen: 0 }
     }
 

@@ -1,6 +1,6 @@
 //! Who is let in at the control socket: places, those that are kept, and what is done when there is none.
 
-use super::connection::Connection;
+use super::connection::SocketConnection;
 use super::place;
 use super::rpc::{self, RpcError};
 use super::serving::{ServingShared, serve, too_many};
@@ -24,11 +24,11 @@ struct InsideDoor {
     closed: bool,
     places: usize,
     kept: usize,
-    connections: Vec<Weak<Connection>>,
+    connections: Vec<Weak<SocketConnection>>,
 }
 
 /// One that is let in, and finds no thread: the system has none left.
-type Waiting = (Arc<Connection>, DoorPlace);
+type Waiting = (Arc<SocketConnection>, DoorPlace);
 
 /// A place, until it is dropped.
 struct DoorPlace {
@@ -81,7 +81,7 @@ impl Doors {
         Some(DoorPlace { doors: self.clone(), kept: true })
     }
 
-    fn enter(&self, connection: &Arc<Connection>) {
+    fn enter(&self, connection: &Arc<SocketConnection>) {
         let mut inside = lock(&self.inside);
         inside.connections.retain(|there| there.strong_count() > 0);
         inside.connections.push(Arc::downgrade(connection));
@@ -140,7 +140,7 @@ impl Doors {
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
         }
         let Some(place) = self.place(shared) else { return refuse(number, stream, shared, too_many()) };
-        let Ok(connection) = Connection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
+        let Ok(connection) = SocketConnection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
         self.enter(&connection);
         let may = {
             let inside = lock(&self.inside);
@@ -163,7 +163,7 @@ impl Doors {
 }
 
 /// Answers one connection to its end.
-fn attend(connection: &Arc<Connection>, shared: &ServingShared, kept: bool) {
+fn attend(connection: &Arc<SocketConnection>, shared: &ServingShared, kept: bool) {
     let _ = serve(connection, shared, kept);
     shared.subscribers.remove(connection.number);
     connection.cut();
@@ -171,7 +171,7 @@ fn attend(connection: &Arc<Connection>, shared: &ServingShared, kept: bool) {
 
 fn refuse(number: u32, stream: UnixStream, shared: &ServingShared, why: RpcError) {
     // A line of a new connection finds room: nobody waits here.
-    if let Ok(connection) = Connection::new(number, stream, shared.bounds.write) {
+    if let Ok(connection) = SocketConnection::new(number, stream, shared.bounds.write) {
         let _ = connection.send(&rpc::answer(&Json::Null, Err(why)));
     }
 }

@@ -53,7 +53,7 @@ impl std::fmt::Display for StandsStill {
 
 /// Of one session.
 #[derive(Default)]
-pub(super) struct Halt {
+pub(super) struct StoppingState {
     /// Declared safety events.
     safety: FxHashSet<EventName>,
     /// The safe configurations, in the order written.
@@ -83,7 +83,7 @@ struct HaltState {
     reported: Vec<String>,
 }
 
-impl Halt {
+impl StoppingState {
     pub fn new(safety: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
         Self { safety: safety.into_iter().collect(), safe, state: Mutex::default() }
     }

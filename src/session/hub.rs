@@ -3,7 +3,7 @@
 //!
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
-use super::halt::Halt;
+use super::halt::StoppingState;
 use super::lanes::Lanes;
 use super::log::{Answered, Fault, Happening, Log, LogEntry, Phase};
 use super::names::Unlisted;
@@ -38,7 +38,7 @@ pub struct Hub {
     emits: FxHashSet<EventName>,
     /// Names from outside that only functions may hear.
     pub(super) unlisted: Unlisted,
-    halt: Halt,
+    halt: StoppingState,
 }
 
 struct HubState {
@@ -118,18 +118,18 @@ impl Hub {
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
             unlisted: Unlisted::default(),
-            halt: Halt::default(),
+            halt: StoppingState::default(),
         }
     }
 
     /// With the events that make it safe, and what is applied then, when no coordinator hears them any more.
     #[must_use]
     pub fn with_safety(self, events: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
-        Self { halt: Halt::new(events, safe), ..self }
+        Self { halt: StoppingState::new(events, safe), ..self }
     }
 
     /// How far stopping is.
-    pub(super) fn halt(&self) -> &Halt {
+    pub(super) fn halt(&self) -> &StoppingState {
         &self.halt
     }
 

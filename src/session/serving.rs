@@ -1,6 +1,6 @@
 //! What is done with the lines of a connection: who answers them, and within which bounds.
 
-use super::connection::{Connection, Lines, SaidTo};
+use super::connection::{Lines, SaidTo, SocketConnection};
 use super::rpc::{self, RpcError};
 use super::subscribers::Subscribers;
 use crate::limits;
@@ -118,7 +118,7 @@ pub(super) fn too_many() -> RpcError {
 }
 
 /// Answers the calls of one connection until it closes. `kept`: it has one of the places kept for what must get through.
-pub(super) fn serve(connection: &Arc<Connection>, shared: &ServingShared, kept: bool) -> io::Result<()> {
+pub(super) fn serve(connection: &Arc<SocketConnection>, shared: &ServingShared, kept: bool) -> io::Result<()> {
     let mut lines = Lines::of(connection);
     let mut subscribed = false;
     let bounds = &shared.bounds;

@@ -3,7 +3,7 @@
 use super::halt::StandsStill;
 use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
-use super::stages::{Came, Next, Stage, first, next};
+use super::stages::{Came, NextStage, Stage, first, next};
 use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::limits;
@@ -87,15 +87,15 @@ impl Session {
                 Came::Empty => None,
             };
             match came_to {
-                Next::Over => break,
-                Next::Stage(next) => stage = next,
-                Next::Held if !self.attended.load(Ordering::Relaxed) => {
+                NextStage::Over => break,
+                NextStage::Stage(next) => stage = next,
+                NextStage::Held if !self.attended.load(Ordering::Relaxed) => {
                     let what = self.what_holds(held);
                     let note = format!("{what}, and nobody is there to ask for force: what is left stays as it is");
                     self.note_all(vec![note], &mut told);
                     break;
                 }
-                Next::Held => {
+                NextStage::Held => {
                     let what = self.what_holds(held);
                     let note = format!("{what}: what is left stays as it is until a second signal or `--force`");
                     hub.note(Happening::Forced { note });

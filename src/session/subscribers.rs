@@ -1,7 +1,7 @@
 //! Who hears what happens over the control socket: each behind a [tap](super::tap) of its own, and all behind one that
 //! turns what happens into lines, so that nothing of it is done in a thread that acts.
 
-use super::connection::Connection;
+use super::connection::SocketConnection;
 use super::log::LogEntry;
 use super::rpc;
 use super::tap::{Full, Hears, News, Tap};
@@ -23,7 +23,7 @@ pub(super) struct Subscribers {
 }
 
 struct Subscriber {
-    connection: Arc<Connection>,
+    connection: Arc<SocketConnection>,
     tap: Tap<Arc<str>>,
 }
 
@@ -37,7 +37,7 @@ impl Subscribers {
     ///
     /// # Errors
     /// When the operating system has no thread left.
-    pub fn add(&self, connection: &Arc<Connection>) -> io::Result<bool> {
+    pub fn add(&self, connection: &Arc<SocketConnection>) -> io::Result<bool> {
         let mut list = lock(&self.list);
         if list.iter().any(|s| s.connection.number == connection.number) {
             return Ok(false);

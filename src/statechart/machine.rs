@@ -3,7 +3,7 @@
 use super::EdgeId;
 use super::chart::{ActionOp, Chart, EventId, Kind, NONE, NodeId, Span};
 use super::hook::{ActionPlace, Doo, Hook, Nobody, Raised, View};
-use super::outcome::{Mode, RunEnd, Step, Stepped};
+use super::outcome::{Mode, RunEnd, Stepped, TurnResult};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
 use super::{timers::ArmedTimer, trace::Trace};
@@ -184,13 +184,13 @@ impl Machine {
             let turn = self.turn(chart, now, hook);
             let mut idle = false;
             match turn {
-                Step::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
-                Step::Entered | Step::Taken => {
+                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                TurnResult::Entered | TurnResult::Taken => {
                     transition = true;
                     left = left.saturating_sub(1);
                 }
-                Step::Unmatched => (),
-                Step::Quiet { idle: quiet } => {
+                TurnResult::Unmatched => (),
+                TurnResult::Quiet { idle: quiet } => {
                     idle = quiet;
                     left = left.saturating_sub(1);
                 }
@@ -210,24 +210,24 @@ impl Machine {
         let mut transition = false;
         for _ in 0..limits::CHART_RUN {
             match self.turn(chart, now, hook) {
-                Step::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
-                Step::Entered | Step::Taken => {
+                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                TurnResult::Entered | TurnResult::Taken => {
                     transition = true;
                     if self.rest::<H>(chart) {
                         return Stepped { idle: true, transition, ended: RunEnd::Idle };
                     }
                 }
-                Step::Quiet { idle: true } if !hook.go_on() => {
+                TurnResult::Quiet { idle: true } if !hook.go_on() => {
                     return Stepped { idle: true, transition, ended: RunEnd::Idle };
                 }
-                Step::Unmatched | Step::Quiet { .. } => (),
+                TurnResult::Unmatched | TurnResult::Quiet { .. } => (),
             }
         }
         Stepped { idle: false, transition, ended: RunEnd::Endless }
     }
 
     /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
-    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
+    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
         if !H::TURNS {
             return self.turn_in(chart, now, hook);
         }
@@ -250,9 +250,9 @@ impl Machine {
         }
     }
 
-    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
+    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
         if !hook.poll(&mut self.queue) {
-            return Step::Unmatched;
+            return TurnResult::Unmatched;
         }
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);
@@ -260,7 +260,7 @@ impl Machine {
             let mut changed = std::mem::take(&mut self.changed);
             changed.clone_from(&self.events);
             if !hook.before_step(&mut self.view(chart), &mut changed) {
-                return Step::Unmatched;
+                return TurnResult::Unmatched;
             }
             self.changed = std::mem::replace(&mut self.events, changed);
         }
@@ -272,7 +272,7 @@ impl Machine {
         } else {
             self.transit(chart, now, hook)
         };
-        if step != Step::NotEntered {
+        if step != TurnResult::NotEntered {
             self.check_timers(chart, now, hook);
             hook.after_step(&mut self.view(chart));
         }
@@ -300,22 +300,22 @@ impl Machine {
         self.search.from(chart, node, &mut around, hook)
     }
 
-    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
         self.search.begin();
         let way = self.find(chart, chart.initial, hook);
         if way == NONE {
             hook.not_entered(chart);
-            return Step::NotEntered;
+            return TurnResult::NotEntered;
         }
         self.enter(chart, NodeId::ROOT, now, hook);
         self.trace_path(chart, way, hook);
         self.report(chart, chart.initial, way, hook);
         self.execute(chart, way, now, hook);
-        Step::Entered
+        TurnResult::Entered
     }
 
     /// The outermost active state with a complete path wins, whatever the priorities further in.
-    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
         self.search.begin();
         self.trace(chart, Trace::Searching, hook);
         for i in 0..self.path.len() {
@@ -333,7 +333,7 @@ impl Machine {
                         hook.taking(chart, EdgeId(edge));
                         let row = &chart.edges[edge as usize];
                         self.segment(chart, edge, NodeId(row.lca), now, hook);
-                        return Step::Taken;
+                        return TurnResult::Taken;
                     }
                     Straight::Unclear => (),
                 }
@@ -342,14 +342,14 @@ impl Machine {
             if way != NONE {
                 self.trace_path(chart, way, hook);
                 self.execute(chart, way, now, hook);
-                return Step::Taken;
+                return TurnResult::Taken;
             }
         }
         self.trace(chart, Trace::NotFound, hook);
-        Step::Unmatched
+        TurnResult::Unmatched
     }
 
-    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> Step {
+    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> TurnResult {
         let mut idle = true;
         if let Some(leaf) = self.leaf
             && self.mode == Mode::Active
@@ -369,7 +369,7 @@ impl Machine {
         if idle {
             idle = hook.poll(&mut self.queue) && self.queue.events.is_empty();
         }
-        Step::Quiet { idle }
+        TurnResult::Quiet { idle }
     }
 
     /// Takes the path that begins with `way`, segment by segment, to a leaf.

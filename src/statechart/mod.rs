@@ -32,7 +32,7 @@ pub use grow::{Addition, NotGrown};
 pub use hook::{ActionPlace, Doo, Hook, Nobody, Printer, Raised, Said, View, Watched};
 pub use machine::Machine;
 pub use order::sort as sort_by_priority;
-pub use outcome::{Mode, RunEnd, Step, Stepped};
+pub use outcome::{Mode, RunEnd, Stepped, TurnResult};
 pub use queue::Queue;
 pub use reactions::AtOnce;
 pub use sim::{Observation, Sim, SimError};

@@ -12,7 +12,7 @@ pub enum Mode {
 
 /// What one turn of the step loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Step {
+pub enum TurnResult {
     /// The chart was entered.
     Entered,
     /// The chart could not be entered; the events are lost.

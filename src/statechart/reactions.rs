@@ -10,7 +10,7 @@ use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NodeId, Span};
 use super::hook::{Hook, Nobody, Raised};
 use super::machine::Machine;
-use super::outcome::{Mode, Step};
+use super::outcome::{Mode, TurnResult};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::time::Time;
@@ -204,7 +204,7 @@ impl ReactionTable {
                 notes.clear();
                 machine.send(*event);
                 let step = machine.turn(chart, Time::default(), &mut notes);
-                if step == Step::Taken && notes.plain && machine.rest::<Notes>(chart) {
+                if step == TurnResult::Taken && notes.plain && machine.rest::<Notes>(chart) {
                     let row = reactions.row(chart, leaf, *event, &machine, &notes);
                     if let Some(row) = row
                         && first.is_some()

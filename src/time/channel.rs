@@ -2,7 +2,7 @@
 //!
 //! On the real clock they are crossbeam's; on a simulated one a receiver that waits gives the token away.
 
-use super::clock::{Clock, ClockKind};
+use super::clock::{Clock, TimeKind};
 use super::simulated::{Scheduler, WaitUntil};
 use super::{Time, lock};
 use crossbeam_channel as real;
@@ -95,8 +95,8 @@ pub(super) fn new<T>(clock: &Clock, bound: usize) -> (Sender<T>, Receiver<T>) {
 
 fn scheduler(clock: &Clock) -> &Scheduler {
     match &*clock.0 {
-        ClockKind::Simulated(scheduler) => scheduler,
-        ClockKind::Real(_) => unreachable!("a simulated channel belongs to a simulated clock"),
+        TimeKind::Simulated(scheduler) => scheduler,
+        TimeKind::Real(_) => unreachable!("a simulated channel belongs to a simulated clock"),
     }
 }
 
@@ -277,8 +277,8 @@ impl<T> Receiver<T> {
 
 fn real_instant(clock: &Clock, time: Time) -> Option<std::time::Instant> {
     match &*clock.0 {
-        ClockKind::Real(real) => real.instant(time),
-        ClockKind::Simulated(_) => None,
+        TimeKind::Real(real) => real.instant(time),
+        TimeKind::Simulated(_) => None,
     }
 }
 

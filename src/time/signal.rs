@@ -3,7 +3,7 @@
 //! Notifying takes no lock on the real clock and allocates nothing, so that it may be done by a control activity and to
 //! one: the waiting thread is parked, and un-parking it is one atomic exchange (and a system call when it sleeps).
 
-use super::clock::{Clock, ClockKind};
+use super::clock::{Clock, TimeKind};
 use super::simulated::WaitUntil;
 use super::{Time, lock};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,14 +35,14 @@ impl Signal {
     /// Sets the flag and wakes the thread that waits for it. Never waits.
     pub fn notify(&self) {
         match &*self.clock.0 {
-            ClockKind::Real(_) => {
+            TimeKind::Real(_) => {
                 if !self.inner.set.swap(true, Ordering::SeqCst)
                     && let Some(thread) = self.inner.waiter.get()
                 {
                     thread.unpark();
                 }
             }
-            ClockKind::Simulated(scheduler) => {
+            TimeKind::Simulated(scheduler) => {
                 let mut wait = lock(&self.inner.wait);
                 self.inner.set.store(true, Ordering::SeqCst);
                 if let Some(wait) = wait.take() {
@@ -58,7 +58,7 @@ impl Signal {
     /// On the real clock, when a second thread waits.
     pub fn wait(&self, deadline: Time) -> bool {
         match &*self.clock.0 {
-            ClockKind::Real(real) => {
+            TimeKind::Real(real) => {
                 let me = self.inner.waiter.get_or_init(std::thread::current);
                 assert!(me.id() == std::thread::current().id(), "a signal is waited for by one thread only");
                 let end = real.instant(deadline);
@@ -73,7 +73,7 @@ impl Signal {
                     }
                 }
             }
-            ClockKind::Simulated(scheduler) => scheduler.as_participant(|me| {
+            TimeKind::Simulated(scheduler) => scheduler.as_participant(|me| {
                 loop {
                     let mut wait = lock(&self.inner.wait);
                     if self.inner.set.swap(false, Ordering::SeqCst) {

@@ -257,7 +257,7 @@ impl Rig {
     }
 
     /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`, `commit!` (by force).
-    pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), Full> {
+    pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), QueueFull> {
         self.handle.submit(words.split_whitespace().map(|word| self.request(word, requester)).collect())
     }
 

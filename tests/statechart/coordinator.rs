@@ -1,7 +1,7 @@
 //! The coordinator on its own thread, in simulated time: what it hears, raises, forgets, and when it falls silent.
 
 use crate::support::*;
-use davit::coordinator::{Class, Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag, Trouble};
+use davit::coordinator::{ChartTrouble, Class, Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag};
 use davit::limits;
 use davit::model::names::EventName;
 use davit::statechart::{Chart, Hook, NodeId, Raised};
@@ -42,7 +42,7 @@ impl Listener for Log {
         self.add(format!("stale {event}"));
     }
 
-    fn trouble(&mut self, _: &Chart, trouble: Trouble) {
+    fn trouble(&mut self, _: &Chart, trouble: ChartTrouble) {
         self.add(format!("{trouble:?}"));
     }
 }

@@ -4,7 +4,7 @@ use davit::model::finding::Origin;
 use davit::model::names::EventName;
 use davit::model::statechart::{Action, FunctionId, Statechart};
 use davit::statechart::{
-    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Queue, Raised, Step, View, compile,
+    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Queue, Raised, TurnResult, View, compile,
 };
 use davit::time::Time;
 use std::collections::{BTreeMap, VecDeque};
@@ -165,7 +165,7 @@ impl Run {
         self.machine.run(&self.chart, Time(0), &mut self.hook).idle
     }
 
-    pub fn turn(&mut self) -> Step {
+    pub fn turn(&mut self) -> TurnResult {
         self.machine.turn(&self.chart, Time(0), &mut self.hook)
     }
 

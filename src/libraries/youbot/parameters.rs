@@ -45,7 +45,7 @@ pub const BASE_MOUNT: [f64; 3] = [0.143, 0.0, 0.13];
 
 /// One rigid link.
 #[derive(Debug, Clone, Copy)]
-pub struct Link {
+pub struct ArmLink {
     /// Mass, in kg.
     pub mass: f64,
     /// Centre of mass in the joint's frame, in m.
@@ -57,16 +57,17 @@ pub struct Link {
 /// Links 1 to 5 (R). The store lists inertia along its own axes; for links 2 and 3, which are long in `z`, the smallest
 /// moment is assigned to `z` (D). The sign of link 5's `z` is doubtful: the URDF has -0.01683, which
 /// would lie behind the joint; taking it instead lowers the gravity torque of joints 2 to 4 by up to 0.22 N m (D).
-pub const LINKS: [Link; JOINTS] = [
-    Link { mass: 2.351, com: [0.01516, 0.00359, -0.03105], inertia: [0.002_952_5, 0.006_009_1, 0.005_882_1] },
-    Link { mass: 1.318, com: [-0.01903, 0.0150, 0.11397], inertia: [0.003_114_5, 0.003_163_1, 0.000_584_3] },
-    Link { mass: 0.821, com: [0.00013, 0.02022, 0.10441], inertia: [0.001_727_67, 0.001_846_8, 0.000_419_67] },
-    Link { mass: 0.769, com: [0.00015, -0.02464, 0.05353], inertia: [0.000_676_4, 0.001_057_3, 0.000_661_0] },
-    Link { mass: 0.687, com: [0.0, 0.0012, 0.01648], inertia: [0.000_193_4, 0.000_160_2, 0.000_068_9] },
+pub const LINKS: [ArmLink; JOINTS] = [
+    ArmLink { mass: 2.351, com: [0.01516, 0.00359, -0.03105], inertia: [0.002_952_5, 0.006_009_1, 0.005_882_1] },
+    ArmLink { mass: 1.318, com: [-0.01903, 0.0150, 0.11397], inertia: [0.003_114_5, 0.003_163_1, 0.000_584_3] },
+    ArmLink { mass: 0.821, com: [0.00013, 0.02022, 0.10441], inertia: [0.001_727_67, 0.001_846_8, 0.000_419_67] },
+    ArmLink { mass: 0.769, com: [0.00015, -0.02464, 0.05353], inertia: [0.000_676_4, 0.001_057_3, 0.000_661_0] },
+    ArmLink { mass: 0.687, com: [0.0, 0.0012, 0.01648], inertia: [0.000_193_4, 0.000_160_2, 0.000_068_9] },
 ];
 
 /// The gripper (R), fixed to link 5 with its centre of mass at [`TOOL_OFFSET`].
-pub const GRIPPER: Link = Link { mass: 0.219, com: TOOL_OFFSET, inertia: [0.000_232_4, 0.000_362_9, 0.000_206_7] };
+pub const GRIPPER: ArmLink =
+    ArmLink { mass: 0.219, com: TOOL_OFFSET, inertia: [0.000_232_4, 0.000_362_9, 0.000_206_7] };
 
 /// Gear ratios (Dv, L).
 pub const GEAR: [f64; JOINTS] = [156.0, 156.0, 100.0, 71.0, 71.0];

@@ -6,7 +6,7 @@
 //! Pinocchio to 1e-9 (`tests/golden/`). Nothing here allocates.
 
 use super::parameters::{
-    BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, Link, REFLECTED_INERTIA, TOOL_OFFSET,
+    ArmLink, BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, REFLECTED_INERTIA, TOOL_OFFSET,
 };
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
 
@@ -41,7 +41,7 @@ struct RigidBody {
 }
 
 impl RigidBody {
-    fn of(link: &Link) -> Self {
+    fn of(link: &ArmLink) -> Self {
         Self {
             mass: link.mass,
             com: Vector3::from(link.com),

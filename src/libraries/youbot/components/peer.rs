@@ -1,7 +1,7 @@
 //! `youbot.Peer`: a stand-in for the other robot and for the network between the two.
 
 use super::samples::{ToolPose, stamp};
-use crate::libraries::youbot::hand::{Hand, Script};
+use crate::libraries::youbot::hand::{Hand, HandScript};
 use crate::libraries::youbot::impedance::Reference;
 use crate::libraries::youbot::link::Packet;
 use crate::libraries::youbot::network::{Network, Quality};
@@ -64,7 +64,7 @@ struct PeerWorld {
 }
 
 impl PeerWorld {
-    fn new(q: J5, script: Script, seed: u64) -> Self {
+    fn new(q: J5, script: HandScript, seed: u64) -> Self {
         Self {
             robot: Robot::new(q),
             hand: Hand::new(script),
@@ -160,7 +160,7 @@ impl Component for Peer {
                 .range(-10.0..=10.0)
                 .property("jump", Vector3::zeros()),
             seed: b.doc("Of the network's luck.").tunable(Tunable::Unconfigured).property("seed", 1_i64),
-            world: Box::new(PeerWorld::new(radians(START_DEG), Script::default(), 1)),
+            world: Box::new(PeerWorld::new(radians(START_DEG), HandScript::default(), 1)),
             epoch: 1,
         }
     }
@@ -215,7 +215,7 @@ impl Component for Peer {
 }
 
 impl Peer {
-    fn read_script(&mut self) -> Result<Script, Failure> {
-        self.script.get_ref().parse::<Script>().map_err(|e| Failure::from_error(&e))
+    fn read_script(&mut self) -> Result<HandScript, Failure> {
+        self.script.get_ref().parse::<HandScript>().map_err(|e| Failure::from_error(&e))
     }
 }
