@@ -3,7 +3,7 @@
 use super::engine::Engine;
 use super::hands::Hands;
 use super::inbox::PoolReply;
-use super::pool::{PlatformCall, Whose};
+use super::pool::{CallFor, PlatformCall};
 use super::progress::{Progress, StepEnd, StepName};
 use super::running::{Flight, Purpose, Running};
 use crate::limits;
@@ -72,7 +72,7 @@ impl Engine {
                     did = true;
                     let deadline = self.given.clock.now() + self.given.limits.step_timeout;
                     let ticket =
-                        self.call(PlatformCall::ObserveSome(components), deadline, self.whose(running, Whose::Look));
+                        self.call(PlatformCall::ObserveSome(components), deadline, self.whose(running, CallFor::Look));
                     running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
                 }
                 Poll::Ask(question) => {
@@ -132,14 +132,14 @@ impl Engine {
     }
 
     /// Whose calls a transaction makes.
-    fn whose(&self, running: &Running, plain: Whose) -> Whose {
-        if running.is_safe() || self.taking_down { Whose::Safe } else { plain }
+    fn whose(&self, running: &Running, plain: CallFor) -> CallFor {
+        if running.is_safe() || self.taking_down { CallFor::Safe } else { plain }
     }
 
     /// Whether a call that takes time may begin: one worker stays free for each of the others that has none. What is safe waits
     /// for none of the others.
     fn has_room(&self, running: &Running) -> bool {
-        if self.whose(running, Whose::Plain) == Whose::Safe {
+        if self.whose(running, CallFor::Plain) == CallFor::Safe {
             return self.pool.has_room_for_safe(running.flights.len());
         }
         let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
@@ -167,7 +167,7 @@ impl Engine {
                 (PlatformCall::Several(several, patience, stop.clone()), until)
             }
         };
-        let ticket = self.call(call, deadline, self.whose(running, Whose::Plain));
+        let ticket = self.call(call, deadline, self.whose(running, CallFor::Plain));
         running.flights.push(Flight { ticket, steps, started, deadline, stop });
     }
 

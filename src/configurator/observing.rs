@@ -4,7 +4,7 @@
 use super::engine::Engine;
 use super::inbox::PoolReply;
 use super::looks::SlowLook;
-use super::pool::{PlatformCall, Whose};
+use super::pool::{CallFor, PlatformCall};
 use super::progress::Progress;
 use super::request::{Reason, Residual};
 use crate::limits;
@@ -80,7 +80,7 @@ impl Engine {
         }
         let deadline = now + self.given.limits.step_timeout;
         let names = components.iter().map(|(name, _)| *name).collect();
-        let ticket = self.call(PlatformCall::ObserveSome(names), deadline, Whose::Plain);
+        let ticket = self.call(PlatformCall::ObserveSome(names), deadline, CallFor::Plain);
         self.observing.out = Some(SlowLook { ticket, components, until: deadline + limits::PLATFORM_GRACE });
     }
 

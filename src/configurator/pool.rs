@@ -29,7 +29,7 @@ pub(super) enum PlatformCall {
 
 /// Whose call it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Whose {
+pub(super) enum CallFor {
     /// Anybody's.
     Plain,
     /// A look that tells what a call has done: without it that is not known, and the system broken.
@@ -127,14 +127,14 @@ impl Pool {
     }
 
     /// Hands `call` to a worker.
-    pub fn start(&mut self, call: PlatformCall, deadline: Time, whose: Whose) -> PoolTicket {
+    pub fn start(&mut self, call: PlatformCall, deadline: Time, whose: CallFor) -> PoolTicket {
         self.next += 1;
         let ticket = PoolTicket(self.next);
         self.busy += 1;
         let more = match whose {
-            Whose::Plain => 0,
-            Whose::Look => limits::WORKERS_SAFE / 2,
-            Whose::Safe => limits::WORKERS_SAFE,
+            CallFor::Plain => 0,
+            CallFor::Look => limits::WORKERS_SAFE / 2,
+            CallFor::Safe => limits::WORKERS_SAFE,
         };
         if self.given_up.len() >= limits::WORKERS_GIVEN_UP + more {
             let why = format!("{} calls have not returned: no further one is made", self.given_up.len());

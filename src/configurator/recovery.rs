@@ -3,7 +3,7 @@
 use super::control::{Drift, Recovery};
 use super::engine::Engine;
 use super::inbox::{PoolReply, PoolTicket};
-use super::pool::{PlatformCall, Whose};
+use super::pool::{CallFor, PlatformCall};
 use super::progress::Progress;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -25,7 +25,7 @@ impl Engine {
     }
 
     /// Has a worker make a call. Where none is made any more that is told.
-    pub(super) fn call(&mut self, call: PlatformCall, deadline: Time, whose: Whose) -> PoolTicket {
+    pub(super) fn call(&mut self, call: PlatformCall, deadline: Time, whose: CallFor) -> PoolTicket {
         let ticket = self.pool.start(call, deadline, whose);
         if let (Some(why), Some(progress)) = (self.pool.take_refused(), &self.given.progress) {
             progress(&Progress::Stuck(why));
@@ -36,7 +36,7 @@ impl Engine {
     /// Asks the platform something on a worker, while everything else goes on. None: no answer.
     pub(super) fn ask(&mut self, call: PlatformCall) -> Option<PoolReply> {
         let deadline = self.given.clock.now() + self.given.limits.step_timeout;
-        let whose = if self.taking_down { Whose::Safe } else { Whose::Look };
+        let whose = if self.taking_down { CallFor::Safe } else { CallFor::Look };
         let ticket = self.call(call, deadline, whose);
         let until = deadline + limits::PLATFORM_GRACE;
         loop {

@@ -1,7 +1,7 @@
 //! Components that were reported faulted: looked at, since the report may be older than what was done since.
 
 use super::inbox::{PoolReply, PoolTicket};
-use super::pool::{PlatformCall, Pool, Whose};
+use super::pool::{CallFor, PlatformCall, Pool};
 use crate::limits;
 use crate::model::{ComponentName, RunState};
 use crate::system::{System, View as _};
@@ -100,7 +100,7 @@ impl Suspects {
                 continue;
             }
             let deadline = now + timeout;
-            let ticket = pool.start(PlatformCall::ObserveComponent(component), deadline, Whose::Plain);
+            let ticket = pool.start(PlatformCall::ObserveComponent(component), deadline, CallFor::Plain);
             let until = deadline + limits::PLATFORM_GRACE;
             self.looks.push(SuspectLook { ticket, component, generation: generation_of(system, component), until });
         }
