@@ -99,6 +99,7 @@ fn write(folder: &Path, coordinators: usize, n: usize) -> PathBuf {
     file
 }
 
+#[allow(clippy::disallowed_methods)] // a benchmark measures real time
 fn row(name: &str, file: &Path) {
     let mut best: Option<(Duration, usize, usize, usize, bool)> = None;
     for _ in 0..5 {

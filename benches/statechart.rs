@@ -10,7 +10,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group};
 use davit::model::finding::Origin;
 use davit::model::names::{EventName, Ident};
 use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
-use davit::statechart::{Chart, EventId, Hook, Machine, Raised, compile};
+use davit::statechart::{AtOnce, Chart, EventId, Hook, Machine, Raised, compile};
 use davit::time::Time;
 use std::hint::black_box;
 use std::time::Instant;
@@ -80,7 +80,15 @@ impl Hook for Batch<Raised> {
 
 /// One event, then to rest.
 fn react(chart: &Chart, machine: &mut Machine, event: EventId, batch: &mut Batch<Raised>) {
-    black_box(machine.react(chart, event, Time(0), batch));
+    // As a coordinator does it.
+    match machine.at_once(chart, event, Time(0), batch) {
+        AtOnce::Rests => {}
+        AtOnce::Goes => _ = black_box(machine.run(chart, Time(0), batch)),
+        AtOnce::No => {
+            machine.send(event);
+            black_box(machine.run(chart, Time(0), batch));
+        }
+    }
     batch.read();
 }
 

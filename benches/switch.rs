@@ -5,7 +5,7 @@
 //!
 //! `cargo bench --bench switch`
 
-use davit::configurator::{Answer, Batch, Configurator, ConfiguratorHandle, Request, Requester, Setup};
+use davit::configurator::{Answer, Batch, Configurator, ConfiguratorHandle, ConfiguratorSetup, Request, Requester};
 use davit::model::*;
 use davit::platform::Platform;
 use davit::platform::embedded::EmbeddedPlatform;
@@ -122,7 +122,7 @@ impl Switched {
         let activities = BTreeMap::from([(loop_, activity)]);
         let platform: Arc<dyn Platform> = Arc::new(EmbeddedPlatform::new(clock, &libraries(), &activities));
         let (sink, answers) = clock.channel::<Answer>(16);
-        let handle = Configurator::start(Setup {
+        let handle = Configurator::start(ConfiguratorSetup {
             configurations: configurations(others),
             rest: Vec::new(),
             operator: vec![ConfigId::new("make").expect("a name"), ConfigId::new("switch").expect("a name")],

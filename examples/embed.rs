@@ -4,15 +4,14 @@
 //! cargo run --example embed
 //! ```
 
-use davit::configurator::{Batch, Configurator, Request, Requester, Setup};
-use davit::lang::{LoadOptions, Sources, load_configurations};
-use davit::model::{
-    Ask, Catalogue, ComponentName, ComponentSnapshot, ComponentType, ConfigId, DeploymentLimits, PropertyType,
-    RequestId, Snapshot, Step, Tunable, Value, ValueType,
+use davit::platforms::{
+    Catalogue, ComponentSnapshot, ComponentType, EventSink, Execution, ObserveError, Outcome, Platform, PropertyType,
+    Simulated, SimulatedOptions, Tunable,
 };
-use davit::platform::simulated::{Options, Simulated};
-use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform};
-use davit::time::{Clock, Time};
+use davit::{
+    Ask, Batch, Clock, ComponentName, ConfigId, Configurator, ConfiguratorSetup, DeploymentLimits, LoadOptions,
+    Request, RequestId, Requester, Snapshot, Sources, Step, Time, Value, ValueType, load_configurations, render,
+};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::Path;
@@ -100,13 +99,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let texts = Sources::memory([("pump.lua", CONFIGURATIONS)]);
     let loaded = load_configurations(&texts, Path::new("pump.lua"), &LoadOptions::default());
     if !loaded.findings.is_empty() {
-        eprint!("{}", davit::diagnostics::render(&loaded.findings, &loaded.sources, false));
+        eprint!("{}", render(&loaded.findings, &loaded.sources, false));
         return Err("the configurations are wrong".into());
     }
 
-    let platform = Arc::new(Talkative(Simulated::new(catalogue.clone(), clock.clone(), Options::default())));
+    let platform = Arc::new(Talkative(Simulated::new(catalogue.clone(), clock.clone(), SimulatedOptions::default())));
     let (answered, answers) = clock.channel(16);
-    let configurator = Configurator::start(Setup {
+    let configurator = Configurator::start(ConfiguratorSetup {
         operator: loaded.configurations.iter().map(|configuration| configuration.id).collect(),
         configurations: loaded.configurations,
         rest: Vec::new(),

@@ -6,8 +6,7 @@
 //! cargo run --example own_components -- deploy examples/own_components/deployment.yaml
 //! ```
 
-use davit::libraries;
-use davit::runtime::{Answer, Builder, Component, Context, In, Library, Out, Prop};
+use davit::component::{Answer, Builder, Component, Context, In, Library, Out, Prop};
 
 /// A first-order low-pass filter.
 struct LowPass {
@@ -45,5 +44,5 @@ impl Component for LowPass {
 
 fn main() -> std::process::ExitCode {
     let mine = Library::new("mine").with::<LowPass>("mine.LowPass");
-    davit::cli::main(libraries::builtin().with(mine))
+    davit::main(davit::builtin().with(mine))
 }

@@ -8,12 +8,11 @@
 //! The platform `bus` sends every step as a line of text to what stands at the other end of a device, which is a file or the terminal
 //! here. A real one would wait for an answer until the deadline, and answer *unknown* when none comes.
 
-use davit::app::{Extensions, Making, PlatformMaker};
-use davit::libraries;
-use davit::model::{Catalogue, ComponentName, ComponentSnapshot, PlatformKind, Snapshot, Step, Value, ValueType};
-use davit::platform::simulated::{Options, Simulated};
-use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform};
-use davit::time::Time;
+use davit::platforms::{
+    Catalogue, Cause, ComponentSnapshot, EventSink, Execution, Making, ObserveError, Outcome, Platform, PlatformKind,
+    PlatformMaker, Simulated, SimulatedOptions,
+};
+use davit::{ComponentName, Extensions, Snapshot, Step, Time, Value, ValueType};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -35,7 +34,7 @@ impl Bus {
             "-" => Box::new(std::io::stdout()),
             path => Box::new(OpenOptions::new().append(true).open(path).map_err(|why| format!("{path}: {why}"))?),
         };
-        let books = Simulated::new(making.checked.catalogue.clone(), making.clock.clone(), Options::default());
+        let books = Simulated::new(making.checked.catalogue.clone(), making.clock.clone(), SimulatedOptions::default());
         Ok(Arc::new(Self { device: Mutex::new(device), prefix: text("prefix"), books }))
     }
 }
@@ -58,7 +57,7 @@ impl Platform for Bus {
         match sent {
             Ok(()) => self.books.execute(step, deadline),
             // What was not sent was not done.
-            Err(why) => Outcome::NotDone(davit::model::Cause::Refused(format!("the bus: {why}"))),
+            Err(why) => Outcome::NotDone(Cause::Refused(format!("the bus: {why}"))),
         }
     }
 
@@ -91,5 +90,5 @@ fn main() -> std::process::ExitCode {
     let bus = PlatformMaker::new("bus", PlatformKind::ELSEWHERE, Bus::open)
         .option("device", ValueType::Str, None, "where lines are sent: a file, or `-` for the terminal")
         .option("prefix", ValueType::Str, Some(Value::Str("".into())), "what stands before every line");
-    davit::cli::main(Extensions::from(libraries::builtin()).with_platform(bus))
+    davit::main(Extensions::from(davit::builtin()).with_platform(bus))
 }

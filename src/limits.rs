@@ -285,10 +285,6 @@ pub const CONFIGURATOR_COMMANDS: usize = 32;
 /// comes down again and again tells it once each time, behind which it waits for its answers.
 pub const CONFIGURATOR_CONTROL: usize = 256;
 
-/// Blocking platform calls made at the same time where the deployment does not say: enough to hide the latency of slow
-/// components behind each other, few enough for a small board.
-pub const WORKERS: usize = 8;
-
 /// Blocking platform calls made at the same time at most, whatever the deployment says: each takes a thread.
 pub const WORKERS_MOST: usize = 64;
 

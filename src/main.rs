@@ -5,5 +5,5 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> std::process::ExitCode {
-    davit::cli::main(davit::libraries::builtin())
+    davit::main(davit::builtin())
 }

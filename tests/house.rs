@@ -142,7 +142,18 @@ fn code_lines(text: &str) -> Vec<String> {
 /// The rooms a source names after `prefix` (`crate::` or `davit::`), with the line of each: `crate::a::b` and
 /// `crate::{a::b, c}`.
 fn rooms_named(text: &str, prefix: &str) -> Vec<(usize, String)> {
+    paths_named(text, prefix).into_iter().map(|(line, room, _)| (line, room)).collect()
+}
+
+/// The same with whether something in it is named, and not only itself.
+fn paths_named(text: &str, prefix: &str) -> Vec<(usize, String, bool)> {
     let code = code_lines(text).join("\n");
+    let one = |line: usize, path: &str| {
+        let path = path.trim_start();
+        let name: String = path.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        let more = path[name.len()..].trim_start().starts_with("::");
+        (line, name, more)
+    };
     let mut found = Vec::new();
     let mut from = 0;
     while let Some(at) = code[from..].find(prefix).map(|i| i + from) {
@@ -152,36 +163,29 @@ fn rooms_named(text: &str, prefix: &str) -> Vec<(usize, String)> {
         }
         let line = code[..at].matches('\n').count() + 1;
         let rest = code[from..].trim_start();
-        if let Some(group) = rest.strip_prefix('{') {
-            let mut depth = 0usize;
-            let mut word = String::new();
-            let mut first = true;
-            for c in group.chars() {
-                match c {
-                    '{' => depth += 1,
-                    '}' if depth == 0 => break,
-                    '}' => depth -= 1,
-                    ',' if depth == 0 => {
-                        found.push((line, std::mem::take(&mut word)));
-                        first = true;
-                        continue;
-                    }
-                    _ => {}
+        let Some(group) = rest.strip_prefix('{') else {
+            found.push(one(line, rest));
+            continue;
+        };
+        let mut depth = 0usize;
+        let mut begin = 0;
+        for (at, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => {
+                    found.push(one(line, &group[begin..at]));
+                    break;
                 }
-                if depth == 0 && first {
-                    if c.is_alphanumeric() || c == '_' {
-                        word.push(c);
-                    } else if !word.is_empty() {
-                        first = false;
-                    }
+                '}' => depth -= 1,
+                ',' if depth == 0 => {
+                    found.push(one(line, &group[begin..at]));
+                    begin = at + 1;
                 }
+                _ => {}
             }
-            found.push((line, word));
-        } else {
-            found.push((line, rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()));
         }
     }
-    found.retain(|(_, room)| !room.is_empty());
+    found.retain(|(_, room, _)| !room.is_empty());
     found
 }
 
@@ -276,7 +280,9 @@ fn needs(room: &str, has: bool) -> BTreeMap<String, BTreeSet<String>> {
 
 #[test]
 fn no_files_go_round_in_a_circle() {
-    for (room, has) in [("check", false), ("configurator", false), ("stack", true), ("transaction", true)] {
+    for (room, has) in
+        [("check", false), ("configurator", false), ("functions", false), ("stack", true), ("transaction", true)]
+    {
         let mut needs = needs(room, has);
         assert!(
             needs.len() > 4 && needs.values().any(|needs| !needs.is_empty()),
@@ -289,6 +295,147 @@ fn no_files_go_round_in_a_circle() {
         }
         assert!(needs.is_empty(), "files of `{room}` need each other in a circle: {needs:#?}");
     }
+}
+
+/// The names that `src/lib.rs` offers, each with its place (`davit::Session`).
+fn public_names() -> BTreeSet<String> {
+    let text = std::fs::read_to_string(root().join("src/lib.rs")).expect("lib.rs is there");
+    let mut names = BTreeSet::new();
+    let (mut module, mut hidden, mut used) = (String::new(), false, String::new());
+    for line in code_lines(&text) {
+        // What is hidden, and the rooms, are nobody's to use.
+        match line.trim_end() {
+            "#[doc(hidden)]" | "    #[doc(hidden)]" | "mod rooms {" | "#[cfg(feature = \"\")]" => hidden = true,
+            "}" => (module, hidden) = (String::new(), false),
+            "    }" => hidden = false,
+            line => {
+                if let Some(name) = line.strip_prefix("pub mod ").and_then(|line| line.strip_suffix(" {")) {
+                    module = format!("{name}::");
+                }
+            }
+        }
+        if !used.is_empty() || line.trim_start().starts_with("pub use ") {
+            used += line.trim_start().trim_start_matches("pub use ");
+            used.push(' ');
+        }
+        let Some(whole) = used.trim_end().strip_suffix(';') else { continue };
+        let list = whole.split_once('{').map_or(whole, |(_, list)| list.trim_end_matches('}'));
+        let last = |name: &str| name.rsplit([' ', ':']).next().unwrap_or_default().to_owned();
+        let listed = list.split(',').map(|name| last(name.trim())).filter(|name| !name.is_empty() && name != "*");
+        names.extend(listed.filter(|_| !hidden).map(|name| format!("davit::{module}{name}")));
+        if module.is_empty() {
+            hidden = false;
+        }
+        used.clear();
+    }
+    names
+}
+
+/// What this crate offers changes on purpose only. Written anew with `DAVIT_WRITE_NAMES=1`.
+#[test]
+fn the_public_names_are_those_that_are_listed() {
+    let path = root().join("tests/golden/public_names.txt");
+    let names = public_names();
+    assert!(names.len() > 40 && names.contains("davit::main"), "lib.rs was not understood: {names:?}");
+    let text: String = names.iter().map(|name| format!("{name}\n")).collect();
+    if std::env::var_os("DAVIT_WRITE_NAMES").is_some() {
+        std::fs::write(&path, &text).expect("the list can be written");
+    }
+    let listed = std::fs::read_to_string(&path).expect("the list is there");
+    let listed: BTreeSet<String> = listed.lines().map(str::to_owned).collect();
+    let (more, less): (Vec<_>, Vec<_>) = (names.difference(&listed).collect(), listed.difference(&names).collect());
+    assert!(
+        more.is_empty() && less.is_empty(),
+        "offered and not listed: {more:?}; listed and not offered: {less:?}. Whoever uses Davit sees that: say it in \
+         CHANGELOG.md, and list it with DAVIT_WRITE_NAMES=1"
+    );
+}
+
+/// Programs and examples use what everybody may use: rooms are open to tests and measurements alone.
+#[test]
+fn examples_name_no_rooms() {
+    let is_room = |name: &str| ["", ".rs"].iter().any(|end| root().join(format!("src/{name}{end}")).exists());
+    let mut texts: Vec<(String, String)> = sources("examples");
+    texts.extend(sources("tests").into_iter().filter(|(file, _)| file == "tests/own_program.rs"));
+    texts.extend(sources("src").into_iter().filter(|(file, _)| file == "src/main.rs"));
+    assert!(texts.len() > 4, "the examples are somewhere else");
+    // And those in the documentation.
+    for (file, text) in sources("src") {
+        let mut inside = false;
+        let mut example = String::new();
+        for line in text.lines().map(str::trim_start) {
+            let Some(said) = line.strip_prefix("///").or_else(|| line.strip_prefix("//!")) else { continue };
+            inside ^= said.trim_start().starts_with("```");
+            if inside {
+                example = example + said.trim_start().trim_start_matches("# ") + "\n";
+            }
+        }
+        texts.push((format!("{file} (examples)"), example));
+    }
+    let offered = public_names();
+    let mut wrong = Vec::new();
+    for (file, text) in texts {
+        for (line, name, more) in paths_named(&text, "davit::") {
+            let whole = offered.contains(&format!("davit::{name}")) && !more;
+            if is_room(&name) && !whole {
+                wrong.push(format!("{file}:{line}: `davit::{name}`"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "rooms are private, use what `src/lib.rs` offers:\n{}", wrong.join("\n"));
+}
+
+/// Names of types, with the files in which each is: what a room calls so, for whoever reads it in the next one.
+fn type_names() -> BTreeMap<String, Vec<String>> {
+    let mut names: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (file, text) in sources("src").into_iter().filter(|(file, _)| !file.contains("/tests")) {
+        // Types of tests, and those inside of functions, are seen by nobody else: they are indented.
+        for line in code_lines(&text) {
+            let line = line.strip_prefix("pub").map_or(line.as_str(), |rest| {
+                rest.strip_prefix('(').and_then(|rest| rest.split_once(')')).map_or(rest, |(_, rest)| rest).trim_start()
+            });
+            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
+            let is_type = !line.starts_with(' ') && words.next().is_some_and(|word| TYPES.contains(&word));
+            if let Some(name) = words.next().filter(|_| is_type) {
+                names.entry(name.to_owned()).or_default().push(file.clone());
+            }
+        }
+    }
+    names
+}
+
+const TYPES: &[&str] = &["struct", "enum", "trait", "type", "union"];
+
+/// Names that several types may have: each a file's own, in the same place of its room.
+const MANY: &[(&str, &str)] = &[("Args", "what a command line may say: one of each command, and seen by no other")];
+
+/// One name, one type. Those that still have several are listed in `tests/golden/names_twice.txt`, with how many: that list
+/// gets only shorter.
+#[test]
+fn one_name_is_one_type() {
+    let names = type_names();
+    assert!(names.len() > 500, "the sources were not understood: {} types", names.len());
+    let listed = std::fs::read_to_string(root().join("tests/golden/names_twice.txt")).expect("the list is there");
+    let listed: BTreeMap<&str, usize> = (listed.lines())
+        .filter_map(|line| line.split_once(' '))
+        .map(|(name, count)| (name, count.parse().expect("a number")))
+        .collect();
+    let mut wrong = Vec::new();
+    for (name, files) in &names {
+        let allowed = listed.get(name.as_str()).copied().unwrap_or(1);
+        if files.len() > allowed && MANY.iter().all(|(many, _)| many != name) {
+            wrong.push(format!("`{name}` is in {}: give the newest a name of its own", files.join(", ")));
+        }
+    }
+    for (name, allowed) in listed {
+        let found = names.get(name).map_or(0, Vec::len);
+        if found < allowed || found < 2 {
+            wrong.push(format!(
+                "`{name} {allowed}` is listed, and there are {found}: shorten `tests/golden/names_twice.txt`"
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "names of several types:\n{}", wrong.join("\n"));
 }
 
 #[test]

@@ -3,9 +3,8 @@
 //!
 //! Without a harness: the program starts itself.
 
-use davit::libraries;
-use davit::runtime::{Builder, Component, Library};
-use davit::time::Clock;
+use davit::Clock;
+use davit::component::{Builder, Component, Library};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
@@ -88,7 +87,7 @@ fn full_pipe() -> (File, OwnedFd) {
 
 fn main() -> ExitCode {
     if std::env::var_os(PROGRAM).is_some() {
-        return davit::cli::main(libraries::builtin().with(Library::new("own").with::<Careless>("own.Careless")));
+        return davit::main(davit::builtin().with(Library::new("own").with::<Careless>("own.Careless")));
     }
     a_panic_does_not_wait_for_its_reader();
     what_is_printed_in_the_background_is_kept();

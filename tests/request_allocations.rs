@@ -1,7 +1,7 @@
 //! What a request for a prepared switch allocates on its whole way: queue, configurator, embedded platform, progress,
 //! answer. Counted over all threads of the process.
 
-use davit::configurator::{Answer, Batch, Configurator, Request, Requester, Setup};
+use davit::configurator::{Answer, Batch, Configurator, ConfiguratorSetup, Request, Requester};
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::runtime::{Builder, Component, In, Libraries, Library, Prop};
@@ -79,7 +79,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
     let (sink, answers) = clock.channel::<Answer>(16);
     let steps = Arc::new(AtomicU64::new(0));
     let told = steps.clone();
-    let handle = Configurator::start(Setup {
+    let handle = Configurator::start(ConfiguratorSetup {
         configurations: configurations(),
         rest: Vec::new(),
         operator: Vec::new(),

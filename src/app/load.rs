@@ -25,7 +25,7 @@ pub struct Read {
     pub platform: PlatformMaker,
     /// Its texts.
     pub sources: SourceMap,
-    /// What reading found; no errors among them, or (of [`read_but_for`]) only such as are about single configurations.
+    /// What reading found; no errors among them, or (of `read_but_for`) only such as are about single configurations.
     pub findings: Findings,
 }
 

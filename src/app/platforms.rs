@@ -14,9 +14,9 @@ use std::sync::Arc;
 /// What a program brings: component libraries, and platforms to run components on.
 ///
 /// ```
-/// use davit::app::Extensions;
+/// use davit::Extensions;
 /// // The built-in libraries on the built-in platforms: `davit` itself.
-/// let extensions = Extensions::from(davit::libraries::builtin());
+/// let extensions = Extensions::from(davit::builtin());
 /// assert_eq!(extensions.platforms().collect::<Vec<_>>(), ["embedded", "simulated"]);
 /// ```
 #[derive(Debug, Clone)]
@@ -81,18 +81,17 @@ impl Extensions {
 /// A platform of a program: its name, what kind it is, which options a deployment may give it, and how it is made.
 ///
 /// ```
-/// use davit::app::PlatformMaker;
-/// use davit::model::{PlatformKind, ValueType};
-/// use davit::platform::simulated::{Options, Simulated};
+/// use davit::platforms::{PlatformKind, PlatformMaker, Simulated, SimulatedOptions};
+/// use davit::{Extensions, ValueType};
 /// use std::sync::Arc;
 ///
 /// let bus = PlatformMaker::new("bus", PlatformKind::ELSEWHERE, |making| {
 ///     // One for a real bus would open `making.options["device"]` here, and say why it cannot.
-///     Ok(Arc::new(Simulated::new(making.checked.catalogue.clone(), making.clock.clone(), Options::default())))
+///     Ok(Arc::new(Simulated::new(making.checked.catalogue.clone(), making.clock.clone(), SimulatedOptions::default())))
 /// })
 /// .option("device", ValueType::Str, None, "the device file of the bus");
 /// // `platform: { bus: { device: "/dev/bus0" } }` in a deployment.
-/// let extensions = davit::app::Extensions::from(davit::libraries::builtin()).with_platform(bus);
+/// let extensions = Extensions::from(davit::builtin()).with_platform(bus);
 /// assert!(extensions.platforms().any(|name| name == "bus"));
 /// ```
 #[derive(Clone)]

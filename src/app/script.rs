@@ -65,14 +65,14 @@ pub struct ScriptEnd {
     pub ended: Option<Ended>,
 }
 
-struct Host {
+struct ScriptHost {
     options: Options,
     folder: PathBuf,
     session: Option<Arc<Session>>,
     /// By what it is reached from outside.
     door: Option<Box<dyn Any>>,
     /// What goes wrong, and where it does.
-    faults: faults::Faults,
+    faults: faults::ScriptFaults,
     /// Answers and events after this one are news for `wait_answer`, but for those that one has waited for already.
     mark: u64,
     taken: Vec<u64>,
@@ -80,7 +80,7 @@ struct Host {
     ended: Option<Ended>,
 }
 
-type Shared = Rc<RefCell<Host>>;
+type SharedHost = Rc<RefCell<ScriptHost>>;
 
 /// How long reading the platform, or a recovery, may take, in time of the script's clock.
 const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
@@ -94,12 +94,12 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
     let clock = options.clock.clone();
     let _participant = clock.enter();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let host = Rc::new(RefCell::new(Host {
+    let host = Rc::new(RefCell::new(ScriptHost {
         options,
         folder,
         session: None,
         door: None,
-        faults: faults::Faults::default(),
+        faults: faults::ScriptFaults::default(),
         mark: 0,
         taken: Vec::new(),
         refused: None,
@@ -125,7 +125,7 @@ pub fn run(path: &Path, options: Options) -> ScriptEnd {
     ScriptEnd { failure, ended: host.ended }
 }
 
-fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure> {
+fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFailure> {
     // It fails by the refusal of a deployment only where it has let that through: one that it caught is its own affair.
     let failed = |error: mlua::Error| match error.chain().any(|error| error.is::<IsRefused>()) {
         true if host.borrow().refused.is_some() => {
@@ -139,7 +139,7 @@ fn execute(path: &Path, text: &[u8], host: &Shared) -> Result<(), ScriptFailure>
     };
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
-    guards.budget.interrupted_by(interrupt(host).asked());
+    guards.budget.count.interrupted_by(interrupt(host).asked());
     let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
     let chunk = chunk.set_mode(mlua::chunk::ChunkMode::Text);
     guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || chunk.exec()).map_err(failed)
@@ -173,7 +173,7 @@ pub const FUNCTIONS: &[&str] = &[
     "shutdown",
 ];
 
-fn install(lua: &Lua, host: &Shared) -> mlua::Result<()> {
+fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     let globals = lua.globals();
     macro_rules! function {
         ($name:literal, $types:ty, |$h:ident, $lua:ident, $args:pat_param| $body:expr) => {{
@@ -279,27 +279,27 @@ fn error(message: impl Into<String>) -> mlua::Error {
     mlua::Error::runtime(message.into())
 }
 
-fn clock(host: &Shared) -> Clock {
+fn clock(host: &SharedHost) -> Clock {
     host.borrow().options.clock.clone()
 }
 
-fn interrupt(host: &Shared) -> Interrupt {
+fn interrupt(host: &SharedHost) -> Interrupt {
     host.borrow().options.interrupt.clone()
 }
 
-fn session(host: &Shared) -> mlua::Result<Arc<Session>> {
+fn session(host: &SharedHost) -> mlua::Result<Arc<Session>> {
     interrupt(host).check()?;
     host.borrow().session.clone().ok_or_else(|| error("nothing is deployed: call deploy(\"FILE\") first"))
 }
 
-fn deadline(host: &Shared, seconds: f64) -> mlua::Result<Time> {
+fn deadline(host: &SharedHost, seconds: f64) -> mlua::Result<Time> {
     if !seconds.is_finite() || !(0.0..=1e6).contains(&seconds) {
         return Err(error(format!("{seconds} is not a number of seconds from 0 to 1000000")));
     }
     Ok(clock(host).now() + Duration::from_secs_f64(seconds))
 }
 
-fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
+fn deploy(host: &SharedHost, file: &str, replay: bool) -> mlua::Result<()> {
     interrupt(host).check()?;
     if host.borrow().session.is_some() {
         return Err(error("a deployment is already up: call shutdown() before the next deploy"));
@@ -367,7 +367,7 @@ fn deploy(host: &Shared, file: &str, replay: bool) -> mlua::Result<()> {
 /// The connection that a script is: what it asks for begins one after the other.
 const LINE: u32 = 1;
 
-fn raise(host: &Shared, name: &str, to: Option<Vec<String>>) -> mlua::Result<()> {
+fn raise(host: &SharedHost, name: &str, to: Option<Vec<String>>) -> mlua::Result<()> {
     let session = session(host)?;
     let names = session.coordinators();
     let known = |to: String| {
@@ -393,13 +393,13 @@ fn raise(host: &Shared, name: &str, to: Option<Vec<String>>) -> mlua::Result<()>
 }
 
 /// From now on only what comes is news.
-fn listen_anew(host: &Shared, session: &Session) {
+fn listen_anew(host: &SharedHost, session: &Session) {
     let mut host = host.borrow_mut();
     host.mark = session.hub().heard();
     host.taken.clear();
 }
 
-fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: bool) -> mlua::Result<()> {
+fn request(host: &SharedHost, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: bool) -> mlua::Result<()> {
     let session = session(host)?;
     let ask = match id {
         None => Ask::Undo,
@@ -417,7 +417,7 @@ fn request(host: &Shared, id: Option<&str>, ask: fn(ConfigId) -> Ask, force: boo
     Ok(())
 }
 
-fn recover(host: &Shared, how: &str) -> mlua::Result<()> {
+fn recover(host: &SharedHost, how: &str) -> mlua::Result<()> {
     let Some(direction) = recovery(how) else {
         return Err(error(match how {
             "forward" => NO_FORWARD.to_owned(),
@@ -438,7 +438,7 @@ fn recover(host: &Shared, how: &str) -> mlua::Result<()> {
 
 /// Waits until `look` finds something; tells what was there instead when the time is over.
 fn wait_until<T>(
-    host: &Shared,
+    host: &SharedHost,
     seconds: f64,
     look: impl Fn(&Session) -> Option<T>,
     what: impl Fn(&Hub) -> String,
@@ -457,7 +457,7 @@ fn wait_until<T>(
     }
 }
 
-fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
+fn wait_state(host: &SharedHost, state: &str, seconds: f64) -> mlua::Result<()> {
     let deployed = session(host)?;
     if !deployed.knows_state(state) {
         let states = deployed.states();
@@ -473,7 +473,7 @@ fn wait_state(host: &Shared, state: &str, seconds: f64) -> mlua::Result<()> {
     )
 }
 
-fn wait_answer(host: &Shared, event: &str, seconds: f64) -> mlua::Result<()> {
+fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua::Result<()> {
     if let Some(why) = session(host)?.never_heard(event) {
         return Err(error(why));
     }

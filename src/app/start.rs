@@ -8,7 +8,7 @@ use crate::model::{Coordinator, Deployment, FaultKind, SimulatedReaction, StepFa
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Fault, FaultRule, Simulated, StepPattern};
-use crate::session::{Session, Setup};
+use crate::session::{Session, SessionSetup};
 use crate::statechart;
 use crate::time::Clock;
 use std::sync::Arc;
@@ -119,7 +119,7 @@ pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -
         let (chart, _) = statechart::compile(written);
         Arc::new(chart.expect("a checked deployment's coordinators compile"))
     });
-    Session::start(Setup {
+    Session::start(SessionSetup {
         deployment: checked.deployment.share(),
         functions: openers(checked),
         charts: charts.collect(),

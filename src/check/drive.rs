@@ -16,7 +16,7 @@ use super::state::{Failed, Move, Next, State};
 use super::timers::{Waits, takes};
 use super::tried::{Goal, Tried, Way};
 use crate::limits;
-use crate::model::{Ask, Catalogue, ConfigId, Deployment, Findings, Ident, Snapshot, Verdict};
+use crate::model::{Ask, Catalogue, Deployment, Findings, Ident, Snapshot, Verdict};
 use crate::plan::PlannedStep;
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
@@ -32,8 +32,6 @@ pub enum Happening {
         coordinator: Ident,
         /// The event.
         event: String,
-        /// The state the coordinator is in then.
-        state: String,
     },
     /// Requests made together are carried out.
     Applied {
@@ -55,8 +53,6 @@ pub enum Happening {
 pub struct Drive {
     /// What happens, in order.
     pub happenings: Vec<Happening>,
-    /// Whether there is more than one coordinator.
-    pub several: bool,
     /// Whether it arrives.
     pub reached: bool,
     /// The coordinator that does not arrive; when all do, the last.
@@ -65,8 +61,6 @@ pub struct Drive {
     pub state: String,
     /// The system it ends with.
     pub system: Snapshot,
-    /// Frames that are left.
-    pub frames: Vec<ConfigId>,
     /// Why a request on the way was refused, if one was; the way ends there.
     pub refused: Option<(Ask, Findings)>,
 }
@@ -347,12 +341,10 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     let ends = last.clone().find(|one| !inside(one)).or_else(|| last.next_back());
     let (member, leaf) = ends?;
     Some(Drive {
-        several: charts.len() > 1,
         reached,
         coordinator: member.name,
         state: member.chart.fqn(*leaf).to_string(),
         system: world.system.snapshot(),
-        frames: world.stack.frames().iter().map(|f| f.configuration).collect(),
         refused: end.refused.clone().map(|(request, findings)| (request.ask, findings)),
         happenings: happenings(&product, end),
     })
@@ -364,11 +356,7 @@ fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
     let mut before = &way.from;
     for next in &way.moves {
         let state = |number: usize| product.members[number].chart.fqn(next.state.leaves[number]).to_string();
-        let of = |number: usize, event: String| Happening::Event {
-            coordinator: product.members[number].name,
-            event,
-            state: state(number),
-        };
+        let of = |number: usize, event: String| Happening::Event { coordinator: product.members[number].name, event };
         match next.by {
             Move::Answer => {
                 let requests: Vec<Request> = next.answers.iter().map(|(request, _)| *request).collect();

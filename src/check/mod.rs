@@ -24,6 +24,7 @@ mod ends;
 mod explore;
 mod failing;
 mod few;
+#[cfg(any(test, feature = "internals"))]
 mod follow;
 mod held;
 mod inbox;
@@ -76,9 +77,12 @@ mod world;
 
 pub use drive::{Drive, Happening, Until, drive};
 pub use effort::{Effort, Far, Halt};
+#[cfg(any(test, feature = "internals"))]
 pub use follow::{Follower, Known, Seen, Shown};
 pub use report::{Checked, Explored, Report};
 pub use run::{configurations, fault, monitors, run, run_with};
-pub use shown::{FOLLOWED, READ, why_no_way};
+pub use shown::why_no_way;
+#[cfg(any(test, feature = "internals"))]
+pub use shown::{FOLLOWED, READ};
 pub use trace::{Again, Answered, Does, Happened, Hears, Place, Replay, TraceStep};
 pub use verdict::Verdict;

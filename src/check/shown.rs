@@ -5,6 +5,7 @@ use crate::model::codes::*;
 
 /// Found by following the coordinators: such a finding has its own way from the start, which a script goes. (What is wrong with
 /// a configuration wherever it is applied is found by looking at it, and has none.)
+#[cfg(any(test, feature = "internals"))]
 pub const FOLLOWED: &[Code] = &[
     // What coordinators come to.
     COORD_REQUEST_REFUSED,

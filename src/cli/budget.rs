@@ -17,14 +17,14 @@ use std::time::Duration;
 
 /// How much is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Budget {
+pub struct CheckBudget {
     /// Transitions of coordinators that are followed together.
     pub transitions: usize,
     /// Bytes of memory that the process takes up; none: any.
     pub memory: Option<u64>,
 }
 
-impl Default for Budget {
+impl Default for CheckBudget {
     fn default() -> Self {
         Self { transitions: limits::CHECK_TRANSITIONS, memory: None }
     }
@@ -51,7 +51,7 @@ fn number(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     whole.parse::<u64>().ok()?.checked_mul(*times)?.checked_add(part)
 }
 
-impl FromStr for Budget {
+impl FromStr for CheckBudget {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -83,14 +83,14 @@ fn memory(bytes: u64) -> String {
 }
 
 /// As it is read: `400000`, `400000,2GB`.
-impl std::fmt::Display for Budget {
+impl std::fmt::Display for CheckBudget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.transitions)?;
         self.memory.map_or(Ok(()), |bytes| write!(f, ",{}", memory(bytes)))
     }
 }
 
-impl Budget {
+impl CheckBudget {
     /// In words.
     pub fn told(self) -> String {
         let memory = self.memory.map(|bytes| format!(" and {} of memory", memory(bytes)));
@@ -110,7 +110,7 @@ const TELLS_AFTER: Duration = Duration::from_millis(500);
 
 /// Following that is under way.
 pub struct Following {
-    budget: Budget,
+    budget: CheckBudget,
     clock: Clock,
     began: Time,
     bar: ProgressBar,
@@ -125,7 +125,7 @@ impl Following {
     ///
     /// # Errors
     /// The operating system does not tell how much memory is taken up, and that is bounded.
-    pub fn new(budget: Budget, silent: bool) -> Result<Self, Failure> {
+    pub fn new(budget: CheckBudget, silent: bool) -> Result<Self, Failure> {
         if budget.memory.is_some() && taken_up().is_none() {
             return Err(Failure::usage(
                 CLI_MEMORY_UNKNOWN,
@@ -211,9 +211,9 @@ mod tests {
             ("1.5GB, 7", 7, Some(1_500_000_000), "7,1500MB"),
             ("9B", limits::CHECK_TRANSITIONS, Some(9), "400000,9B"),
         ] {
-            match text.parse::<Budget>() {
+            match text.parse::<CheckBudget>() {
                 Ok(budget) => {
-                    assert_eq!(budget, Budget { transitions, memory }, "{text}");
+                    assert_eq!(budget, CheckBudget { transitions, memory }, "{text}");
                     assert_eq!(budget.to_string(), told, "{text}");
                     assert_eq!(told.parse(), Ok(budget), "{text}");
                 }
@@ -221,7 +221,7 @@ mod tests {
             }
         }
         for none in ["", "M", ".5M", "1e3", "1.2345k", "+3", "3,4", "1GB,2GB", "99999999999999999999", "5TB", "١"] {
-            assert!(none.parse::<Budget>().is_err(), "{none}");
+            assert!(none.parse::<CheckBudget>().is_err(), "{none}");
         }
     }
 }

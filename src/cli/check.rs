@@ -1,6 +1,6 @@
 //! `davit check`
 
-use super::budget::{Budget, Following};
+use super::budget::{CheckBudget, Following};
 use super::exit::Exit;
 use super::input::Input;
 use super::output::Style;
@@ -43,7 +43,7 @@ pub struct Args {
     /// much memory (`2GB`, `500MB`), or both (`20M,4GB`). Of coordinators that have nothing to do with each other each has as
     /// many.
     #[arg(long, value_name = "BUDGET", default_value_t)]
-    budget: Budget,
+    budget: CheckBudget,
     /// Show the shortest way to the N-th finding, and nothing else.
     #[arg(long, value_name = "N", conflicts_with_all = ["json", "notes"])]
     trace: Option<usize>,
@@ -254,7 +254,7 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
 }
 
 /// How far the coordinators were followed, and what was left out.
-fn bounds(explored: &Explored, deployment: &Deployment, budget: Budget) -> Vec<String> {
+fn bounds(explored: &Explored, deployment: &Deployment, budget: CheckBudget) -> Vec<String> {
     let mut lines = Vec::new();
     if explored.states == 0 {
         return lines;

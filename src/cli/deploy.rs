@@ -6,8 +6,8 @@ use super::input::Input;
 use super::keep::Keep;
 use super::last_words;
 use super::output::{Output, Style};
-use super::progress::Progress;
-use super::signals::Watch;
+use super::progress::ProgressView;
+use super::signals::SignalWatch;
 use super::{Answer, Context, Failure, Run};
 use crate::app::{self, Checked, StartError};
 use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED};
@@ -79,9 +79,9 @@ impl ClockKind {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         if self.detach {
-            return detach::run(context).map_err(|failure| failure.as_json(self.json));
+            return detach::run(context).map_err(|failure| failure.in_json(self.json));
         }
-        self.deploy(context).map_err(|failure| failure.as_json(self.json))
+        self.deploy(context).map_err(|failure| failure.in_json(self.json))
     }
 }
 
@@ -89,7 +89,7 @@ impl Args {
     fn deploy(&self, context: &Context) -> Answer {
         let checked = self.input.check(context)?;
         let clock = self.clock.make(self.pace);
-        let progress = Progress::new(context.out, self.json, &clock).map_err(short)?;
+        let progress = ProgressView::new(context.out, self.json, &clock).map_err(short)?;
         let exit = self.foreground(context, &checked, &clock, &progress)?;
         clock.shutdown();
         last_words::unread(progress.end());
@@ -101,7 +101,7 @@ impl Args {
         context: &Context,
         checked: &Checked,
         clock: &Clock,
-        progress: &Progress,
+        progress: &ProgressView,
     ) -> Result<Exit, Failure> {
         let _participant = clock.enter();
         let (name, in_background) = (checked.deployment.name, self.in_background);
@@ -202,10 +202,10 @@ type Leaving = Arc<Mutex<Vec<Leave>>>;
 
 fn watch(
     session: &Arc<Session>,
-    progress: &Progress,
+    progress: &ProgressView,
     leaving: &Leaving,
     in_background: bool,
-) -> Result<Watch, Failure> {
+) -> Result<SignalWatch, Failure> {
     let stop = {
         let (session, progress) = (Arc::downgrade(session), progress.clone());
         move |force| {
@@ -224,7 +224,7 @@ fn watch(
             progress.finish();
         }
     };
-    Watch::start(in_background, stop, leave).map_err(unwatched)
+    SignalWatch::start(in_background, stop, leave).map_err(unwatched)
 }
 
 /// Signals cannot be watched.
@@ -245,7 +245,7 @@ pub(super) fn short(error: std::io::Error) -> Failure {
     )
 }
 
-fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: bool) {
+fn tell_up(out: &Output, progress: &ProgressView, session: &Session, in_background: bool) {
     let status = session.status();
     let what = match (&status.system, &status.stack) {
         (Some(system), Some(stack)) => format!(
@@ -266,7 +266,7 @@ fn tell_up(out: &Output, progress: &Progress, session: &Session, in_background: 
     progress.line(out.paint(Style::Dim, way));
 }
 
-fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in_background: bool) -> Exit {
+fn tell_not_up(out: &Output, progress: &ProgressView, name: &str, not_up: &NotUp, in_background: bool) -> Exit {
     progress.line(format!("{} {}: {}", out.paint(Style::Bold, name), out.paint(Style::Bad, "not up"), not_up.why));
     for reason in &not_up.reasons {
         progress.line(format!("  {reason}"));
@@ -280,7 +280,7 @@ fn tell_not_up(out: &Output, progress: &Progress, name: &str, not_up: &NotUp, in
     Exit::of_stop(&not_up.ended, well)
 }
 
-fn tell_ended(out: &Output, progress: &Progress, name: &str, ended: &Ended) {
+fn tell_ended(out: &Output, progress: &ProgressView, name: &str, ended: &Ended) {
     for note in &ended.left {
         progress.line(format!("  {}  {note}", out.paint(Style::Bad, "left")));
     }

@@ -6,7 +6,7 @@
 use super::exit::Exit;
 use super::last_words;
 use super::output::{self, Output};
-use super::signals::Watch;
+use super::signals::SignalWatch;
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_SYSTEM;
 use crate::time::lock;
@@ -53,7 +53,7 @@ pub fn run(context: &Context) -> Answer {
                 std::process::exit(i32::from(Exit::Done.code()));
             }
         };
-        Watch::start(
+        SignalWatch::start(
             true,
             move |_| {
                 left(lock(&passed).signal());

@@ -26,13 +26,13 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct View {
+struct CodeView {
     code: &'static str,
     title: &'static str,
     text: &'static str,
 }
 
-impl From<&'static Page> for View {
+impl From<&'static Page> for CodeView {
     fn from(page: &'static Page) -> Self {
         Self { code: page.code.0, title: page.title, text: page.text }
     }
@@ -52,7 +52,7 @@ impl Run for Args {
 
 fn all(out: &Output, json: bool) {
     if json {
-        return out.json(&PAGES.iter().map(View::from).collect::<Vec<_>>());
+        return out.json(&PAGES.iter().map(CodeView::from).collect::<Vec<_>>());
     }
     let mut table = Table::new(0);
     for page in PAGES {
@@ -86,7 +86,7 @@ fn first_sentence(text: &str) -> &str {
 fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
     if let Some(page) = codes::page(what) {
         if json {
-            out.json(&View::from(page));
+            out.json(&CodeView::from(page));
         } else {
             out.line(format!("{}: {}\n", out.paint(Style::Name, page.code), out.paint(Style::Bold, page.title)));
             out.text(wrapped(page.text, text_columns(), 0));
@@ -95,7 +95,7 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
     }
     let entries = schema::about(what);
     if entries.is_empty() {
-        return Err(unknown(what).as_json(json));
+        return Err(unknown(what).in_json(json));
     }
     if json {
         out.json(&entries);

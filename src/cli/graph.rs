@@ -2,9 +2,9 @@
 
 use super::exit::Exit;
 use super::input::{Coordinator, Input, Parameters, coordinators, is_deployment, which};
-use super::plan::{asked, drive, driven, of_others};
 use super::remote::{ASK, ask};
 use super::{Answer, Context, Failure, Run, write_output};
+use crate::app::{drive, plan, plan_way, wrong_in_others};
 use crate::check::Until;
 use crate::diagnostics::Language;
 use crate::draw;
@@ -26,7 +26,7 @@ pub struct Args {
     ids: Vec<String>,
     /// What to draw.
     #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
-    what: What,
+    what: Drawn,
     /// The format.
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
@@ -48,7 +48,7 @@ pub struct Args {
 
 /// What is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-enum What {
+enum Drawn {
     /// Components, ports and connections.
     #[default]
     Components,
@@ -78,8 +78,8 @@ enum Format {
 
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
-        let what = if is_deployment(&self.file) { self.what } else { What::Coordinator };
-        let picture = if what == What::Coordinator {
+        let what = if is_deployment(&self.file) { self.what } else { Drawn::Coordinator };
+        let picture = if what == Drawn::Coordinator {
             let mut all = coordinators(&self.file, &self.parameters, self.of.as_deref(), &[])?;
             if all.len() > 1 {
                 return self.several(context, &all);
@@ -110,11 +110,11 @@ impl Run for Args {
             // What is wrong with configurations that are not drawn refuses nothing.
             let tell_others = |told: Option<&Findings>| {
                 let told = told.map_or(&[][..], Vec::as_slice);
-                context.out.findings(&of_others(&read, told), &read.sources);
+                context.out.findings(&wrong_in_others(&read, told), &read.sources);
             };
             match what {
-                What::Plan => {
-                    let plans = if self.ids.is_empty() { driven(&read, Until::Up) } else { asked(&read, &self.ids) };
+                Drawn::Plan => {
+                    let plans = if self.ids.is_empty() { plan_way(&read, Until::Up) } else { plan(&read, &self.ids) };
                     tell_others(plans.as_ref().err());
                     let plans: Vec<_> = plans
                         .map_err(refused)?
@@ -137,7 +137,7 @@ impl Run for Args {
                         }
                         drive.system
                     } else {
-                        let planned = asked(&read, &self.ids);
+                        let planned = plan(&read, &self.ids);
                         tell_others(planned.as_ref().err());
                         let planned = planned.map_err(refused)?;
                         planned.into_iter().last().map(|p| p.result).unwrap_or_default()

@@ -14,9 +14,9 @@ use std::panic::PanicHookInfo;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-type Job = Box<dyn FnOnce() + Send>;
+type LastWord = Box<dyn FnOnce() + Send>;
 
-static WORDS: OnceLock<Tap<Job>> = OnceLock::new();
+static WORDS: OnceLock<Tap<LastWord>> = OnceLock::new();
 
 /// Lines of the story were not read.
 static STALLED: AtomicBool = AtomicBool::new(false);
@@ -26,7 +26,7 @@ static STALLED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// When the operating system has no thread left.
 pub fn prepare() -> std::io::Result<()> {
-    let tap = Tap::new("davit-last-words", limits::TAP_OWN, &Clock::real(), |news: News<Job>| match news {
+    let tap = Tap::new("davit-last-words", limits::TAP_OWN, &Clock::real(), |news: News<LastWord>| match news {
         News::One(job) => job(),
         News::Missed(words) => output::error(&format!("note: {} could not be written\n", count(words, "message"))),
     })?;

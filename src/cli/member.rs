@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, Wait, Which, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, WaitFor, Which, connect, failure, seconds};
 use super::request::request;
 use super::status::text;
 use super::{Answer, Context, Run};
@@ -34,7 +34,7 @@ impl Run for GetArgs {
         let patience = Patience::within(self.within);
         let client = connect(self.which.name.as_deref());
         let seen = client.and_then(|mut client| client.call("get", &params, patience.left()).map_err(failure));
-        let seen = seen.map_err(|failure| failure.as_json(self.json))?;
+        let seen = seen.map_err(|failure| failure.in_json(self.json))?;
         let there = !seen["value"].is_null();
         if self.json {
             out.json(&seen);
@@ -78,7 +78,7 @@ pub struct SetArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -91,7 +91,7 @@ impl Run for SetArgs {
             let mut client = connect(self.which.name.as_deref())?;
             client.call("get", &json!({ "name": self.member, "within_s": 0 }), patience.left()).map_err(failure)
         };
-        let seen = ask().map_err(|failure| failure.as_json(self.json))?;
+        let seen = ask().map_err(|failure| failure.in_json(self.json))?;
         let value = meant(&self.value, text(&seen["type"]));
         let params = json!({ "name": self.member, "value": value, "force": self.force });
         request(context, "set", params, &self.which, &self.wait, &patience, self.json)

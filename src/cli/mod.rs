@@ -1,6 +1,6 @@
 //! The command line: a thin skin. One file a command, each: load, one call of the library, one view as text or JSON.
 //!
-//! A program with components of its own is three lines: `fn main() -> ExitCode { davit::cli::main(libraries) }`.
+//! A program with components of its own is three lines: `fn main() -> ExitCode { davit::main(libraries) }`.
 //!
 //! To add a command: a file with an `Args` struct (its doc comment is the help text) that implements [`Run`], and one
 //! line in `commands!` below.
@@ -179,7 +179,7 @@ impl Failure {
 
     /// The same, as JSON if so asked.
     #[must_use]
-    pub fn as_json(mut self, json: bool) -> Self {
+    pub fn in_json(mut self, json: bool) -> Self {
         self.json = json;
         self
     }

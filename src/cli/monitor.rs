@@ -15,7 +15,7 @@ use crate::model::codes::{
 use crate::model::finding::{did_you_mean, has_errors};
 use crate::model::{Finding, Findings, Monitor, Origin};
 use crate::monitor::replay::{Raised, Replay, Tally};
-use crate::monitor::table::{Columns, Problem, decimal, empty, is_blank};
+use crate::monitor::table::{Columns, TableProblem, decimal, empty, is_blank};
 use crate::time::Time;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
@@ -56,7 +56,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.replay(context).map_err(|failure| failure.as_json(json))
+        self.replay(context).map_err(|failure| failure.in_json(json))
     }
 }
 
@@ -126,9 +126,9 @@ impl Args {
         } else {
             Box::new(std::fs::File::open(&self.samples).map_err(|error| unreadable(&error))?)
         };
-        let mut lines = Lines { input: BufReader::new(input), number: 0, text: String::new() };
+        let mut lines = SampleLines { input: BufReader::new(input), number: 0, text: String::new() };
         // What is wrong with a line of the recording, shown with that line alone: the whole of it may be too large.
-        let wrong = |sources: &mut SourceMap, lines: &Lines, problem: Problem| {
+        let wrong = |sources: &mut SourceMap, lines: &SampleLines, problem: TableProblem| {
             let line = u32::try_from(lines.number).unwrap_or(u32::MAX).max(1);
             let text = lines.text.trim_start_matches('\u{feff}').trim_end_matches(['\r', '\n']);
             let file = sources.add_excerpt(name.as_str(), text, line);
@@ -329,13 +329,13 @@ fn notes(monitors: &[Monitor], replay: &Replay) -> Findings {
 }
 
 /// Lines of bounded length.
-struct Lines {
+struct SampleLines {
     input: BufReader<Box<dyn Read>>,
     number: u64,
     text: String,
 }
 
-impl Lines {
+impl SampleLines {
     /// Reads the next line; false at the end.
     fn next(&mut self) -> std::io::Result<bool> {
         self.text.clear();

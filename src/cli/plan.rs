@@ -5,17 +5,10 @@ use super::input::Input;
 use super::output::{Output, Style, Table};
 use super::plan_view::{PlanView, SystemSteps};
 use super::{Answer, Context, Failure, Run};
-use crate::app::Read;
-use crate::check::{self, Drive, Happening, Until};
-use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
-use crate::model::finding::{configuration, count, did_you_mean, has_errors};
-use crate::model::{Ask, ConfigId, Finding, Findings, Ident, Snapshot};
-use crate::plan::PlannedStep;
-use crate::stack::{Op, Requester, Stack, transaction};
-use crate::system::{Reversibility, System, step};
-use crate::time::Time;
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use crate::app::{Application, plan, plan_way, wrong_in_others};
+use crate::check::Until;
+use crate::model::finding::count;
+use crate::system::Reversibility;
 
 /// Show what configurations mean: their steps, in which order, what runs in parallel, what can be undone and how.
 ///
@@ -40,26 +33,10 @@ pub struct Args {
     json: bool,
 }
 
-/// One planned application.
-pub struct Planned {
-    /// The coordinator that asks, of several.
-    pub coordinator: Option<String>,
-    /// What was asked for.
-    pub asks: Vec<Ask>,
-    /// Events that come before it.
-    pub events: Vec<String>,
-    /// The coordinator's state after it, when it is driven.
-    pub state: Option<String>,
-    /// The steps.
-    pub steps: Vec<PlannedStep>,
-    /// The system after it.
-    pub result: Snapshot,
-}
-
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.show(context).map_err(|failure| failure.as_json(json))
+        self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
@@ -67,12 +44,12 @@ impl Args {
     fn show(self, context: &Context) -> Answer {
         let read = self.input.read_but_for(context)?;
         let planned = if self.ids.is_empty() {
-            driven(&read, if self.shutdown { Until::Down } else { Until::Up })
+            plan_way(&read, if self.shutdown { Until::Down } else { Until::Up })
         } else {
-            asked(&read, &self.ids)
+            plan(&read, &self.ids)
         };
         let told = planned.as_ref().err().map_or(&[][..], Vec::as_slice);
-        context.out.findings(&of_others(&read, told), &read.sources);
+        context.out.findings(&wrong_in_others(&read, told), &read.sources);
         let planned =
             planned.map_err(|findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() })?;
         if self.json {
@@ -89,156 +66,7 @@ impl Args {
     }
 }
 
-/// What is wrong in the texts of these configurations.
-fn of_texts(read: &Read, ids: &[ConfigId]) -> Findings {
-    let about = |f: &&Finding| configuration(f).is_some_and(|name| ids.iter().any(|id| id.as_str() == name));
-    read.findings.iter().filter(|f| f.is_error()).filter(about).cloned().collect()
-}
-
-/// What is wrong with configurations that were not asked for, which refuses nothing: everything but what is `told` already.
-///
-/// Where a text could not be read, only that is said: what a configuration lacks then makes wrong names of others.
-pub fn of_others(read: &Read, told: &[Finding]) -> Findings {
-    let mut wrong: Findings = read.findings.iter().filter(|f| f.is_error()).cloned().collect();
-    if wrong.is_empty() {
-        let all: Vec<ConfigId> = read.deployment.configurations.iter().map(|c| c.id).collect();
-        wrong = check::configurations(&read.deployment, &read.catalogue, &all);
-        wrong.retain(Finding::is_error);
-    }
-    wrong.retain(|f| !told.contains(f));
-    wrong
-}
-
-/// The configurations of these names, one after the other.
-///
-/// # Errors
-/// Unknown names, and everything for which one is refused.
-pub fn asked(read: &Read, names: &[String]) -> Result<Vec<Planned>, Findings> {
-    let deployment = &read.deployment;
-    let mut ids = Vec::new();
-    let mut unknown = Vec::new();
-    for name in names {
-        match ConfigId::new(name).ok().filter(|id| deployment.configuration(*id).is_some()) {
-            Some(id) => ids.push(id),
-            None => {
-                let known = deployment.configurations.iter().map(|c| c.id.as_str());
-                unknown.push(
-                    Finding::error(CLI_UNKNOWN_CONFIGURATION, format!("there is no configuration `{name}`"))
-                        .help(did_you_mean(name, "configurations", known)),
-                );
-            }
-        }
-    }
-    if !unknown.is_empty() {
-        return Err(unknown);
-    }
-    let unread = of_texts(read, &ids);
-    if !unread.is_empty() {
-        return Err(unread);
-    }
-    let wrong = check::configurations(deployment, &read.catalogue, &ids);
-    if has_errors(&wrong) {
-        return Err(wrong);
-    }
-    let context = crate::plan::Context::of(deployment);
-    let mut system = System::new(Arc::new(read.catalogue.clone()));
-    let mut stack = Stack::new(deployment.limits.stack);
-    let mut planned = Vec::new();
-    for id in ids {
-        let Some(configuration) = deployment.configuration(id) else { continue };
-        let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
-        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
-        for planned in transaction.steps.iter() {
-            step::effect(&planned.step, &mut system);
-        }
-        planned.push(Planned {
-            coordinator: None,
-            asks: vec![Ask::Apply(id)],
-            events: Vec::new(),
-            state: None,
-            steps: transaction.steps.to_vec(),
-            result: system.snapshot(),
-        });
-        stack.commit(transaction);
-    }
-    Ok(planned)
-}
-
-/// What the coordinators ask for on their way, every request answered *ok*.
-///
-/// # Errors
-/// Findings of the coordinator, and why it does not arrive.
-pub fn driven(read: &Read, until: Until) -> Result<Vec<Planned>, Findings> {
-    let (drive, arrived) = drive(read, until)?;
-    arrived?;
-    let several = read.deployment.coordinators.len() > 1;
-    // What each has heard since it last asked for something: with several, in between others may ask.
-    let mut heard: BTreeMap<Ident, Vec<String>> = BTreeMap::new();
-    let mut planned = Vec::new();
-    for happening in drive.happenings {
-        match happening {
-            Happening::Event { coordinator, event, .. } => heard.entry(coordinator).or_default().push(event),
-            Happening::Applied { coordinator, asks, steps, result, state } => planned.push(Planned {
-                events: heard.remove(&coordinator).unwrap_or_default(),
-                coordinator: several.then(|| coordinator.to_string()),
-                asks,
-                state: Some(state),
-                steps,
-                result,
-            }),
-        }
-    }
-    Ok(planned)
-}
-
-/// Drives the coordinators; with what is wrong when one does not arrive.
-///
-/// # Errors
-/// When it cannot be driven at all.
-pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>), Findings> {
-    let deployment = &read.deployment;
-    let Some(drive) = check::drive(deployment, &read.catalogue, until) else {
-        return Err(check::run(deployment.clone(), &read.catalogue).findings);
-    };
-    let own = deployment.coordinator_named(drive.coordinator).unwrap_or(deployment.first_coordinator());
-    let (code, what, key, goal) = match until {
-        Until::Up => (DEPLOY_NEVER_UP, "the bring-up", "deploy.up", &own.up),
-        Until::Down => (DEPLOY_NEVER_DOWN, "the shutdown", "shutdown.down", &own.down),
-    };
-    let of = |state: &str| {
-        if deployment.coordinators.len() > 1 { format!("{}:{state}", own.name) } else { state.to_owned() }
-    };
-    let stops = format!("{what} stops at `{}`", of(&drive.state));
-    let on_the_way = drive.happenings.iter().flat_map(|happening| match happening {
-        Happening::Applied { asks, .. } => asks.as_slice(),
-        Happening::Event { .. } => &[],
-    });
-    let on_the_way = on_the_way.chain(drive.refused.iter().map(|(ask, _)| ask));
-    let applied = on_the_way.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None });
-    let unread = of_texts(read, &applied.collect::<Vec<_>>());
-    let arrived = if !unread.is_empty() {
-        Err(unread)
-    } else if let Some((ask, findings)) = &drive.refused {
-        let mut all = vec![
-            Finding::error(code, format!("{stops}: `{ask}` is refused"))
-                .at(deployment.key_origin(key))
-                .help("see the findings below for the reason"),
-        ];
-        all.extend(findings.iter().cloned());
-        Err(all)
-    } else if drive.reached {
-        Ok(())
-    } else {
-        Err(vec![
-            Finding::error(code, format!("{stops} and never reaches `{}`", of(goal)))
-                .at(deployment.key_origin(key))
-                .help("`davit check` shows the way there"),
-        ])
-    };
-    Ok((drive, arrived))
-}
-
-fn show(out: &Output, planned: &Planned) {
+fn show(out: &Output, planned: &Application) {
     let names: Vec<String> = planned.asks.iter().map(ToString::to_string).collect();
     let of = planned.coordinator.as_ref().map_or_else(String::new, |name| format!("{name}: "));
     for event in &planned.events {
@@ -283,7 +111,7 @@ fn show(out: &Output, planned: &Planned) {
     out.text(table.to_string());
 }
 
-fn summary(out: &Output, last: &Planned) {
+fn summary(out: &Output, last: &Application) {
     let running = last.result.components.values().filter(|c| c.state == crate::model::RunState::Running).count();
     out.line(format!(
         "then: {}, {running} of them running, {}, {}",

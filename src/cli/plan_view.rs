@@ -1,8 +1,8 @@
 //! Plans as other programs see them.
 
-use super::plan::Planned;
+use crate::app::Application;
 use crate::model::{Ask, Snapshot};
-use crate::plan::{PlannedStep, Stage};
+use crate::plan::{PlanStage, PlannedStep};
 use crate::system::{Reversibility, Undo};
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
@@ -25,7 +25,7 @@ pub struct PlanView<'a> {
 
 impl<'a> PlanView<'a> {
     /// The view of one application.
-    pub fn new(planned: &'a Planned) -> Self {
+    pub fn new(planned: &'a Application) -> Self {
         // The configuration that is applied, else the one that is undone.
         let applied = planned.asks.iter().find_map(|ask| match ask {
             Ask::Apply(id) => Some(id.to_string()),
@@ -63,7 +63,7 @@ pub struct SystemSteps<'a> {
 }
 
 /// One step of the list.
-pub struct Shown {
+pub struct ShownStep {
     /// Its place in the list.
     pub index: usize,
     /// The stage it belongs to.
@@ -81,9 +81,9 @@ impl<'a> SystemSteps<'a> {
 }
 
 impl Iterator for SystemSteps<'_> {
-    type Item = Shown;
+    type Item = ShownStep;
 
-    fn next(&mut self) -> Option<Shown> {
+    fn next(&mut self) -> Option<ShownStep> {
         let index = self.next;
         let step = self.steps.get(index)?;
         self.next += 1;
@@ -101,15 +101,15 @@ impl Iterator for SystemSteps<'_> {
         }
         let stage = match step.stage {
             _ if !self.monotonic => "changes",
-            Stage::Pre => "pre",
-            Stage::Changes => "changes",
-            Stage::Post => "post",
+            PlanStage::Pre => "pre",
+            PlanStage::Changes => "changes",
+            PlanStage::Post => "post",
         };
-        Some(Shown { index, stage, after })
+        Some(ShownStep { index, stage, after })
     }
 }
 
-impl Shown {
+impl ShownStep {
     fn view(&self, steps: &[PlannedStep]) -> Map<String, Json> {
         let step = &steps[self.index];
         let mut view = match json!(step.step) {

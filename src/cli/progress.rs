@@ -8,7 +8,7 @@ use super::log::duration;
 use super::output::{Output, Style};
 use crate::limits;
 use crate::model::finding::count;
-use crate::session::log::Entry;
+use crate::session::log::LogEntry;
 use crate::session::tap::{Hears, News, Tap};
 use crate::session::{Happening, Phase};
 use crate::time::Clock;
@@ -20,16 +20,16 @@ use std::sync::Arc;
 
 /// How a deployment's story is told. Clones tell the same one.
 #[derive(Clone)]
-pub struct Progress {
-    tap: Tap<Told>,
+pub struct ProgressView {
+    tap: Tap<ToldLine>,
     json: bool,
     simulated: bool,
 }
 
 /// What is told.
-enum Told {
+enum ToldLine {
     /// Something happened.
-    Entry(Arc<Entry>),
+    Entry(Arc<LogEntry>),
     /// A line of the command's own.
     Line(String),
     /// The same for programs.
@@ -40,13 +40,13 @@ enum Told {
     UpInBackground,
 }
 
-impl From<Arc<Entry>> for Told {
-    fn from(entry: Arc<Entry>) -> Self {
+impl From<Arc<LogEntry>> for ToldLine {
+    fn from(entry: Arc<LogEntry>) -> Self {
         Self::Entry(entry)
     }
 }
 
-impl Progress {
+impl ProgressView {
     /// Tells it on stdout: as one JSON object a line if `json`, else as text. Of a deployment on `clock`.
     ///
     /// # Errors
@@ -65,39 +65,39 @@ impl Progress {
     /// A line of the command's own, for people. Never waits.
     pub fn line(&self, line: impl std::fmt::Display) {
         if !self.json {
-            self.tap.put_own(Told::Line(line.to_string()));
+            self.tap.put_own(ToldLine::Line(line.to_string()));
         }
     }
 
     /// A line of a script. In simulated time the script waits for the reader.
     pub fn say(&self, line: impl std::fmt::Display) {
         if !self.json {
-            self.tap.put(Told::Line(line.to_string()));
+            self.tap.put(ToldLine::Line(line.to_string()));
             self.tap.keep_pace();
         }
     }
 
     /// The same for programs.
     pub fn say_json(&self, object: &serde_json::Value) {
-        self.tap.put(Told::Json(object.to_string()));
+        self.tap.put(ToldLine::Json(object.to_string()));
         self.tap.keep_pace();
     }
 
     /// What the command itself has to say, for programs. Never waits.
     pub fn json_line(&self, object: &serde_json::Value) {
         if self.json {
-            self.tap.put_own(Told::Json(object.to_string()));
+            self.tap.put_own(ToldLine::Json(object.to_string()));
         }
     }
 
-    /// From now on nothing is told but by [`Progress::line`], [`Progress::json_line`] and what happens.
+    /// From now on nothing is told but by [`ProgressView::line`], [`ProgressView::json_line`] and what happens.
     pub fn finish(&self) {
-        self.tap.put_own(Told::Finish);
+        self.tap.put_own(ToldLine::Finish);
     }
 
     /// It is up, and from now on nothing is told at all.
     pub fn up_in_background(&self) {
-        self.tap.put_own(Told::UpInBackground);
+        self.tap.put_own(ToldLine::UpInBackground);
     }
 
     /// The end: waits until all is written, as long as somebody reads. Answers how many lines were not.
@@ -139,19 +139,19 @@ impl Screen {
         self.bar.suspend(|| out.line(line));
     }
 
-    fn show(&mut self, news: News<Told>) {
+    fn show(&mut self, news: News<ToldLine>) {
         if self.quiet {
             return;
         }
         match news {
-            News::One(Told::Entry(entry)) => {
+            News::One(ToldLine::Entry(entry)) => {
                 self.at = entry.at;
                 self.tell(&entry);
             }
-            News::One(Told::Line(line)) => self.line(line),
-            News::One(Told::Json(line)) => self.out.line(line),
-            News::One(Told::Finish) => self.bar.finish_and_clear(),
-            News::One(Told::UpInBackground) => {
+            News::One(ToldLine::Line(line)) => self.line(line),
+            News::One(ToldLine::Json(line)) => self.out.line(line),
+            News::One(ToldLine::Finish) => self.bar.finish_and_clear(),
+            News::One(ToldLine::UpInBackground) => {
                 self.bar.finish_and_clear();
                 self.quiet = true;
                 detach::tell_up(self.out);
@@ -167,7 +167,7 @@ impl Screen {
         }
     }
 
-    fn tell(&mut self, entry: &Entry) {
+    fn tell(&mut self, entry: &LogEntry) {
         if self.json {
             self.out.json_line(entry);
             return;

@@ -34,7 +34,7 @@ pub fn deployment_name(text: &str) -> Result<String, String> {
 
 /// How long to wait for an answer.
 #[derive(Debug, clap::Args)]
-pub struct Wait {
+pub struct WaitFor {
     /// Do not wait for the answer: exit with 0 once it is asked for.
     #[arg(long)]
     pub no_wait: bool,

@@ -15,7 +15,7 @@ pub fn script(file: &Path, finding: &Finding, trace: &[TraceStep]) -> Result<Str
     if trace.is_empty() {
         return Err(why_no_way(finding.code).to_owned());
     }
-    let mut out = Lines { text: String::new(), now: Duration::ZERO, within: "" };
+    let mut out = ScriptLines { text: String::new(), now: Duration::ZERO, within: "" };
     _ = writeln!(out.text, "-- {}: {}", finding.code, finding.message.replace('\n', " "));
     _ = writeln!(out.text, "-- Run it with `davit run FILE --clock simulated --platform simulated`.");
     _ = writeln!(out.text, "deploy({}, {{ replay = true }})", quoted(&file.display().to_string()));
@@ -117,13 +117,13 @@ impl Alone<'_> {
 /// What is armed for a move is so long before it.
 const HALF: Duration = Duration::from_micros(limits::REPLAY_STEP.as_micros() as u64 / 2);
 
-struct Lines {
+struct ScriptLines {
     text: String,
     now: Duration,
     within: &'static str,
 }
 
-impl Lines {
+impl ScriptLines {
     fn line(&mut self, line: impl std::fmt::Display) {
         _ = writeln!(self.text, "{}{line}", self.within);
     }

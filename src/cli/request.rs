@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::log::duration;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, Wait, Which, ask, seconds};
+use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::status::text;
 use super::{Answer, Context, Failure, Run};
 use crate::configurator::WAY_OUT;
@@ -40,7 +40,7 @@ impl Run for EventArgs {
             "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
         });
         let answer = ask(self.which.name.as_deref(), "event", &params, Patience::within(self.within).left())
-            .map_err(|failure| failure.as_json(self.json))?;
+            .map_err(|failure| failure.in_json(self.json))?;
         let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
         let good = heard == self.wait_for.as_deref();
         // Nobody leads any more: a safety event acts by itself.
@@ -98,7 +98,7 @@ pub struct ApplyArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -130,7 +130,7 @@ pub struct UndoArgs {
     #[command(flatten)]
     which: Which,
     #[command(flatten)]
-    wait: Wait,
+    wait: WaitFor,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -164,7 +164,7 @@ pub struct CommitArgs {
 
 impl Run for CommitArgs {
     fn run(self, context: &Context) -> Answer {
-        let wait = Wait { no_wait: false, wait: true, within: self.within };
+        let wait = WaitFor { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
         let patience = Patience::within(wait.within);
         request(context, "commit", params, &Which { name: self.name }, &wait, &patience, self.json)
@@ -177,7 +177,7 @@ pub(super) fn request(
     method: &str,
     mut params: Json,
     which: &Which,
-    wait: &Wait,
+    wait: &WaitFor,
     patience: &Patience,
     json: bool,
 ) -> Result<Exit, Failure> {
@@ -186,7 +186,7 @@ pub(super) fn request(
     params["within_s"] = json!(wait.within);
     let out = &context.out;
     let asked = ask(which.name.as_deref(), method, &params, patience.left());
-    let answer = asked.map_err(|failure| failure.as_json(json))?;
+    let answer = asked.map_err(|failure| failure.in_json(json))?;
     let verdict = text(&answer["answer"]);
     if json {
         out.json(&answer);

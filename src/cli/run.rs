@@ -5,8 +5,8 @@ use super::exit::Exit;
 use super::input::Parameters;
 use super::last_words;
 use super::output::Style;
-use super::progress::Progress;
-use super::signals::{self, Watch};
+use super::progress::ProgressView;
+use super::signals::{self, SignalWatch};
 use super::{Answer, Context, Failure, Run};
 use crate::app::Extensions;
 use crate::app::script::{self, Door, Interrupt, Options, ScriptFailure};
@@ -50,7 +50,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.story(context).map_err(|failure| failure.as_json(json))
+        self.story(context).map_err(|failure| failure.in_json(json))
     }
 }
 
@@ -58,7 +58,7 @@ impl Args {
     fn story(self, context: &Context) -> Answer {
         let platform = self.platform.as_deref().map(|name| known(name, &context.extensions)).transpose()?;
         let clock = self.clock.make(0.0);
-        let progress = Progress::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
+        let progress = ProgressView::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
         let say = {
             let progress = progress.clone();
             let (out, clock, json) = (context.out, clock.clone(), self.json);
@@ -74,7 +74,7 @@ impl Args {
                 interrupt.stop(force);
                 stopped.line(signals::told(force));
             };
-            Watch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
+            SignalWatch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
         };
         let end = script::run(
             &self.script,

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Which file.
-    #[arg(value_enum, default_value_t = Of::Deployment, value_name = "KIND")]
-    of: Of,
+    #[arg(value_enum, default_value_t = SchemaOf::Deployment, value_name = "KIND")]
+    of: SchemaOf,
     /// Write the page of the reference (Markdown) instead of the schema; of `lua`, the pages of all that Lua is written in.
     #[arg(long)]
     markdown: bool,
@@ -27,7 +27,7 @@ pub struct Args {
 
 /// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Of {
+enum SchemaOf {
     /// A deployment.
     Deployment,
     /// Configurations, in YAML.
@@ -40,7 +40,7 @@ enum Of {
     Lua,
 }
 
-impl Of {
+impl SchemaOf {
     fn name(self) -> &'static str {
         match self {
             Self::Deployment => "deployment",

@@ -36,7 +36,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.show(context).map_err(|failure| failure.as_json(json))
+        self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 

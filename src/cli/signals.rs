@@ -9,7 +9,7 @@ use signal_hook::iterator::{Handle, Signals};
 use std::thread::JoinHandle;
 
 /// Watches for signals until dropped.
-pub struct Watch {
+pub struct SignalWatch {
     handle: Handle,
     thread: Option<JoinHandle<()>>,
 }
@@ -28,14 +28,14 @@ enum Asks {
 
 /// The signals so far.
 #[derive(Debug, Default)]
-struct Seen {
+struct SignalSeen {
     count: u8,
     /// When one counted last, and when any came.
     counted: Option<Time>,
     last: Option<Time>,
 }
 
-impl Seen {
+impl SignalSeen {
     /// Each signal asks for more. But one cause may bring several: a shell tells its jobs that the terminal is gone, and then the
     /// kernel does; `timeout`, or who passes Ctrl-C on, tells a process and its group; those that come together come in any
     /// order; a key that is held down repeats. So a terminal that is gone, or a time limit, asks for no more than the first one
@@ -63,7 +63,7 @@ impl Seen {
     }
 }
 
-impl Watch {
+impl SignalWatch {
     /// At the first signal calls `stop(false)`, at the second `stop(true)`: by force. The third is for when even that does not
     /// come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is asked of the components, and
     /// what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is no signal. What whoever has
@@ -82,7 +82,7 @@ impl Watch {
         let mut signals = Signals::new(asking.chain([SIGTSTP]))?;
         let handle = signals.handle();
         let thread = std::thread::Builder::new().name("davit-signals".to_owned()).spawn(move || {
-            let (clock, mut seen) = (Clock::real(), Seen::default());
+            let (clock, mut seen) = (Clock::real(), SignalSeen::default());
             for signal in signals.forever() {
                 if signal == SIGTSTP {
                     last_words::say(|| output::error(STAYS_AWAKE));
@@ -181,7 +181,7 @@ pub fn told(force: bool) -> &'static str {
     }
 }
 
-impl Drop for Watch {
+impl Drop for SignalWatch {
     fn drop(&mut self) {
         self.handle.close();
         if let Some(thread) = self.thread.take() {

@@ -47,7 +47,7 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &self.host)
-            .map_err(|f| f.as_json(self.json))?;
+            .map_err(|f| f.in_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
         let Some(chart) = chart else {
@@ -61,7 +61,7 @@ impl Run for Args {
                     format!("{}: {error}", path.display()),
                     "each line of the file is a set of events, `run`, or `advance SECONDS`; `-` is standard input",
                 )
-                .as_json(self.json)
+                .in_json(self.json)
             })?),
             _ => Box::new(std::io::stdin()),
         };
@@ -82,7 +82,7 @@ impl Run for Args {
                         format!("the functions cannot be run: {failure}"),
                         "the text ran when it was read: does it depend on time or chance?",
                     )
-                    .as_json(self.json)
+                    .in_json(self.json)
                 })?;
                 self.lines(context, Sim::with(&chart, functions), input)
             }
@@ -105,7 +105,7 @@ impl Args {
         let out = &context.out;
         let mut exit = Exit::Done;
         // An input may have no end.
-        let mut lines = Lines { input: BufReader::new(input), left: SIM_BYTES };
+        let mut lines = SimLines { input: BufReader::new(input), left: SIM_BYTES };
         while !output::arrives_nowhere() {
             let line = match lines.next() {
                 Ok(None) => break,
@@ -116,7 +116,7 @@ impl Args {
                         format!("the events cannot be read: {error}"),
                         "each line is a set of events, `run`, or `advance SECONDS`, as UTF-8 text",
                     )
-                    .as_json(self.json));
+                    .in_json(self.json));
                 }
             };
             match sim.line(&line) {
@@ -141,12 +141,12 @@ impl Args {
 }
 
 /// Lines of a text that may have no end.
-struct Lines {
+struct SimLines {
     input: BufReader<Box<dyn Read>>,
     left: u64,
 }
 
-impl Lines {
+impl SimLines {
     fn next(&mut self) -> io::Result<Option<String>> {
         let mut line = Vec::new();
         let read = (&mut self.input).take(SIM_LINE as u64 + 1).read_until(b'\n', &mut line)?;

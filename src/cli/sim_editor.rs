@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::sim_session::Session;
+use super::sim_session::SimSession;
 use super::{Answer, Context, Failure};
 use crate::model::codes::CLI_EVENTS_UNREADABLE;
 use crate::statechart::{Hook, Sim};
@@ -14,9 +14,9 @@ use std::rc::Rc;
 
 /// Completes words as the session knows them.
 #[derive(Helper, Highlighter, Hinter, Validator)]
-struct Words<C: Fn(&str) -> (usize, Vec<String>)>(C);
+struct SimWords<C: Fn(&str) -> (usize, Vec<String>)>(C);
 
-impl<C: Fn(&str) -> (usize, Vec<String>)> Completer for Words<C> {
+impl<C: Fn(&str) -> (usize, Vec<String>)> Completer for SimWords<C> {
     type Candidate = String;
 
     fn complete(&self, line: &str, at: usize, _: &rustyline::Context<'_>) -> rustyline::Result<(usize, Vec<String>)> {
@@ -34,12 +34,12 @@ pub fn edit<'c, F: Hook>(context: &Context, make: impl Fn() -> Result<Sim<'c, F>
         Failure::usage(CLI_EVENTS_UNREADABLE, format!("the terminal cannot be read: {error}"), help)
     };
     super::signals::give_terminal_back().map_err(|why| unreadable(&why))?;
-    let session = Session::new(make).map_err(|why| unreadable(&why))?;
+    let session = SimSession::new(make).map_err(|why| unreadable(&why))?;
     let session = Rc::new(RefCell::new(session));
     let config = Config::builder().max_history_size(crate::limits::SIM_LINES).map_err(|e| unreadable(&e))?.build();
     let mut editor = Editor::with_config(config).map_err(|e| unreadable(&e))?;
     let known = session.clone();
-    editor.set_helper(Some(Words(move |line: &str| known.borrow().complete(line))));
+    editor.set_helper(Some(SimWords(move |line: &str| known.borrow().complete(line))));
     let out = &context.out;
     out.line("a line is a set of events; Tab completes; `help` lists the commands; Ctrl-D ends");
     loop {

@@ -24,7 +24,7 @@ quit             leave (or Ctrl-D)
 
 /// What a line came to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Reply {
+pub struct SimReply {
     /// What is to be shown, with a line break at its end unless it is empty.
     pub text: String,
     /// It was the last line.
@@ -32,7 +32,7 @@ pub struct Reply {
 }
 
 /// A run that can be taken back.
-pub struct Session<'c, F, M> {
+pub struct SimSession<'c, F, M> {
     sim: Sim<'c, F>,
     /// A machine at its beginning.
     make: M,
@@ -40,7 +40,7 @@ pub struct Session<'c, F, M> {
     typed: Vec<String>,
 }
 
-impl<'c, F: Hook, M: Fn() -> Result<Sim<'c, F>, String>> Session<'c, F, M> {
+impl<'c, F: Hook, M: Fn() -> Result<Sim<'c, F>, String>> SimSession<'c, F, M> {
     /// A run at its beginning.
     ///
     /// # Errors
@@ -50,11 +50,11 @@ impl<'c, F: Hook, M: Fn() -> Result<Sim<'c, F>, String>> Session<'c, F, M> {
     }
 
     /// Does what a line says.
-    pub fn line(&mut self, line: &str) -> Reply {
+    pub fn line(&mut self, line: &str) -> SimReply {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let say = |text: String| Reply { text, quit: false };
+        let say = |text: String| SimReply { text, quit: false };
         match words[..] {
-            ["quit" | "exit"] => Reply { text: String::new(), quit: true },
+            ["quit" | "exit"] => SimReply { text: String::new(), quit: true },
             ["help" | "?"] => say(HELP.to_owned()),
             ["history"] => {
                 let mut text = String::new();
@@ -196,7 +196,7 @@ mod tests {
     fn lines_are_done_shown_and_taken_back() {
         let chart = lamp();
         let make = || Ok::<Sim<'_, Nobody>, String>(Sim::new(&chart));
-        let mut session = Session::new(make).unwrap();
+        let mut session = SimSession::new(make).unwrap();
         assert_eq!(session.state(), "not entered  at 0 s\nqueue: e_init_fsm\n");
         assert!(session.line("run").text.contains("= root.off"));
         assert_eq!(session.enabled(), ["e_switch"]);
@@ -221,7 +221,7 @@ mod tests {
     fn words_are_completed() {
         let chart = lamp();
         let make = || Ok::<Sim<'_, Nobody>, String>(Sim::new(&chart));
-        let mut session = Session::new(make).unwrap();
+        let mut session = SimSession::new(make).unwrap();
         session.line("run");
         assert_eq!(session.complete("e_s"), (0, vec!["e_switch".to_owned()]));
         assert_eq!(session.complete("e_switch e_a"), (9, vec!["e_after(2)@root.on".to_owned()]));

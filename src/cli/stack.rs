@@ -22,7 +22,7 @@ impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let out = &context.out;
         let stack =
-            ask(self.name.as_deref(), "stack", &json!({}), ASK).map_err(|failure| failure.as_json(self.json))?;
+            ask(self.name.as_deref(), "stack", &json!({}), ASK).map_err(|failure| failure.in_json(self.json))?;
         if self.json {
             out.json(&stack);
             return Ok(Exit::Done);

@@ -32,13 +32,13 @@ pub struct Args {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let out = &context.out;
-        let refused = |error| Err(failure(error).as_json(self.json));
+        let refused = |error| Err(failure(error).in_json(self.json));
         match &self.names[..] {
             [] => match look(None) {
-                Ok(Seen::Runs(status)) => {
+                Ok(SeenStatus::Runs(status)) => {
                     // Who runs has died before, if ever.
                     let own = status["name"].as_str().unwrap_or_default().to_owned();
-                    let mut exit = show(out, &[Seen::Runs(status)], self.json);
+                    let mut exit = show(out, &[SeenStatus::Runs(status)], self.json);
                     for died in kept::died().iter().filter(|died| died.name() != own) {
                         out.error(format!("note: {}\n", died.sentence()));
                         exit = Exit::worst([exit, kept::EXIT]);
@@ -55,9 +55,10 @@ impl Run for Args {
             },
             [name] => look(Some(name)).map_or_else(refused, |seen| Ok(show(out, &[seen], self.json))),
             names => {
-                let seen =
-                    |name: &String| look(Some(name)).unwrap_or_else(|error| Seen::Not(name.clone(), failure(error)));
-                let seen: Vec<Seen> = names.iter().map(seen).collect();
+                let seen = |name: &String| {
+                    look(Some(name)).unwrap_or_else(|error| SeenStatus::Not(name.clone(), failure(error)))
+                };
+                let seen: Vec<SeenStatus> = names.iter().map(seen).collect();
                 Ok(show(out, &seen, self.json))
             }
         }
@@ -65,14 +66,14 @@ impl Run for Args {
 }
 
 /// What is seen of a deployment.
-enum Seen {
+enum SeenStatus {
     Runs(Json),
     Died(Box<Died>),
     /// It is not seen, and why; one of several.
     Not(String, Failure),
 }
 
-impl Seen {
+impl SeenStatus {
     fn json(&self) -> Json {
         match self {
             Self::Runs(status) => status.clone(),
@@ -101,22 +102,22 @@ impl Seen {
     }
 }
 
-fn look(name: Option<&str>) -> Result<Seen, ClientError> {
+fn look(name: Option<&str>) -> Result<SeenStatus, ClientError> {
     let asked = Client::connect(name).and_then(|mut client| client.call("status", &json!({}), ASK));
-    asked.map(Seen::Runs).or_else(|error| {
+    asked.map(SeenStatus::Runs).or_else(|error| {
         let died = match error {
             ClientError::None => kept::died().into_iter().max_by(|a, b| a.seen().0.total_cmp(&b.seen().0)),
             _ => kept::meant(&error).filter(Life::is_open).map(Died::of),
         };
-        died.map(|died| Seen::Died(Box::new(died))).ok_or(error)
+        died.map(|died| SeenStatus::Died(Box::new(died))).ok_or(error)
     })
 }
 
 /// One as it is, several below each other or as an array.
-fn show(out: &Output, seen: &[Seen], json: bool) -> Exit {
+fn show(out: &Output, seen: &[SeenStatus], json: bool) -> Exit {
     match seen {
         [only] if json => out.json(&only.json()),
-        all if json => out.json(&all.iter().map(Seen::json).collect::<Vec<_>>()),
+        all if json => out.json(&all.iter().map(SeenStatus::json).collect::<Vec<_>>()),
         all => {
             for (i, seen) in all.iter().enumerate() {
                 if i > 0 {
@@ -126,7 +127,7 @@ fn show(out: &Output, seen: &[Seen], json: bool) -> Exit {
             }
         }
     }
-    Exit::worst(seen.iter().map(Seen::exit))
+    Exit::worst(seen.iter().map(SeenStatus::exit))
 }
 
 /// The style of a phase or a run state.

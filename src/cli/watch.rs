@@ -55,7 +55,7 @@ fn pause(text: &str) -> Result<f64, String> {
 impl Run for Args {
     fn run(self, context: &Context) -> Answer {
         let json = self.json;
-        self.show(context).map_err(|failure| failure.as_json(json))
+        self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
@@ -65,7 +65,7 @@ impl Args {
         let client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
         let mut looking = Looks { client, asked: None, anew: false };
-        let screen = (!self.json && output::is_terminal()).then(Screen::new);
+        let screen = (!self.json && output::is_terminal()).then(WatchScreen::new);
         let clock = Clock::real();
         let (mut looks, mut page, mut heard) = (0, String::new(), clock.now());
         loop {
@@ -162,9 +162,9 @@ impl Looks {
 }
 
 /// What is drawn anew.
-struct Screen(ProgressBar);
+struct WatchScreen(ProgressBar);
 
-impl Screen {
+impl WatchScreen {
     fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());
         bar.set_style(ProgressStyle::with_template("{msg}").expect("a valid template"));
@@ -176,7 +176,7 @@ impl Screen {
     }
 }
 
-impl Drop for Screen {
+impl Drop for WatchScreen {
     /// What was seen last stays.
     fn drop(&mut self) {
         self.0.abandon();

@@ -2,8 +2,8 @@
 
 use super::engine::Engine;
 use super::hands::Hands;
-use super::inbox::Reply;
-use super::pool::{Call, Whose};
+use super::inbox::PoolReply;
+use super::pool::{CallFor, PlatformCall};
 use super::progress::{Progress, StepEnd, StepName};
 use super::running::{Flight, Purpose, Running};
 use crate::limits;
@@ -71,7 +71,8 @@ impl Engine {
                 Poll::Read(components) => {
                     did = true;
                     let deadline = self.given.clock.now() + self.given.limits.step_timeout;
-                    let ticket = self.call(Call::ObserveSome(components), deadline, self.whose(running, Whose::Look));
+                    let ticket =
+                        self.call(PlatformCall::ObserveSome(components), deadline, self.whose(running, CallFor::Look));
                     running.read = Some((ticket, deadline + limits::PLATFORM_GRACE));
                 }
                 Poll::Ask(question) => {
@@ -131,14 +132,14 @@ impl Engine {
     }
 
     /// Whose calls a transaction makes.
-    fn whose(&self, running: &Running, plain: Whose) -> Whose {
-        if running.is_safe() || self.taking_down { Whose::Safe } else { plain }
+    fn whose(&self, running: &Running, plain: CallFor) -> CallFor {
+        if running.is_safe() || self.taking_down { CallFor::Safe } else { plain }
     }
 
     /// Whether a call that takes time may begin: one worker stays free for each of the others that has none. What is safe waits
     /// for none of the others.
     fn has_room(&self, running: &Running) -> bool {
-        if self.whose(running, Whose::Plain) == Whose::Safe {
+        if self.whose(running, CallFor::Plain) == CallFor::Safe {
             return self.pool.has_room_for_safe(running.flights.len());
         }
         let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
@@ -152,7 +153,10 @@ impl Engine {
         let step = |i: &u32| &running.machine.step(*i).step;
         steps.iter().for_each(|i| self.tell_started(step(i)));
         let (call, deadline) = match *steps {
-            [i] => (Call::Execute(step(&i).clone(), running.enters_quarantine), running.machine.deadline(i, started)),
+            [i] => (
+                PlatformCall::Execute(step(&i).clone(), running.enters_quarantine),
+                running.machine.deadline(i, started),
+            ),
             _ => {
                 let several = steps.iter().map(|i| step(i).clone()).collect();
                 let all = || steps.iter().map(|i| running.machine.limit_of(*i));
@@ -160,10 +164,10 @@ impl Engine {
                 let latest = all().map(|limit| limit.until).max().unwrap_or(Time::NEVER);
                 // The last of them begins within the turn.
                 let until = (started + patience + limits::BRIEF_TURN).min(latest);
-                (Call::Several(several, patience, stop.clone()), until)
+                (PlatformCall::Several(several, patience, stop.clone()), until)
             }
         };
-        let ticket = self.call(call, deadline, self.whose(running, Whose::Plain));
+        let ticket = self.call(call, deadline, self.whose(running, CallFor::Plain));
         running.flights.push(Flight { ticket, steps, started, deadline, stop });
     }
 
@@ -183,7 +187,7 @@ impl Engine {
         let now = self.given.clock.now();
         if let Some((ticket, until)) = running.read {
             let seen: Option<Option<Snapshot>> = match self.pool.take(ticket) {
-                Some(Reply::Observed(Ok(seen))) => Some(Some(seen)),
+                Some(PoolReply::Observed(Ok(seen))) => Some(Some(seen)),
                 Some(_) => Some(None),
                 None if now >= until => {
                     self.pool.give_up(ticket);
@@ -204,8 +208,8 @@ impl Engine {
             let flight = &running.flights[at];
             let several = flight.steps.len();
             let ended: SmallVec<[Ended; 1]> = match self.pool.take(flight.ticket) {
-                Some(Reply::Executed(outcome)) => smallvec![Ended { outcome, took: None }],
-                Some(Reply::Several(ended)) => SmallVec::from_vec(ended),
+                Some(PoolReply::Executed(outcome)) => smallvec![Ended { outcome, took: None }],
+                Some(PoolReply::Several(ended)) => SmallVec::from_vec(ended),
                 Some(_) => smallvec![unknown(Cause::Lost("the answer was to another question".to_owned())); several],
                 None if now >= flight.deadline + limits::PLATFORM_GRACE => {
                     self.pool.give_up(flight.ticket);

@@ -32,7 +32,7 @@ pub trait Conditions: Send + Sync {
 }
 
 /// How a configuration in force is watched.
-pub(super) enum Watch {
+pub(super) enum HoldsWatch {
     /// By the condition of that number. With a time: it was taken up anew and may become true until then.
     On(u64, Option<Time>),
     /// Something is under way that may rightly make it false.
@@ -43,7 +43,7 @@ pub(super) enum Watch {
 
 /// A configuration in force that stands for something, or of which something was lost.
 pub(super) struct Standing {
-    pub watch: Watch,
+    pub watch: HoldsWatch,
     /// Components that its condition looks at and that were running when it was applied.
     pub runs: Vec<ComponentName>,
     pub lost: bool,

@@ -32,7 +32,7 @@ pub struct FrameView {
 
 /// How things stand, at one moment.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct ConfiguratorView {
     /// The system as the configurator knows it, if it was asked for.
     pub system: Option<Arc<Snapshot>>,
     /// Frames in force, newest last.
@@ -77,7 +77,7 @@ impl Moment {
 
 /// What was in force when stopping began.
 #[derive(Debug, Clone)]
-pub(super) struct Began {
+pub(super) struct StoppingBegan {
     /// When that was.
     pub since: Moment,
     /// The number of the next frame when its coordinators were left out.
@@ -156,16 +156,16 @@ pub enum Recovery {
 }
 
 /// What somebody tells it, with where its answer goes.
-pub(super) enum Command {
-    AtOnce(AtOnce),
+pub(super) enum ControlCommand {
+    AtOnce(UrgentCommand),
     InTurn(InTurn),
 }
 
 /// Done where it is taken in.
-pub(super) enum AtOnce {
+pub(super) enum UrgentCommand {
     View {
         system: bool,
-        reply: Sender<Arc<View>>,
+        reply: Sender<Arc<ConfiguratorView>>,
     },
     /// A configuration that an operator makes up, in the place of the one of that name; `listed`: it may be applied without force.
     Define {
@@ -191,19 +191,19 @@ pub(super) enum InTurn {
     Stop,
 }
 
-impl From<AtOnce> for Command {
-    fn from(command: AtOnce) -> Self {
+impl From<UrgentCommand> for ControlCommand {
+    fn from(command: UrgentCommand) -> Self {
         Self::AtOnce(command)
     }
 }
 
-impl From<InTurn> for Command {
+impl From<InTurn> for ControlCommand {
     fn from(command: InTurn) -> Self {
         Self::InTurn(command)
     }
 }
 
-impl AtOnce {
+impl UrgentCommand {
     /// Whether somebody only wants to know something, or to change what can be asked for again: there may be many of these.
     pub fn only_asks(&self) -> bool {
         matches!(self, Self::View { .. } | Self::Define { .. })
@@ -211,7 +211,7 @@ impl AtOnce {
 }
 
 impl InTurn {
-    /// As [`AtOnce::only_asks`].
+    /// As [`UrgentCommand::only_asks`].
     pub fn only_asks(&self) -> bool {
         matches!(self, Self::Drift { .. } | Self::Recover { .. })
     }

@@ -3,7 +3,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{AtOnce, Began, Command, InTurn, Moment, View};
+use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, UrgentCommand};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -91,7 +91,7 @@ pub(super) struct Engine {
     /// Everything is being taken down.
     pub taking_down: bool,
     /// When stopping began, and what was in force then.
-    pub began: Option<Began>,
+    pub began: Option<StoppingBegan>,
     /// When the event that ends the deployment came, and it is not down since.
     pub leaving: Option<Moment>,
     /// What takes its time has been broken off, since force is wanted.
@@ -256,30 +256,30 @@ impl Engine {
                 self.counts.report_taken();
                 self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());
             }
-            Mail::Command(Command::AtOnce(command)) => {
+            Mail::Command(ControlCommand::AtOnce(command)) => {
                 self.counts.command_taken(command.only_asks());
                 self.at_once(command);
             }
             // What waits for its turn keeps its place until then.
-            Mail::Command(Command::InTurn(command)) => self.commands.push_back(command),
+            Mail::Command(ControlCommand::InTurn(command)) => self.commands.push_back(command),
         }
     }
 
-    fn at_once(&mut self, command: AtOnce) {
+    fn at_once(&mut self, command: UrgentCommand) {
         match command {
             // How things stand can be told at any time.
-            AtOnce::View { system, reply } => {
+            UrgentCommand::View { system, reply } => {
                 let _ = reply.try_send(self.view(system));
             }
-            AtOnce::Define { configuration, listed, reply } => {
+            UrgentCommand::Define { configuration, listed, reply } => {
                 self.given.define(*configuration, listed, &mut self.switches);
                 let _ = reply.try_send(());
             }
-            AtOnce::Stopping => self.stopping_begins(),
+            UrgentCommand::Stopping => self.stopping_begins(),
             // To have it come is all: who waits looks whether force is wanted.
-            AtOnce::Hurry => {}
+            UrgentCommand::Hurry => {}
             // Stands in its coordinator's queue like a request.
-            AtOnce::Down(requester) => {
+            UrgentCommand::Down(requester) => {
                 let request = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) };
                 let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
             }
@@ -415,7 +415,7 @@ impl Engine {
         (self.given.answers)(answer);
     }
 
-    pub fn view(&mut self, system: bool) -> Arc<View> {
+    pub fn view(&mut self, system: bool) -> Arc<ConfiguratorView> {
         let stack = self.frame_views();
         let system = system.then(|| match &self.snapshot {
             Some((of, snapshot)) if *of == (self.revision, self.world.system.revision()) => snapshot.clone(),
@@ -425,7 +425,7 @@ impl Engine {
                 snapshot
             }
         });
-        Arc::new(View {
+        Arc::new(ConfiguratorView {
             system,
             stack,
             broken: self.broken_longest(),

@@ -1,12 +1,12 @@
 //! Starting a configurator, and what others hold of it while its thread runs.
 
 use super::conditions::Conditions;
-use super::control::{AtOnce, Command, Drift, InTurn, Recovery, TakenDown, View};
+use super::control::{ConfiguratorView, ControlCommand, Drift, InTurn, Recovery, TakenDown, UrgentCommand};
 use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
 use super::progress::{AnswerSink, ProgressSink};
-use super::request::{Answer, Batch, Full, Reason, Request, Residual};
+use super::request::{Answer, Batch, QueueFull, Reason, Request, Residual};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
 use crate::plan::Context;
@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What a configurator is started with.
-pub struct Setup {
+pub struct ConfiguratorSetup {
     /// The configurations that may be asked for.
     pub configurations: Vec<Configuration>,
     /// Those of them that bring the system to rest when it is taken down by force, in this order.
@@ -57,7 +57,7 @@ pub struct Configurator;
 
 impl Configurator {
     /// Starts a configurator on a thread of its own, for a platform on which nothing of the deployment is yet.
-    pub fn start(setup: Setup) -> ConfiguratorHandle {
+    pub fn start(setup: ConfiguratorSetup) -> ConfiguratorHandle {
         let (post, inbox) = inbox::new(&setup.clock);
         let safe_in_order = setup.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
         let configurations: FxHashMap<ConfigId, Configuration> =
@@ -94,8 +94,14 @@ impl Configurator {
             World::new(System::new(Arc::new(setup.catalogue)), stack),
         );
         let thread = setup.clock.spawn("configurator", move || engine.live());
-        let inner =
-            Inner { post, clock: setup.clock, safe, awaited, answers: setup.answers, thread: Mutex::new(Some(thread)) };
+        let inner = HandleInner {
+            post,
+            clock: setup.clock,
+            safe,
+            awaited,
+            answers: setup.answers,
+            thread: Mutex::new(Some(thread)),
+        };
         ConfiguratorHandle { inner: Arc::new(inner) }
     }
 }
@@ -103,10 +109,10 @@ impl Configurator {
 /// A running configurator. Cheap to clone; when the last clone is dropped it ends.
 #[derive(Clone)]
 pub struct ConfiguratorHandle {
-    inner: Arc<Inner>,
+    inner: Arc<HandleInner>,
 }
 
-struct Inner {
+struct HandleInner {
     post: Post,
     clock: Clock,
     safe: FxHashSet<ConfigId>,
@@ -115,7 +121,7 @@ struct Inner {
     thread: Mutex<Option<Join>>,
 }
 
-impl Drop for Inner {
+impl Drop for HandleInner {
     fn drop(&mut self) {
         self.post.command(InTurn::Stop);
     }
@@ -125,9 +131,9 @@ impl ConfiguratorHandle {
     /// Submits requests; never blocks.
     ///
     /// # Errors
-    /// [`Full`] when the queue is full or the configurator has ended; each request that found no room has then been answered
+    /// `QueueFull` when the queue is full or the configurator has ended; each request that found no room has then been answered
     /// *failed*. What is safe has room of its own, also in a batch whose other requests find none.
-    pub fn submit(&self, batch: Batch) -> Result<(), Full> {
+    pub fn submit(&self, batch: Batch) -> Result<(), QueueFull> {
         if batch.requests.is_empty() {
             return Ok(());
         }
@@ -147,7 +153,7 @@ impl ConfiguratorHandle {
             let reason = Some(Arc::new(Reason::Full));
             (self.inner.answers)(Answer { request, verdict, at, took: Duration::ZERO, reason });
         }
-        Err(Full)
+        Err(QueueFull)
     }
 
     /// Tells what the platform reported; never blocks. Faults and late returns change the picture of the system, a raised
@@ -173,8 +179,8 @@ impl ConfiguratorHandle {
     }
 
     /// How things stand, with the system if it is wanted. None: the configurator did not answer by `deadline`.
-    pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<View>> {
-        self.ask(deadline, |reply| AtOnce::View { system, reply })
+    pub fn view(&self, system: bool, deadline: Time) -> Option<Arc<ConfiguratorView>> {
+        self.ask(deadline, |reply| UrgentCommand::View { system, reply })
     }
 
     /// The difference between the picture and the platform.
@@ -191,12 +197,12 @@ impl ConfiguratorHandle {
     /// meanwhile. `listed`: it may be applied without force. Answers whether it was taken in by `deadline`.
     pub fn define(&self, configuration: Configuration, listed: bool, deadline: Time) -> bool {
         let configuration = Box::new(configuration);
-        self.ask(deadline, |reply| AtOnce::Define { configuration, listed, reply }).is_some()
+        self.ask(deadline, |reply| UrgentCommand::Define { configuration, listed, reply }).is_some()
     }
 
     /// Stopping begins: what is in force now is known apart from what comes since, and operators' requests are refused.
     pub fn stopping(&self) {
-        self.inner.post.command(AtOnce::Stopping);
+        self.inner.post.command(UrgentCommand::Stopping);
     }
 
     /// The event that ends the deployment was raised: until it is down, or (`false`) the one that begins it is raised, an undo
@@ -233,7 +239,7 @@ impl ConfiguratorHandle {
     /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
     /// are down and nothing is there any more, what was in force is forgotten.
     pub fn down(&self, coordinator: Requester) {
-        self.inner.post.command(AtOnce::Down(coordinator));
+        self.inner.post.command(UrgentCommand::Down(coordinator));
     }
 
     /// Forgets the stack: the *down* state was reached with an empty system.
@@ -249,7 +255,11 @@ impl ConfiguratorHandle {
         thread.is_none_or(|thread| thread.join(deadline).is_ok())
     }
 
-    fn ask<T, C: Into<Command>>(&self, deadline: Time, command: impl FnOnce(crate::time::Sender<T>) -> C) -> Option<T> {
+    fn ask<T, C: Into<ControlCommand>>(
+        &self,
+        deadline: Time,
+        command: impl FnOnce(crate::time::Sender<T>) -> C,
+    ) -> Option<T> {
         let (reply, answer) = self.inner.clock.channel(1);
         if !self.inner.post.command(command(reply)) {
             return None;

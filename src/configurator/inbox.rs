@@ -3,7 +3,7 @@
 //! Each kind has room of its own in it, counted here, so that no flood of one kind keeps another out: a `safe` request
 //! gets in when the queue of requests is full, and the reply of a worker always does.
 
-use super::control::{AtOnce, Command};
+use super::control::{ControlCommand, UrgentCommand};
 use super::request::{Batch, Request};
 use crate::limits;
 use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
@@ -16,10 +16,10 @@ use std::sync::{Arc, Mutex};
 
 /// A call of the platform, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct Ticket(pub u64);
+pub(super) struct PoolTicket(pub u64);
 
 /// What came of a call.
-pub(super) enum Reply {
+pub(super) enum PoolReply {
     Executed(Outcome),
     Several(Vec<Ended>),
     Observed(Result<Snapshot, ObserveError>),
@@ -31,7 +31,7 @@ pub(super) enum Mail {
     /// A request alone: nearly all are, and what every letter takes in the box is what the largest kind takes.
     Request(Request),
     Batch(Box<Batch>),
-    Reply(Ticket, Reply),
+    Reply(PoolTicket, PoolReply),
     /// A component became faulted, or came back.
     Platform(PlatformEvent),
     /// An event that some configuration waits for as its confirmation.
@@ -39,7 +39,7 @@ pub(super) enum Mail {
     /// Conditions that are evaluated for the configurator are so, or are so no more.
     Truths,
     /// To be done between requests, in the configurator's own thread.
-    Command(Command),
+    Command(ControlCommand),
 }
 
 #[derive(Default)]
@@ -165,11 +165,11 @@ impl Post {
     }
 
     /// Puts a command in; answers whether there was room.
-    pub fn command(&self, command: impl Into<Command>) -> bool {
+    pub fn command(&self, command: impl Into<ControlCommand>) -> bool {
         let command = command.into();
         let asks = match &command {
-            Command::AtOnce(command) => command.only_asks(),
-            Command::InTurn(command) => command.only_asks(),
+            ControlCommand::AtOnce(command) => command.only_asks(),
+            ControlCommand::InTurn(command) => command.only_asks(),
         };
         let (count, bound) = self.counts.room_of(asks);
         reserve(count, 1, bound) && self.sender.try_send(Mail::Command(command)).is_ok()
@@ -178,7 +178,7 @@ impl Post {
     /// Says that force is wanted. That is known also when there is no room to wake whoever waits: then there is much to take in.
     pub fn hurry(&self) {
         self.counts.hurried.store(true, Ordering::Release);
-        self.command(AtOnce::Hurry);
+        self.command(UrgentCommand::Hurry);
     }
 
     /// Says that the deployment is led down from now on, or that it is brought up. Whoever takes something up looks: it wakes
@@ -228,9 +228,9 @@ mod tests {
         let drift = || InTurn::Drift { reply: Clock::simulated().channel(1).0 };
         let asked = (0..1_000).filter(|_| post.command(drift())).count();
         assert_eq!(asked, limits::CONFIGURATOR_COMMANDS);
-        let told = (0..1_000).filter(|_| post.command(AtOnce::Stopping)).count();
+        let told = (0..1_000).filter(|_| post.command(UrgentCommand::Stopping)).count();
         assert_eq!(told, limits::CONFIGURATOR_CONTROL);
-        let Ok(Mail::Command(Command::InTurn(command))) = inbox.try_recv() else { panic!("a command") };
+        let Ok(Mail::Command(ControlCommand::InTurn(command))) = inbox.try_recv() else { panic!("a command") };
         assert!(!post.command(drift()), "it was taken in, and waits");
         post.counts.command_taken(command.only_asks());
         assert!(post.command(drift()));

@@ -1,13 +1,13 @@
 //! Where the slow look at what nothing is under way with stands (`observing`).
 
-use super::inbox::Ticket;
+use super::inbox::PoolTicket;
 use crate::limits;
 use crate::model::ComponentName;
 use crate::time::Time;
 
 /// A look at some components, as the slow one takes it.
-pub(super) struct Look {
-    pub ticket: Ticket,
+pub(super) struct SlowLook {
+    pub ticket: PoolTicket,
     /// Each with when the model had touched it last: what is done to it meanwhile makes the look stale.
     pub components: Vec<(ComponentName, Option<u64>)>,
     pub until: Time,
@@ -20,7 +20,7 @@ pub(super) struct Observing {
     pub next: Option<Time>,
     /// What is left of this round.
     pub rest: Vec<ComponentName>,
-    pub out: Option<Look>,
+    pub out: Option<SlowLook>,
     /// Something was there since the last round began: one is owed also when nothing is any more.
     pub owed: bool,
 }

@@ -2,9 +2,9 @@
 //! false *done*, a stranger's doing) is a residual like others, and who wrote it last is lost.
 
 use super::engine::Engine;
-use super::inbox::Reply;
-use super::looks::Look;
-use super::pool::{Call, Whose};
+use super::inbox::PoolReply;
+use super::looks::SlowLook;
+use super::pool::{CallFor, PlatformCall};
 use super::progress::Progress;
 use super::request::{Reason, Residual};
 use crate::limits;
@@ -22,7 +22,7 @@ impl Engine {
         let now = self.given.clock.now();
         if let Some(look) = self.observing.out.take() {
             match self.pool.take(look.ticket) {
-                Some(Reply::Observed(Ok(seen))) => {
+                Some(PoolReply::Observed(Ok(seen))) => {
                     if self.compare(&look, seen) {
                         return true;
                     }
@@ -80,8 +80,8 @@ impl Engine {
         }
         let deadline = now + self.given.limits.step_timeout;
         let names = components.iter().map(|(name, _)| *name).collect();
-        let ticket = self.call(Call::ObserveSome(names), deadline, Whose::Plain);
-        self.observing.out = Some(Look { ticket, components, until: deadline + limits::PLATFORM_GRACE });
+        let ticket = self.call(PlatformCall::ObserveSome(names), deadline, CallFor::Plain);
+        self.observing.out = Some(SlowLook { ticket, components, until: deadline + limits::PLATFORM_GRACE });
     }
 
     /// Components that something is under way with, or of which it is known that they are not as they should be.
@@ -92,7 +92,7 @@ impl Engine {
     }
 
     /// Compares what was seen with the model. True: it differs.
-    fn compare(&mut self, look: &Look, mut seen: Snapshot) -> bool {
+    fn compare(&mut self, look: &SlowLook, mut seen: Snapshot) -> bool {
         let mut busy = self.not_to_be_judged();
         for (name, generation) in &look.components {
             if self.generation(*name) != *generation {

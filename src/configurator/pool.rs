@@ -5,7 +5,7 @@
 //! by the deadline; a worker whose call is not back a while after it is given up and replaced, and its late report is
 //! told apart by its ticket. Where too many are stuck no further call is made, but for what is safe.
 
-use super::inbox::{Mail, Post, Reply, Ticket};
+use super::inbox::{Mail, PoolReply, PoolTicket, Post};
 use crate::limits;
 use crate::model::{ComponentName, Step};
 use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// What a worker is to call.
-pub(super) enum Call {
+pub(super) enum PlatformCall {
     /// One step; whether it belongs to a safe configuration.
     Execute(Step, bool),
     /// Several brief steps, each with so much time; none is begun any more once it is set.
@@ -29,7 +29,7 @@ pub(super) enum Call {
 
 /// Whose call it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Whose {
+pub(super) enum CallFor {
     /// Anybody's.
     Plain,
     /// A look that tells what a call has done: without it that is not known, and the system broken.
@@ -38,9 +38,9 @@ pub(super) enum Whose {
     Safe,
 }
 
-struct Job {
-    ticket: Ticket,
-    call: Call,
+struct PoolJob {
+    ticket: PoolTicket,
+    call: PlatformCall,
     deadline: Time,
 }
 
@@ -48,16 +48,16 @@ pub(super) struct Pool {
     clock: Clock,
     platform: Arc<dyn Platform>,
     post: Post,
-    jobs: (Sender<Job>, Receiver<Job>),
+    jobs: (Sender<PoolJob>, Receiver<PoolJob>),
     /// Workers that wait for a job or are at one, not counting those given up.
     workers: usize,
     busy: usize,
     bound: usize,
     next: u64,
     /// What came of calls that somebody waits for.
-    replies: Vec<(Ticket, Reply)>,
+    replies: Vec<(PoolTicket, PoolReply)>,
     /// Calls that nobody waits for any more.
-    given_up: FxHashSet<Ticket>,
+    given_up: FxHashSet<PoolTicket>,
     /// No call was made since too many are stuck, and nobody was told yet.
     refused: Option<String>,
     /// That was told, and none has come back since.
@@ -72,25 +72,25 @@ pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time, safe
     })
 }
 
-fn perform(platform: &dyn Platform, call: Call, deadline: Time) -> Reply {
+fn perform(platform: &dyn Platform, call: PlatformCall, deadline: Time) -> PoolReply {
     let lost = || ObserveError::Lost("the platform panicked".to_owned());
     match call {
-        Call::Execute(step, safe) => Reply::Executed(execute(platform, &step, deadline, safe)),
-        Call::Several(steps, each, stop) => {
+        PlatformCall::Execute(step, safe) => PoolReply::Executed(execute(platform, &step, deadline, safe)),
+        PlatformCall::Several(steps, each, stop) => {
             let count = steps.len();
             let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline, &stop)));
-            Reply::Several(several.unwrap_or_else(|_| {
+            PoolReply::Several(several.unwrap_or_else(|_| {
                 let outcome = Outcome::Unknown(Cause::Lost("the platform panicked".to_owned()));
                 vec![Ended { outcome, took: None }; count]
             }))
         }
-        Call::Observe => Reply::Observed(
+        PlatformCall::Observe => PoolReply::Observed(
             catch_unwind(AssertUnwindSafe(|| platform.observe(deadline))).unwrap_or_else(|_| Err(lost())),
         ),
-        Call::ObserveSome(names) => Reply::Observed(
+        PlatformCall::ObserveSome(names) => PoolReply::Observed(
             catch_unwind(AssertUnwindSafe(|| platform.observe_some(&names, deadline))).unwrap_or_else(|_| Err(lost())),
         ),
-        Call::ObserveComponent(name) => Reply::ObservedComponent(
+        PlatformCall::ObserveComponent(name) => PoolReply::ObservedComponent(
             catch_unwind(AssertUnwindSafe(|| platform.observe_component(name, deadline)))
                 .unwrap_or_else(|_| Err(lost())),
         ),
@@ -127,14 +127,14 @@ impl Pool {
     }
 
     /// Hands `call` to a worker.
-    pub fn start(&mut self, call: Call, deadline: Time, whose: Whose) -> Ticket {
+    pub fn start(&mut self, call: PlatformCall, deadline: Time, whose: CallFor) -> PoolTicket {
         self.next += 1;
-        let ticket = Ticket(self.next);
+        let ticket = PoolTicket(self.next);
         self.busy += 1;
         let more = match whose {
-            Whose::Plain => 0,
-            Whose::Look => limits::WORKERS_SAFE / 2,
-            Whose::Safe => limits::WORKERS_SAFE,
+            CallFor::Plain => 0,
+            CallFor::Look => limits::WORKERS_SAFE / 2,
+            CallFor::Safe => limits::WORKERS_SAFE,
         };
         if self.given_up.len() >= limits::WORKERS_GIVEN_UP + more {
             let why = format!("{} calls have not returned: no further one is made", self.given_up.len());
@@ -148,7 +148,7 @@ impl Pool {
             self.hire();
         }
         if let Err(TrySendError::Full(job) | TrySendError::Closed(job)) =
-            self.jobs.0.try_send(Job { ticket, call, deadline })
+            self.jobs.0.try_send(PoolJob { ticket, call, deadline })
         {
             self.refuse(ticket, &job.call, "no worker is free");
         }
@@ -156,15 +156,17 @@ impl Pool {
     }
 
     /// A call is not made.
-    fn refuse(&mut self, ticket: Ticket, call: &Call, why: &str) {
+    fn refuse(&mut self, ticket: PoolTicket, call: &PlatformCall, why: &str) {
         let reply = match call {
-            Call::Execute(..) => Reply::Executed(Outcome::NotDone(Cause::Lost(why.to_owned()))),
-            Call::Several(..) => {
+            PlatformCall::Execute(..) => PoolReply::Executed(Outcome::NotDone(Cause::Lost(why.to_owned()))),
+            PlatformCall::Several(..) => {
                 let outcome = Outcome::NotDone(Cause::Lost(why.to_owned()));
-                Reply::Several(vec![Ended { outcome, took: None }])
+                PoolReply::Several(vec![Ended { outcome, took: None }])
             }
-            Call::Observe | Call::ObserveSome(_) => Reply::Observed(Err(ObserveError::Lost(why.to_owned()))),
-            Call::ObserveComponent(_) => Reply::ObservedComponent(Err(ObserveError::Lost(why.to_owned()))),
+            PlatformCall::Observe | PlatformCall::ObserveSome(_) => {
+                PoolReply::Observed(Err(ObserveError::Lost(why.to_owned())))
+            }
+            PlatformCall::ObserveComponent(_) => PoolReply::ObservedComponent(Err(ObserveError::Lost(why.to_owned()))),
         };
         self.came(ticket, reply);
     }
@@ -175,7 +177,7 @@ impl Pool {
     }
 
     /// A worker is back with what came of its call.
-    pub fn came(&mut self, ticket: Ticket, reply: Reply) {
+    pub fn came(&mut self, ticket: PoolTicket, reply: PoolReply) {
         if self.given_up.remove(&ticket) {
             self.workers += 1;
             self.told = false;
@@ -186,13 +188,13 @@ impl Pool {
     }
 
     /// What came of a call, once.
-    pub fn take(&mut self, ticket: Ticket) -> Option<Reply> {
+    pub fn take(&mut self, ticket: PoolTicket) -> Option<PoolReply> {
         let at = self.replies.iter().position(|(of, _)| *of == ticket)?;
         Some(self.replies.swap_remove(at).1)
     }
 
     /// The call is waited for no more: it is not back long after its deadline. When it comes back its worker is free again.
-    pub fn give_up(&mut self, ticket: Ticket) {
+    pub fn give_up(&mut self, ticket: PoolTicket) {
         if self.take(ticket).is_none() {
             self.given_up.insert(ticket);
             self.busy = self.busy.saturating_sub(1);
@@ -203,7 +205,7 @@ impl Pool {
     fn hire(&mut self) {
         let (jobs, post, platform) = (self.jobs.1.clone(), self.post.clone(), self.platform.clone());
         let worker = move || {
-            while let Ok(Job { ticket, call, deadline }) = jobs.recv() {
+            while let Ok(PoolJob { ticket, call, deadline }) = jobs.recv() {
                 post.send(Mail::Reply(ticket, perform(&*platform, call, deadline)));
             }
         };

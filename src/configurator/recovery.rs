@@ -2,8 +2,8 @@
 
 use super::control::{Drift, Recovery};
 use super::engine::Engine;
-use super::inbox::{Reply, Ticket};
-use super::pool::{Call, Whose};
+use super::inbox::{PoolReply, PoolTicket};
+use super::pool::{CallFor, PlatformCall};
 use super::progress::Progress;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -18,14 +18,14 @@ use std::sync::Arc;
 impl Engine {
     /// The whole system as the platform sees it; none: no answer.
     pub(super) fn look(&mut self) -> Option<Snapshot> {
-        match self.ask(Call::Observe) {
-            Some(Reply::Observed(Ok(seen))) => Some(seen),
+        match self.ask(PlatformCall::Observe) {
+            Some(PoolReply::Observed(Ok(seen))) => Some(seen),
             _ => None,
         }
     }
 
     /// Has a worker make a call. Where none is made any more that is told.
-    pub(super) fn call(&mut self, call: Call, deadline: Time, whose: Whose) -> Ticket {
+    pub(super) fn call(&mut self, call: PlatformCall, deadline: Time, whose: CallFor) -> PoolTicket {
         let ticket = self.pool.start(call, deadline, whose);
         if let (Some(why), Some(progress)) = (self.pool.take_refused(), &self.given.progress) {
             progress(&Progress::Stuck(why));
@@ -34,9 +34,9 @@ impl Engine {
     }
 
     /// Asks the platform something on a worker, while everything else goes on. None: no answer.
-    pub(super) fn ask(&mut self, call: Call) -> Option<Reply> {
+    pub(super) fn ask(&mut self, call: PlatformCall) -> Option<PoolReply> {
         let deadline = self.given.clock.now() + self.given.limits.step_timeout;
-        let whose = if self.taking_down { Whose::Safe } else { Whose::Look };
+        let whose = if self.taking_down { CallFor::Safe } else { CallFor::Look };
         let ticket = self.call(call, deadline, whose);
         let until = deadline + limits::PLATFORM_GRACE;
         loop {

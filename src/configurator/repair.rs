@@ -1,8 +1,8 @@
 //! What is broken is brought to where the model has it: by itself, or with the undo that asks for it.
 
 use super::engine::Engine;
-use super::inbox::Reply;
-use super::pool::Call;
+use super::inbox::PoolReply;
+use super::pool::PlatformCall;
 use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::Running;
@@ -187,7 +187,7 @@ impl Engine {
     fn read(&mut self, components: &[ComponentName]) -> bool {
         for _ in 0..limits::LOOKS_AGAIN {
             let before: Vec<Option<u64>> = components.iter().map(|name| self.generation(*name)).collect();
-            let Some(Reply::Observed(Ok(seen))) = self.ask(Call::ObserveSome(components.to_vec())) else {
+            let Some(PoolReply::Observed(Ok(seen))) = self.ask(PlatformCall::ObserveSome(components.to_vec())) else {
                 return false;
             };
             self.after_safe();

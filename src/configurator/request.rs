@@ -5,4 +5,4 @@ pub use crate::stack::{Answer, Batch, Reason, Request, Residual};
 /// The queue of requests is full; each request of the batch was answered *failed*.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the configurator's queue is full")]
-pub struct Full;
+pub struct QueueFull;

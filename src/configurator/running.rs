@@ -1,6 +1,6 @@
 //! A transaction under way: what it is for, and its calls that are out.
 
-use super::inbox::Ticket;
+use super::inbox::PoolTicket;
 use crate::limits;
 use crate::model::RequestId;
 use crate::stack::{Frame, FrameId, Group, Request};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A call that is out: one blocking step, or several brief ones.
 pub(super) struct Flight {
-    pub ticket: Ticket,
+    pub ticket: PoolTicket,
     pub steps: SmallVec<[u32; 1]>,
     pub started: Time,
     pub deadline: Time,
@@ -21,7 +21,7 @@ pub(super) struct Flight {
 }
 
 /// A condition that is being evaluated for a transaction, and until when it is waited for.
-pub(super) struct Asked {
+pub(super) struct AskedBatch {
     pub question: Question,
     pub number: u64,
     pub until: Time,
@@ -47,8 +47,8 @@ pub(super) struct Running {
     /// The request that each part of the plan serves, for the log.
     pub serves: SmallVec<[RequestId; 2]>,
     pub flights: Vec<Flight>,
-    pub read: Option<(Ticket, Time)>,
-    pub asked: Vec<Asked>,
+    pub read: Option<(PoolTicket, Time)>,
+    pub asked: Vec<AskedBatch>,
     /// Parts that stand for what they should, with the numbers of their conditions.
     pub stood: Vec<(usize, u64)>,
     /// Safe configurations that came before and do something about the same components: its end comes after theirs.

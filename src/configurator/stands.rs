@@ -1,10 +1,10 @@
 //! What configurations stand for (semantics: *Configurations*, `holds`): asked before they count as applied, watched while they are in force.
 
-use super::conditions::{Standing, Truth, Watch};
+use super::conditions::{HoldsWatch, Standing, Truth};
 use super::engine::Engine;
 use super::progress::Progress;
 use super::request::Reason;
-use super::running::{Asked, Running};
+use super::running::{AskedBatch, Running};
 use crate::model::ConfigId;
 use crate::stack::{is_stood_down, running_for};
 use crate::system::View as _;
@@ -41,7 +41,7 @@ impl Engine {
             (Some(condition), Some(conditions)) => {
                 let number = self.number();
                 conditions.begin(number, &condition);
-                running.asked.push(Asked { question, number, until });
+                running.asked.push(AskedBatch { question, number, until });
             }
             // Nobody looks: nothing speaks against it, and nobody knows.
             _ => {
@@ -60,7 +60,7 @@ impl Engine {
         let mut did = false;
         let mut at = 0;
         while at < running.asked.len() {
-            let Asked { question, number, until } = running.asked[at];
+            let AskedBatch { question, number, until } = running.asked[at];
             let truth = conditions.truth(number);
             let late = now >= until;
             let told = match question {
@@ -95,7 +95,7 @@ impl Engine {
         let Some(number) = number else { return };
         let holds = self.given.configurations.get(&id).and_then(|c| c.holds.as_ref());
         let runs = holds.map_or_else(Vec::new, |holds| running_for(holds, &self.world.system));
-        self.standings.of.insert(id, Standing { watch: Watch::On(number, None), runs, lost: false });
+        self.standings.of.insert(id, Standing { watch: HoldsWatch::On(number, None), runs, lost: false });
     }
 
     /// A configuration is no longer watched, and not lost.
@@ -103,7 +103,7 @@ impl Engine {
         if self.standings.of.is_empty() {
             return;
         }
-        if let (Some(Standing { watch: Watch::On(number, _), .. }), Some(conditions)) =
+        if let (Some(Standing { watch: HoldsWatch::On(number, _), .. }), Some(conditions)) =
             (self.standings.of.remove(&id), &self.given.conditions)
         {
             conditions.end(number);
@@ -129,7 +129,7 @@ impl Engine {
     /// Whether what a configuration in force stands for cannot be seen on this platform.
     pub(super) fn is_unseen(&self, id: ConfigId) -> bool {
         match (self.standings.of.get(&id).map(|standing| &standing.watch), &self.given.conditions) {
-            (Some(Watch::On(number, _)), Some(conditions)) => conditions.truth(*number).unseen,
+            (Some(HoldsWatch::On(number, _)), Some(conditions)) => conditions.truth(*number).unseen,
             _ => false,
         }
     }
@@ -137,7 +137,7 @@ impl Engine {
     /// When what is watched must be looked at though nothing comes.
     pub(super) fn standing_until(&self) -> Time {
         let until = |standing: &Standing| match standing.watch {
-            Watch::On(_, Some(until)) => until,
+            HoldsWatch::On(_, Some(until)) => until,
             _ => Time::NEVER,
         };
         self.standings.of.values().map(until).min().unwrap_or(Time::NEVER)
@@ -159,23 +159,23 @@ impl Engine {
             let standing = &self.standings.of[&id];
             let stood_down = || is_stood_down(standing.runs.iter().copied(), &self.world.system);
             let next = match &standing.watch {
-                Watch::On(..) if worked_on => Watch::Paused,
-                Watch::On(..) | Watch::Paused if !worked_on && stood_down() => Watch::Over,
-                Watch::Paused if !worked_on => {
+                HoldsWatch::On(..) if worked_on => HoldsWatch::Paused,
+                HoldsWatch::On(..) | HoldsWatch::Paused if !worked_on && stood_down() => HoldsWatch::Over,
+                HoldsWatch::Paused if !worked_on => {
                     let holds = self.given.configurations.get(&id).and_then(|c| c.holds.clone());
                     match (holds, self.given.conditions.clone()) {
                         (Some(holds), Some(conditions)) => {
                             let number = self.number();
                             conditions.begin(number, &holds);
-                            Watch::On(number, Some(self.given.clock.now() + self.given.limits.step_timeout))
+                            HoldsWatch::On(number, Some(self.given.clock.now() + self.given.limits.step_timeout))
                         }
-                        _ => Watch::Over,
+                        _ => HoldsWatch::Over,
                     }
                 }
                 _ => continue,
             };
             let standing = self.standings.of.get_mut(&id).expect("looked at just now");
-            if let (Watch::On(number, _), Some(conditions)) =
+            if let (HoldsWatch::On(number, _), Some(conditions)) =
                 (std::mem::replace(&mut standing.watch, next), &self.given.conditions)
             {
                 conditions.end(number);
@@ -190,7 +190,7 @@ impl Engine {
         let now = self.given.clock.now();
         let mut fallen: Vec<ConfigId> = Vec::new();
         for (id, standing) in &mut self.standings.of {
-            let Watch::On(number, until) = &mut standing.watch else { continue };
+            let HoldsWatch::On(number, until) = &mut standing.watch else { continue };
             let truth = conditions.truth(*number);
             if truth.fell || truth.is != Some(true) && until.is_some_and(|until| now >= until) {
                 fallen.push(*id);
@@ -209,7 +209,7 @@ impl Engine {
             return;
         }
         self.forget_standing(id);
-        self.standings.of.insert(id, Standing { watch: Watch::Over, runs: Vec::new(), lost: true });
+        self.standings.of.insert(id, Standing { watch: HoldsWatch::Over, runs: Vec::new(), lost: true });
         self.changed();
         if let Some(progress) = &self.given.progress {
             progress(&Progress::Lost { configuration: id, reason: Arc::new(reason) });

@@ -1,7 +1,7 @@
 //! Components that were reported faulted: looked at, since the report may be older than what was done since.
 
-use super::inbox::{Reply, Ticket};
-use super::pool::{Call, Pool, Whose};
+use super::inbox::{PoolReply, PoolTicket};
+use super::pool::{CallFor, PlatformCall, Pool};
 use crate::limits;
 use crate::model::{ComponentName, RunState};
 use crate::system::{System, View as _};
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// A look at a component that was reported faulted.
 struct SuspectLook {
-    ticket: Ticket,
+    ticket: PoolTicket,
     component: ComponentName,
     /// When the model had touched it last: what is done to it meanwhile makes the look stale.
     generation: Option<u64>,
@@ -67,7 +67,7 @@ impl Suspects {
         while at < self.looks.len() {
             let SuspectLook { ticket, component, generation, until } = self.looks[at];
             let seen = match pool.take(ticket) {
-                Some(Reply::ObservedComponent(Ok(seen))) => seen,
+                Some(PoolReply::ObservedComponent(Ok(seen))) => seen,
                 Some(_) => None,
                 None if now >= until => {
                     pool.give_up(ticket);
@@ -100,7 +100,7 @@ impl Suspects {
                 continue;
             }
             let deadline = now + timeout;
-            let ticket = pool.start(Call::ObserveComponent(component), deadline, Whose::Plain);
+            let ticket = pool.start(PlatformCall::ObserveComponent(component), deadline, CallFor::Plain);
             let until = deadline + limits::PLATFORM_GRACE;
             self.looks.push(SuspectLook { ticket, component, generation: generation_of(system, component), until });
         }

@@ -5,7 +5,7 @@
 //! rest is not raised again: where something moved hardware since stopping began, or since the event that ends the deployment,
 //! nothing is popped at all.
 
-use super::control::{Began, Moment, TakenDown};
+use super::control::{Moment, StoppingBegan, TakenDown};
 use super::engine::Engine;
 use super::repair::By;
 use super::request::{Reason, Request};
@@ -24,7 +24,7 @@ impl Engine {
         if self.began.is_some() {
             return;
         }
-        self.began = Some(Began { since: self.moment(), led: None });
+        self.began = Some(StoppingBegan { since: self.moment(), led: None });
         let operators = |request: &Request| request.why == Why::Asked && request.requester == Requester::Operator;
         for request in self.desk.cancel_waiting(operators) {
             self.refuse(request);

@@ -6,7 +6,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
-use crate::plan::{PlannedStep, Stage};
+use crate::plan::{PlanStage, PlannedStep};
 use crate::stack::{Broken, Effort, FrameId, Part, Planned, Requester, Residual, Why, effort};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
@@ -311,7 +311,7 @@ fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
         let reversibility = Reversibility::Exact;
         work.push(PlannedStep {
             id,
-            stage: Stage::Changes,
+            stage: PlanStage::Changes,
             wave,
             after,
             step,

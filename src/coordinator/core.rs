@@ -4,7 +4,7 @@ use crate::limits;
 use crate::model::finding::Finding;
 use crate::model::names::EventName;
 use crate::model::{codes, finding};
-use crate::statechart::{AtOnce, Chart, Hook, Machine, Mode, Nobody, NodeId, Raised, Said, Step, Watched};
+use crate::statechart::{AtOnce, Chart, Hook, Machine, Mode, Nobody, NodeId, Raised, Said, TurnResult, Watched};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -77,21 +77,21 @@ pub trait Listener {
     }
 
     /// The chart behaved badly.
-    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
         let _ = (chart, trouble);
     }
 }
 
 /// What a chart does that it should not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
+pub enum ChartTrouble {
     /// It could not be entered. The next event tries again.
     NotEntered,
     /// It did not come to rest within [`limits::CHART_RUN`] turns. What it still had inside was dropped.
     Runaway,
 }
 
-impl Trouble {
+impl ChartTrouble {
     /// The trouble as a finding.
     pub fn finding(self, chart: &Chart) -> Finding {
         let initial = chart.initial();
@@ -150,8 +150,9 @@ impl Hook for Collect<'_> {
     }
 }
 
+#[cfg(any(test, feature = "internals"))]
 impl Core {
-    /// A coordinator that has not begun.
+    /// A coordinator that has not begun, of a chart without functions.
     pub fn new(chart: Arc<Chart>) -> Self {
         Self::with(chart, Nobody)
     }
@@ -167,11 +168,13 @@ impl<F: Hook> Core<F> {
     }
 
     /// The chart, as it was read.
+    #[cfg(any(test, feature = "internals"))]
     pub fn chart(&self) -> &Arc<Chart> {
         &self.chart
     }
 
     /// Where it stands.
+    #[cfg(any(test, feature = "internals"))]
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
@@ -215,7 +218,7 @@ impl<F: Hook> Core<F> {
             return Delivered::Taken;
         }
         self.machine.send(id);
-        if matches!(self.settle(now, listener), Step::Taken | Step::Entered) {
+        if matches!(self.settle(now, listener), TurnResult::Taken | TurnResult::Entered) {
             Delivered::Taken
         } else {
             listener.unmatched(event);
@@ -245,8 +248,8 @@ impl<F: Hook> Core<F> {
     }
 
     /// Whether a turn left nothing to do.
-    fn is_idle(&self, step: Step) -> bool {
-        step == Step::Quiet { idle: true } && self.machine.queue().events().is_empty()
+    fn is_idle(&self, step: TurnResult) -> bool {
+        step == TurnResult::Quiet { idle: true } && self.machine.queue().events().is_empty()
     }
 
     /// Hands on what the step raised.
@@ -258,7 +261,7 @@ impl<F: Hook> Core<F> {
     }
 
     /// Turns until nothing is left to do; answers what the first one did.
-    fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> Step {
+    fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> TurnResult {
         let mut first = None;
         self.again = None;
         for _ in 0..limits::CHART_RUN {
@@ -275,19 +278,23 @@ impl<F: Hook> Core<F> {
                 self.said.drain(..).for_each(|said| listener.said(&said));
             }
             match step {
-                Step::Taken | Step::Entered => listener.moved(self.machine.chart(&self.chart), self.machine.active()),
-                Step::NotEntered => {
-                    listener.trouble(&self.chart, Trouble::NotEntered);
+                TurnResult::Taken | TurnResult::Entered => {
+                    listener.moved(self.machine.chart(&self.chart), self.machine.active())
+                }
+                TurnResult::NotEntered => {
+                    listener.trouble(&self.chart, ChartTrouble::NotEntered);
                     return step;
                 }
-                Step::Unmatched | Step::Quiet { .. } => (),
+                TurnResult::Unmatched | TurnResult::Quiet { .. } => (),
             }
             self.tell(listener);
             let rests = match step {
-                Step::Taken | Step::Entered => self.machine.rest::<Watched<'_, Collect<'_>, F>>(&self.chart),
+                TurnResult::Taken | TurnResult::Entered => {
+                    self.machine.rest::<Watched<'_, Collect<'_>, F>>(&self.chart)
+                }
                 // A time event that came due in an idle turn waits inside for the next one.
-                Step::Quiet { .. } if goes_on || !self.machine.queue().events().is_empty() => false,
-                Step::Quiet { idle } => {
+                TurnResult::Quiet { .. } if goes_on || !self.machine.queue().events().is_empty() => false,
+                TurnResult::Quiet { idle } => {
                     if F::TURNS {
                         self.again = self.turn_after(idle, now);
                     }
@@ -300,7 +307,7 @@ impl<F: Hook> Core<F> {
             }
         }
         self.machine.drop_queue();
-        listener.trouble(&self.chart, Trouble::Runaway);
-        first.unwrap_or(Step::Unmatched)
+        listener.trouble(&self.chart, ChartTrouble::Runaway);
+        first.unwrap_or(TurnResult::Unmatched)
     }
 }

@@ -12,6 +12,6 @@ mod core;
 mod inbox;
 mod thread;
 
-pub use self::core::{Core, Delivered, Listener, Tag, Trouble};
+pub use self::core::{ChartTrouble, Core, Delivered, Listener, Tag};
 pub use inbox::{Class, Dropped, Incoming, Put, Refused};
-pub use thread::{Coordinator, Waited};
+pub use thread::Coordinator;

@@ -1,13 +1,13 @@
 //! The coordinator's own thread.
 
-use super::core::{Core, Listener, Trouble};
+use super::core::{ChartTrouble, Core, Listener};
 use super::inbox::{Class, Dropped, Inbox, Incoming, Put, Refused};
 use super::{Delivered, Tag};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
 use crate::time::clock::panic_text;
-use crate::time::{Clock, Join, JoinError, RecvError, Released, Sender, Signal, Time, lock};
+use crate::time::{Clock, Join, JoinError, Released, Signal, Time, lock};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, TryLockError};
@@ -16,10 +16,10 @@ use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 /// are gone.
 #[derive(Clone)]
 pub struct Coordinator {
-    shared: Arc<Shared>,
+    shared: Arc<CoordinatorShared>,
 }
 
-struct Shared {
+struct CoordinatorShared {
     clock: Clock,
     chart: Arc<Chart>,
     /// The chart, once a model with functions has added to it.
@@ -38,34 +38,13 @@ struct Shared {
     /// Held while the listener is called; whoever holds it knows that nothing is being told. Not held while a function of
     /// the model runs, which may take as long as it likes.
     telling: Mutex<()>,
-    delivered: AtomicU64,
-    stale: AtomicU64,
-    waiting: Mutex<Waiting>,
     thread: Mutex<Thread>,
-}
-
-/// Who waits for which state, by number.
-#[derive(Default)]
-struct Waiting {
-    next: u64,
-    all: Vec<(u64, NodeId, Sender<()>)>,
 }
 
 #[derive(Default)]
 struct Thread {
     join: Option<Join>,
     id: Option<std::thread::ThreadId>,
-}
-
-/// How waiting for a state ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Waited {
-    /// The state is or was active.
-    Reached,
-    /// The deadline came first.
-    TimedOut,
-    /// The coordinator was detached first.
-    Detached,
 }
 
 impl Coordinator {
@@ -84,7 +63,7 @@ impl Coordinator {
         open: impl FnOnce() -> Result<F, String> + Send + 'static,
     ) -> Self {
         let inbox = Inbox::new(chart.events().iter().copied());
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(CoordinatorShared {
             clock: clock.clone(),
             chart,
             grown: OnceLock::new(),
@@ -96,9 +75,6 @@ impl Coordinator {
             lost: AtomicU64::new(0),
             reacting: Mutex::new(()),
             telling: Mutex::new(()),
-            delivered: AtomicU64::new(0),
-            stale: AtomicU64::new(0),
-            waiting: Mutex::new(Waiting::default()),
             thread: Mutex::new(Thread::default()),
         });
         let coordinator = Self { shared };
@@ -164,32 +140,6 @@ impl Coordinator {
         self.leaf().is_some_and(|leaf| self.shared.chart().is_inside(leaf, state))
     }
 
-    /// Waits until `state` is active: now, or after any step until the deadline, however short it stays so.
-    pub fn wait_for_state(&self, state: NodeId, deadline: Time) -> Waited {
-        let (told, tell) = self.shared.clock.channel(1);
-        let number = {
-            let mut waiting = lock(&self.shared.waiting);
-            waiting.next += 1;
-            let number = waiting.next;
-            waiting.all.push((number, state, told));
-            number
-        };
-        // Looked at only now, so that a step in between is seen by one or the other.
-        let waited = if self.is_active(state) {
-            Waited::Reached
-        } else if self.is_detached() {
-            Waited::Detached
-        } else {
-            match tell.recv_deadline(deadline) {
-                Ok(()) => Waited::Reached,
-                Err(RecvError::Timeout) => Waited::TimedOut,
-                Err(RecvError::Closed) => Waited::Detached,
-            }
-        };
-        lock(&self.shared.waiting).all.retain(|(n, _, _)| *n != number);
-        waited
-    }
-
     /// Events that found no room.
     pub fn dropped(&self) -> Dropped {
         let inside = self.shared.lost.load(Ordering::Relaxed);
@@ -204,16 +154,6 @@ impl Coordinator {
     /// Whether it has been reacting to one event for longer than [`limits::REACTION_LONG`]: a function of its model hangs.
     pub fn hangs(&self) -> bool {
         self.reacting_since().is_some_and(|since| self.shared.clock.now() > since + limits::REACTION_LONG)
-    }
-
-    /// Events that were delivered to the chart so far.
-    pub fn delivered(&self) -> u64 {
-        self.shared.delivered.load(Ordering::Relaxed)
-    }
-
-    /// Answers that came for visits that were over.
-    pub fn stale(&self) -> u64 {
-        self.shared.stale.load(Ordering::Relaxed)
     }
 
     /// Whether it was detached (or has ended).
@@ -240,7 +180,6 @@ impl Coordinator {
         if !own {
             drop(lock(&self.shared.telling));
         }
-        lock(&self.shared.waiting).all.clear();
     }
 
     /// Detaches it and waits for its thread to end.
@@ -260,7 +199,7 @@ impl std::fmt::Debug for Coordinator {
     }
 }
 
-impl Shared {
+impl CoordinatorShared {
     fn leaf(&self) -> Option<NodeId> {
         let number = self.leaf.load(Ordering::SeqCst).checked_sub(1)?;
         self.chart.node(number).or_else(|| self.chart().node(number))
@@ -276,7 +215,6 @@ impl Shared {
         let by_itself = !self.detached.swap(true, Ordering::SeqCst);
         self.since.store(0, Ordering::Relaxed);
         lock(&self.inbox).clear();
-        lock(&self.waiting).all.clear();
         match ended {
             Ok(Err(why)) if by_itself => listener.ended(&why),
             Err(panic) => {
@@ -303,7 +241,7 @@ impl Shared {
                 return Err(format!("its functions cannot be run: {text}"));
             }
         };
-        let mut listener = Told { shared: self, listener };
+        let mut listener = Publisher { shared: self, listener };
         let began = self.clock.now();
         self.react(began, || {
             core.start(began, &mut listener);
@@ -318,9 +256,6 @@ impl Shared {
             let worked = self.react(now, || match self.next(&mut tickets) {
                 Some(incoming) => {
                     let delivered = core.deliver(incoming.event, incoming.tag, now, &mut listener);
-                    if delivered != Delivered::Stale {
-                        self.delivered.fetch_add(1, Ordering::Relaxed);
-                    }
                     tickets.iter().for_each(|ticket| listener.taken_up(*ticket, delivered));
                     true
                 }
@@ -385,12 +320,12 @@ impl Round {
 }
 
 /// Between core and listener: publishes where the chart stands, and lets nothing through once detached.
-struct Told<'a, L> {
-    shared: &'a Shared,
+struct Publisher<'a, L> {
+    shared: &'a CoordinatorShared,
     listener: &'a mut L,
 }
 
-impl<L> Told<'_, L> {
+impl<L> Publisher<'_, L> {
     /// Calls the listener, unless the coordinator has been detached: that waits for the end of the call.
     fn tell(&mut self, call: impl FnOnce(&mut L)) {
         let _telling = lock(&self.shared.telling);
@@ -400,7 +335,7 @@ impl<L> Told<'_, L> {
     }
 }
 
-impl<L: Listener> Listener for Told<'_, L> {
+impl<L: Listener> Listener for Publisher<'_, L> {
     fn raised(&mut self, chart: &Chart, batch: &[Raised]) {
         self.tell(|listener| listener.raised(chart, batch));
     }
@@ -409,14 +344,6 @@ impl<L: Listener> Listener for Told<'_, L> {
         let shared = self.shared;
         self.tell(|listener| {
             shared.leaf.store(active.last().map_or(0, |leaf| leaf.index() + 1), Ordering::SeqCst);
-            lock(&shared.waiting).all.retain(|(_, state, told)| {
-                let reached = active.contains(state);
-                if reached {
-                    // One place, one value: it cannot be full, and whoever stopped waiting does not mind.
-                    let _ = told.try_send(());
-                }
-                !reached
-            });
             listener.moved(chart, active);
         });
     }
@@ -441,7 +368,6 @@ impl<L: Listener> Listener for Told<'_, L> {
     }
 
     fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {
-        self.shared.stale.fetch_add(1, Ordering::Relaxed);
         self.tell(|listener| listener.stale(chart, event, tag));
     }
 
@@ -453,7 +379,7 @@ impl<L: Listener> Listener for Told<'_, L> {
         self.tell(|listener| listener.said(said));
     }
 
-    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
         self.tell(|listener| listener.trouble(chart, trouble));
     }
 }

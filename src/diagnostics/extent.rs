@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A token of Lua, as far as places need it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Token {
+enum ExtentToken {
     Name,
     /// A string with the range of its content.
     Text(Range<usize>),
@@ -35,7 +35,7 @@ fn long_end(text: &[u8], from: usize, level: usize) -> (usize, usize) {
 }
 
 /// The next token at or after `at`, with its bytes; none at the end. Comments are skipped.
-fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, Token)> {
+fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, ExtentToken)> {
     loop {
         let byte = *text.get(at)?;
         if byte.is_ascii_whitespace() {
@@ -47,22 +47,22 @@ fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, Token)> {
             };
         } else if byte.is_ascii_alphabetic() || byte == b'_' {
             let length = text[at..].iter().take_while(|b| b.is_ascii_alphanumeric() || **b == b'_').count();
-            return Some((at..at + length, Token::Name));
+            return Some((at..at + length, ExtentToken::Name));
         } else if byte == b'"' || byte == b'\'' {
             let mut end = at + 1;
             while end < text.len() && text[end] != byte && text[end] != b'\n' {
                 end += if text[end] == b'\\' { 2 } else { 1 };
             }
             let end = end.min(text.len());
-            return Some((at..(end + 1).min(text.len()), Token::Text(at + 1..end)));
+            return Some((at..(end + 1).min(text.len()), ExtentToken::Text(at + 1..end)));
         } else if let Some((length, level)) = long_bracket(text, at) {
             let (content, end) = long_end(text, at + length, level);
-            return Some((at..end, Token::Text(at + length..content)));
+            return Some((at..end, ExtentToken::Text(at + length..content)));
         } else {
             let token = match byte {
-                b'(' | b'{' | b'[' => Token::Open,
-                b')' | b'}' | b']' => Token::Close,
-                _ => Token::Other,
+                b'(' | b'{' | b'[' => ExtentToken::Open,
+                b')' | b'}' | b']' => ExtentToken::Close,
+                _ => ExtentToken::Other,
             };
             return Some((at..at + 1, token));
         }
@@ -75,16 +75,16 @@ pub fn balanced(text: &str, span: Range<usize>) -> Range<usize> {
     let (mut at, mut depth, mut end) = (span.end, 0_usize, span.end);
     while let Some((token, kind)) = next_token(bytes, at) {
         match kind {
-            Token::Open => depth += 1,
-            Token::Close if depth <= 1 => {
+            ExtentToken::Open => depth += 1,
+            ExtentToken::Close if depth <= 1 => {
                 end = token.end;
                 match next_token(bytes, end) {
-                    Some((next, Token::Other)) if bytes[next.start] == b':' => depth = 0,
+                    Some((next, ExtentToken::Other)) if bytes[next.start] == b':' => depth = 0,
                     _ => break,
                 }
             }
-            Token::Close => depth -= 1,
-            Token::Other if depth == 0 && !matches!(bytes[token.start], b':' | b'.') => break,
+            ExtentToken::Close => depth -= 1,
+            ExtentToken::Other if depth == 0 && !matches!(bytes[token.start], b':' | b'.') => break,
             _ => {}
         }
         at = token.end;
@@ -101,7 +101,7 @@ pub fn find_name(text: &str, range: Range<usize>, word: &str, nth: usize) -> Opt
     let mut at = range.start;
     let (mut found, mut count) = (None, 0);
     while let Some((token, kind)) = next_token(bytes, at) {
-        if kind == Token::Name && &bytes[token.clone()] == word.as_bytes() {
+        if kind == ExtentToken::Name && &bytes[token.clone()] == word.as_bytes() {
             found = Some(token.clone());
             if count == nth {
                 break;
@@ -124,8 +124,8 @@ pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>>
     while let Some((token, kind)) = next_token(bytes, at) {
         at = token.end;
         let content = match kind {
-            Token::Name => token.clone(),
-            Token::Text(content) => content,
+            ExtentToken::Name => token.clone(),
+            ExtentToken::Text(content) => content,
             _ => continue,
         };
         let Some(content_text) = text.get(content.clone()) else { continue };
@@ -156,17 +156,17 @@ pub fn find_in_element(text: &str, line: Range<usize>, word: &str) -> Option<Ran
         at = token.end;
         let inside = open.last().copied().unwrap_or(false);
         match kind {
-            Token::Open => open.push(inside || (named && !open.is_empty())),
-            Token::Close => _ = open.pop(),
-            Token::Name | Token::Text(_) if !inside => {
-                let content = if let Token::Text(content) = &kind { content.clone() } else { token.clone() };
+            ExtentToken::Open => open.push(inside || (named && !open.is_empty())),
+            ExtentToken::Close => _ = open.pop(),
+            ExtentToken::Name | ExtentToken::Text(_) if !inside => {
+                let content = if let ExtentToken::Text(content) = &kind { content.clone() } else { token.clone() };
                 if text.get(content) == Some(word) {
                     return Some(token).filter(|span| text.get(span.clone()).is_some());
                 }
             }
             _ => {}
         }
-        named = kind == Token::Name;
+        named = kind == ExtentToken::Name;
     }
     None
 }
@@ -175,8 +175,8 @@ pub fn find_in_element(text: &str, line: Range<usize>, word: &str) -> Option<Ran
 pub fn reach_of_key(text: &str, key: &Range<usize>, end: usize) -> Range<usize> {
     let bytes = text.as_bytes().get(..end).unwrap_or_default();
     match next_token(bytes, key.end) {
-        Some((equals, Token::Other)) if bytes[equals.start] == b'=' => match next_token(bytes, equals.end) {
-            Some((open, Token::Open)) => {
+        Some((equals, ExtentToken::Other)) if bytes[equals.start] == b'=' => match next_token(bytes, equals.end) {
+            Some((open, ExtentToken::Open)) => {
                 let value = balanced(text, open.start..open.start);
                 value.start..value.end.min(end)
             }

@@ -8,5 +8,5 @@ mod extent;
 mod render;
 mod source_map;
 
-pub use render::{RenderOptions, explain, render, render_with, to_json};
+pub use render::{RenderOptions, render, render_with, to_json};
 pub use source_map::{FileId, Language, Location, SourceFile, SourceMap};

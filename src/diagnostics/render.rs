@@ -2,7 +2,7 @@
 
 use super::source_map::{FileId, Location, SourceMap};
 use crate::model::finding::count;
-use crate::model::{Finding, Origin, Severity, codes};
+use crate::model::{Finding, Origin, Severity};
 use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode,
     SourceSpan, SpanContents,
@@ -43,7 +43,7 @@ pub fn render_with(findings: &[Finding], sources: &SourceMap, options: RenderOpt
         .without_cause_chain();
     let mut out = String::new();
     for finding in findings.iter().take(options.most) {
-        let report = Report::new(finding, sources);
+        let report = FindingReport::new(finding, sources);
         // The handler fails only where a source cannot be read; ours can always.
         if handler.render_report(&mut out, &report).is_err() {
             let _ = writeln!(out, "davit::{}: {}", finding.code, finding.message);
@@ -94,31 +94,6 @@ pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
     findings.iter().map(one).collect()
 }
 
-/// The page of a code, laid out for a terminal; none for an unknown code.
-pub fn explain(code: &str) -> Option<String> {
-    let page = codes::page(code)?;
-    let mut out = format!("davit::{}: {}\n\n", page.code, page.title);
-    for paragraph in page.text.split("\n\n") {
-        let mut width = 0;
-        for word in paragraph.split_whitespace() {
-            let length = word.chars().count();
-            if width > 0 && width + 1 + length > 80 {
-                out.push('\n');
-                width = 0;
-            } else if width > 0 {
-                out.push(' ');
-                width += 1;
-            }
-            out.push_str(word);
-            width += length;
-        }
-        out.push_str("\n\n");
-    }
-    out.truncate(out.trim_end().len());
-    out.push('\n');
-    Some(out)
-}
-
 /// The place of a finding: inside the element at fault, the first name that the message quotes, if it stands there.
 fn primary(finding: &Finding, sources: &SourceMap) -> Option<Location> {
     let whole = sources.locate(finding.origin)?;
@@ -128,17 +103,17 @@ fn primary(finding: &Finding, sources: &SourceMap) -> Option<Location> {
 
 /// A finding with its texts, as miette wants it.
 #[derive(Debug)]
-struct Report {
+struct FindingReport {
     message: String,
     code: String,
     severity: miette::Severity,
     help: Option<String>,
-    source: Option<Window>,
+    source: Option<SourceWindow>,
     labels: Vec<LabeledSpan>,
     related: Vec<Self>,
 }
 
-impl Report {
+impl FindingReport {
     fn new(finding: &Finding, sources: &SourceMap) -> Self {
         let severity = match finding.severity {
             Severity::Error => miette::Severity::Error,
@@ -157,7 +132,7 @@ impl Report {
         let mut home = None;
         if let Some(location) = primary(finding, sources) {
             home = Some(location.file);
-            report.source = Some(Window::new(sources, location.file));
+            report.source = Some(SourceWindow::new(sources, location.file));
             let text = if finding.label.is_empty() { "here" } else { &*sources.told(finding.origin, &finding.label) };
             let span = first_line(sources, &location);
             report.labels.push(LabeledSpan::new_primary_with_span(Some(text.to_owned()), to_miette(&span)));
@@ -186,7 +161,7 @@ impl Report {
                 code: String::new(),
                 severity: miette::Severity::Advice,
                 help: None,
-                source: Some(Window::new(sources, location.file)),
+                source: Some(SourceWindow::new(sources, location.file)),
                 labels: vec![LabeledSpan::new_primary_with_span(Some("here".to_owned()), span)],
                 related: Vec::new(),
             });
@@ -194,7 +169,7 @@ impl Report {
     }
 }
 
-impl Report {
+impl FindingReport {
     /// Whether a second place can be shown in one picture with the first: all between places on neighbouring lines is
     /// shown, however long these lines are.
     fn is_near(&self, span: &SourceSpan, location: &Location, sources: &SourceMap) -> bool {
@@ -216,15 +191,15 @@ fn first_line(sources: &SourceMap, location: &Location) -> Range<usize> {
     location.span.start..location.span.end.min(file.line(location.line).end).min(most).max(location.span.start)
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for FindingReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
     }
 }
 
-impl std::error::Error for Report {}
+impl std::error::Error for FindingReport {}
 
-impl Diagnostic for Report {
+impl Diagnostic for FindingReport {
     fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         (!self.code.is_empty()).then(|| Box::new(&self.code) as Box<dyn fmt::Display>)
     }
@@ -249,14 +224,14 @@ impl Diagnostic for Report {
 
 /// A text of which only the lines around a place are shown. Finds lines by bisection, so that a thousand findings in
 /// a large file do not read it a thousand times, and cuts lines that no terminal could show.
-struct Window {
+struct SourceWindow {
     name: Arc<str>,
     text: Arc<str>,
     line_starts: Vec<usize>,
     skipped: usize,
 }
 
-impl fmt::Debug for Window {
+impl fmt::Debug for SourceWindow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.name)
     }
@@ -268,7 +243,7 @@ const LINE_MARGIN: usize = 120;
 /// Bytes from which a line is too long to be shown whole.
 const LONG_LINE: usize = 2_000;
 
-impl Window {
+impl SourceWindow {
     fn new(sources: &SourceMap, file: FileId) -> Self {
         let source = sources.file(file);
         Self {
@@ -284,7 +259,7 @@ impl Window {
     }
 }
 
-impl SourceCode for Window {
+impl SourceCode for SourceWindow {
     fn read_span<'a>(
         &'a self,
         span: &SourceSpan,

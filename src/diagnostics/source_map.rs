@@ -62,7 +62,7 @@ impl SourceFile {
 
 /// How a place is known.
 #[derive(Debug, Clone)]
-enum Place {
+enum TextPlace {
     /// Nowhere: the place of [`Origin::NONE`].
     Nowhere,
     /// The whole file.
@@ -94,7 +94,7 @@ pub struct Location {
 #[derive(Debug, Clone)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
-    places: Vec<Place>,
+    places: Vec<TextPlace>,
     speller: Option<Speller>,
 }
 
@@ -103,7 +103,7 @@ pub type Speller = fn(&str) -> String;
 
 impl Default for SourceMap {
     fn default() -> Self {
-        Self { files: Vec::new(), places: vec![Place::Nowhere], speller: None }
+        Self { files: Vec::new(), places: vec![TextPlace::Nowhere], speller: None }
     }
 }
 
@@ -163,7 +163,7 @@ impl SourceMap {
         &self.files
     }
 
-    fn add(&mut self, place: Place) -> Origin {
+    fn add(&mut self, place: TextPlace) -> Origin {
         let origin = Origin(u32::try_from(self.places.len()).unwrap_or(0));
         self.places.push(place);
         origin
@@ -171,29 +171,29 @@ impl SourceMap {
 
     /// The place of a whole file.
     pub fn whole_file(&mut self, file: FileId) -> Origin {
-        self.add(Place::File(file))
+        self.add(TextPlace::File(file))
     }
 
     /// A line (from 1), a column (from 0) and a length, both in characters. Length 0 means up to the token's end.
     pub fn exact(&mut self, file: FileId, line: u32, column: u32, length: u32) -> Origin {
-        self.add(Place::Exact { file, line, column, length })
+        self.add(TextPlace::Exact { file, line, column, length })
     }
 
     /// A whole line (from 1).
     pub fn exact_line(&mut self, file: FileId, line: u32) -> Origin {
-        self.add(Place::Line { file, line })
+        self.add(TextPlace::Line { file, line })
     }
 
     /// The `nth` (from 0) call of `word` that stands on a line (from 1).
     pub fn call(&mut self, file: FileId, line: u32, nth: u32, word: &'static str) -> Origin {
-        self.add(Place::Call { file, line, nth, word })
+        self.add(TextPlace::Call { file, line, nth, word })
     }
 
     /// The token `word` inside the place `parent`; where that is not found, `parent` itself.
     pub fn within(&mut self, parent: Origin, word: &str) -> Origin {
         match self.places.get(parent.0 as usize) {
-            Some(Place::Call { .. } | Place::Within { .. } | Place::File(_) | Place::Line { .. }) => {
-                self.add(Place::Within { parent, word: word.into() })
+            Some(TextPlace::Call { .. } | TextPlace::Within { .. } | TextPlace::File(_) | TextPlace::Line { .. }) => {
+                self.add(TextPlace::Within { parent, word: word.into() })
             }
             _ => parent,
         }
@@ -201,7 +201,7 @@ impl SourceMap {
 
     /// Whether a place is known exactly, without looking for its text.
     pub fn is_exact(&self, origin: Origin) -> bool {
-        matches!(self.places.get(origin.0 as usize), Some(Place::Exact { .. }))
+        matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }))
     }
 
     /// The bytes of the whole element at `origin`, as far as they are known: of a call in Lua up to its closing bracket.
@@ -210,11 +210,11 @@ impl SourceMap {
         Some((file, self.reach(origin, file, &span)))
     }
 
-    /// Where an origin stands; none for [`Origin::NONE`].
+    /// Where an origin stands; none for that of what no text has.
     pub fn locate(&self, origin: Origin) -> Option<Location> {
         let mut words = Vec::new();
         let mut at = origin;
-        while let Place::Within { parent, word } = self.places.get(at.0 as usize)? {
+        while let TextPlace::Within { parent, word } = self.places.get(at.0 as usize)? {
             words.push(&**word);
             at = *parent;
         }
@@ -222,7 +222,7 @@ impl SourceMap {
         let source = self.file(file);
         let mut inside = self.reach(at, file, &span);
         while let Some(word) = words.pop() {
-            let on_line = matches!(self.places.get(at.0 as usize), Some(Place::Line { .. })) && inside == span;
+            let on_line = matches!(self.places.get(at.0 as usize), Some(TextPlace::Line { .. })) && inside == span;
             let far = || extent::find_in_element(&source.text, inside.clone(), word);
             let found = on_line.then(far).flatten();
             let Some(found) = found.or_else(|| extent::find(&source.text, inside.clone(), word)) else { continue };
@@ -260,9 +260,9 @@ impl SourceMap {
     /// File and bytes of a place that is not inside another.
     fn base(&self, origin: Origin) -> Option<(FileId, Range<usize>)> {
         Some(match self.places.get(origin.0 as usize)? {
-            Place::Nowhere | Place::Within { .. } => return None,
-            Place::File(file) => (*file, 0..0),
-            Place::Exact { file, line, column, length } => {
+            TextPlace::Nowhere | TextPlace::Within { .. } => return None,
+            TextPlace::File(file) => (*file, 0..0),
+            TextPlace::Exact { file, line, column, length } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
                 let offset = |from: usize, chars: u32| {
@@ -272,13 +272,13 @@ impl SourceMap {
                 let end = if *length == 0 { extent::token_end(&source.text, start) } else { offset(start, *length) };
                 (*file, start..end)
             }
-            Place::Line { file, line } => {
+            TextPlace::Line { file, line } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
                 let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
                 (*file, line.start + indent..line.end)
             }
-            Place::Call { file, line, nth, word } => {
+            TextPlace::Call { file, line, nth, word } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
                 let found = extent::find_name(&source.text, line.clone(), word, *nth as usize).unwrap_or_else(|| {
@@ -293,8 +293,8 @@ impl SourceMap {
     /// The bytes in which parts of the element at `origin` are looked for.
     fn reach(&self, origin: Origin, file: FileId, span: &Range<usize>) -> Range<usize> {
         match self.places.get(origin.0 as usize) {
-            Some(Place::Call { .. }) => extent::balanced(&self.file(file).text, span.clone()),
-            Some(Place::File(_)) => 0..self.file(file).text.len(),
+            Some(TextPlace::Call { .. }) => extent::balanced(&self.file(file).text, span.clone()),
+            Some(TextPlace::File(_)) => 0..self.file(file).text.len(),
             _ => span.clone(),
         }
     }

@@ -21,19 +21,19 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
     }
     used.extend(system.ports.keys());
     let watching = |ty: TypeName| ty.as_str() == MONITORS_TYPE;
-    let watched: Vec<(&Monitor, BTreeSet<Watched>)> = match system.components.values().any(|c| watching(c.ty)) {
+    let watched: Vec<(&Monitor, BTreeSet<WatchedMember>)> = match system.components.values().any(|c| watching(c.ty)) {
         true => monitors.iter().map(|monitor| (monitor, watches(monitor))).collect(),
         false => Vec::new(),
     };
     used.extend(watched.iter().flat_map(|(_, of)| of).filter_map(|watched| match watched {
-        Watched::Port(port) => Some(*port),
-        Watched::Component(_) => None,
+        WatchedMember::Port(port) => Some(*port),
+        WatchedMember::Component(_) => None,
     }));
     let mut boxes: BTreeMap<ComponentName, usize> = BTreeMap::new();
     let mut rows: BTreeMap<MemberRef, (PortDirection, usize)> = BTreeMap::new();
     let mut groups: BTreeMap<&str, usize> = BTreeMap::new();
     let mut tones: BTreeSet<RunState> = BTreeSet::new();
-    let mut lines: Vec<(Watched, ComponentName, usize)> = Vec::new();
+    let mut lines: Vec<(WatchedMember, ComponentName, usize)> = Vec::new();
     for (name, component) in &system.components {
         let parent = subsystem(&mut picture, &mut groups, name.prefix());
         let own = name.as_str().rsplit('/').next().unwrap_or(name.as_str());
@@ -92,8 +92,8 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
     }
     for (watched, by, row) in lines {
         let (component, port) = match watched {
-            Watched::Port(port) => (port.component, rows.get(&port)),
-            Watched::Component(name) => (name, None),
+            WatchedMember::Port(port) => (port.component, rows.get(&port)),
+            WatchedMember::Component(name) => (name, None),
         };
         let (Some(a), Some(b)) = (boxes.get(&component), boxes.get(&by)) else { continue };
         let mut edge = Edge::new(*a, *b);
@@ -109,12 +109,12 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
 
 /// What a monitor looks at. Activities are in no picture of components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Watched {
+enum WatchedMember {
     Port(MemberRef),
     Component(ComponentName),
 }
 
-impl std::fmt::Display for Watched {
+impl std::fmt::Display for WatchedMember {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Port(port) => port.fmt(f),
@@ -123,19 +123,19 @@ impl std::fmt::Display for Watched {
     }
 }
 
-fn watches(monitor: &Monitor) -> BTreeSet<Watched> {
+fn watches(monitor: &Monitor) -> BTreeSet<WatchedMember> {
     let mut of = BTreeSet::new();
     monitor.for_each_condition(&mut |condition| match &condition.kind {
-        ConditionKind::IsTrue(signal) => _ = of.insert(Watched::Port(signal.member)),
-        ConditionKind::Silent { port, .. } => _ = of.insert(Watched::Port(*port)),
+        ConditionKind::IsTrue(signal) => _ = of.insert(WatchedMember::Port(signal.member)),
+        ConditionKind::Silent { port, .. } => _ = of.insert(WatchedMember::Port(*port)),
         ConditionKind::InState { component, .. } | ConditionKind::Faulted(component) => {
-            _ = of.insert(Watched::Component(*component));
+            _ = of.insert(WatchedMember::Component(*component));
         }
         _ => {}
     });
     monitor.for_each_signal(&mut |signal| match &signal.kind {
-        SignalKind::Port(signal) => _ = of.insert(Watched::Port(signal.member)),
-        SignalKind::Age(port) | SignalKind::Rate { port, .. } => _ = of.insert(Watched::Port(*port)),
+        SignalKind::Port(signal) => _ = of.insert(WatchedMember::Port(signal.member)),
+        SignalKind::Age(port) | SignalKind::Rate { port, .. } => _ = of.insert(WatchedMember::Port(*port)),
         _ => {}
     });
     of

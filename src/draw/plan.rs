@@ -2,7 +2,7 @@
 
 use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
 use super::text::short;
-use crate::plan::{PlannedStep, Stage};
+use crate::plan::{PlanStage, PlannedStep};
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
 
@@ -76,10 +76,10 @@ fn lanes(picture: &mut Picture, group: usize, steps: &[PlannedStep]) {
     }
 }
 
-fn stage(stage: Stage) -> &'static str {
+fn stage(stage: PlanStage) -> &'static str {
     match stage {
-        Stage::Pre => "pre",
-        Stage::Changes => "changes",
-        Stage::Post => "post",
+        PlanStage::Pre => "pre",
+        PlanStage::Changes => "changes",
+        PlanStage::Post => "post",
     }
 }

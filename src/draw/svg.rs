@@ -1,6 +1,6 @@
 //! A picture as SVG: no script, no font of its own, no outside reference; readable on a light background.
 
-use super::layout::{LINE, Layout, Rect, Route, Run, SMALL, TITLE, header, layout};
+use super::layout::{LINE, Layout, LineRun, Rect, Route, SMALL, TITLE, header, layout};
 use super::picture::{Direction, Node, Picture, Shape, Tone};
 use super::text::{width, xml};
 use std::fmt::Write as _;
@@ -230,7 +230,7 @@ fn path(route: &Route, direction: Direction) -> String {
         );
     }
     let mut out = String::new();
-    let mut before: Option<Run> = None;
+    let mut before: Option<LineRun> = None;
     for run in &route.runs {
         match before {
             None => {

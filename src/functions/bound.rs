@@ -2,10 +2,10 @@
 
 use super::budget::Budget;
 use super::errors::{message_of, undefined_global, without_address};
-use super::host::{Host, Voice};
-use super::tables::Tables;
+use super::tables::{Refused, Tables};
+use super::voice::Voice;
 use crate::limits;
-use crate::model::{Finding, Openings};
+use crate::model::Openings;
 use crate::statechart::{Chart, EdgeId, EventId, Kind, Machine, NodeId, Printer, View};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::cell::{Cell, RefCell};
@@ -28,7 +28,7 @@ pub struct Status {
 }
 
 /// A machine's tables.
-pub struct Bound {
+pub struct BoundMachine {
     pub budget: Rc<Budget>,
     pub voice: Rc<Voice>,
     /// They only grow, and a call that is under way keeps those it began with.
@@ -49,7 +49,7 @@ pub struct Bound {
     /// Resumes the coroutine of a `doo`.
     pub go_on: Function,
     /// Words that functions are called with.
-    pub words: Words,
+    pub words: CallWords,
     /// The model has a `dbg` printer of its own.
     pub traces: Cell<bool>,
     /// The printer of those that have none.
@@ -66,7 +66,7 @@ pub struct Bound {
 }
 
 /// Words that functions are called with.
-pub struct Words {
+pub struct CallWords {
     pub entry: LuaString,
     pub exit: LuaString,
     pub effect: LuaString,
@@ -79,30 +79,23 @@ pub struct Words {
     pub act_leaf: LuaString,
 }
 
-/// Why a machine could not be made of its tables.
-pub enum Refused {
-    Lua(mlua::Error),
-    Findings(Vec<Finding>),
-}
-
-impl From<mlua::Error> for Refused {
-    fn from(error: mlua::Error) -> Self {
-        Self::Lua(error)
-    }
-}
-
-impl Bound {
-    /// Compiles a machine's tables.
-    pub fn new(lua: &Lua, host: &Host, fsm: &Table) -> std::result::Result<Self, Refused> {
-        let (tables, written) = Tables::new(lua, host, fsm)?;
+impl BoundMachine {
+    /// Compiles a machine's tables. `native`: the functions of the Lua part.
+    pub fn new(
+        lua: &Lua,
+        (budget, voice): (&Rc<Budget>, &Rc<Voice>),
+        native: &Table,
+        fsm: &Table,
+    ) -> std::result::Result<Self, Refused> {
+        let (tables, written) = Tables::new(lua, native, fsm)?;
         let given = |key: &str| -> Result<bool> { Ok(matches!(fsm.raw_get(key)?, Value::Function(_))) };
         let polls = given("_polls")?;
         let word = |text: &str| lua.create_string(text);
         let machine = Machine::new(&tables.chart);
         fsm.raw_set("_act_leaf", false)?;
         Ok(Self {
-            budget: host.budget.clone(),
-            voice: host.voice.clone(),
+            budget: budget.clone(),
+            voice: voice.clone(),
             written,
             fsm: fsm.clone(),
             strange: RefCell::default(),
@@ -111,7 +104,7 @@ impl Bound {
             shown_leaf: Cell::new(None),
             thread: RefCell::default(),
             events: RefCell::default(),
-            words: Words {
+            words: CallWords {
                 entry: word("entry")?,
                 exit: word("exit")?,
                 effect: word("effect")?,
@@ -121,9 +114,9 @@ impl Bound {
                 dbg: word("dbg")?,
                 act_leaf: word("_act_leaf")?,
             },
-            go_on: host.native.raw_get("go_on")?,
+            go_on: native.raw_get("go_on")?,
             traces: Cell::new(false),
-            quiet: host.native.raw_get("quiet")?,
+            quiet: native.raw_get("quiet")?,
             failed: RefCell::default(),
             driven: Cell::new(false),
             machine: RefCell::new(Some(machine)),

@@ -1,198 +1,60 @@
-//! What one call may take, and what its errors are called.
+//! What one call may take.
 
-use super::errors::UsedUp;
+use super::count::Count;
 use super::exact;
 #[cfg(target_os = "linux")]
-use super::watch::Watch;
-use crate::limits;
+use super::watch::CallWatch;
 use mlua::{Lua, Result};
-use std::cell::{Cell, OnceCell};
-use std::ffi::CStr;
+use std::cell::Cell;
+#[cfg(target_os = "linux")]
+use std::cell::OnceCell;
 use std::rc::Rc;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// What an error says inside a call that is over; outside it is [`Budget::error`].
-pub const ENDED: &CStr = c"ended: its instructions are used up";
-
-/// What whatever was [interrupted](Budget::interrupted_by) ends with.
-pub const INTERRUPTED: &CStr = c"interrupted by a signal";
 
 /// Counts the instructions of the call under way. Once they are used up every look fails, and what protects calls in Lua
 /// passes that on, so that the call ends wherever it is.
 ///
 /// Counting costs more than most calls. It is exact, from the first instruction on, until [`Budget::count_late`]. What
 /// instructions set in motion (`work.rs`) is always counted.
-#[derive(Default)]
 pub struct Budget {
-    used: Cell<u64>,
-    /// Of these, what was done beside instructions: elements gone through, memory asked for, steps of patterns.
-    work: Cell<u64>,
-    /// Of these, what ticks stand for.
-    ticks: Cell<u64>,
-    limit: Cell<u64>,
-    /// Processor time of one call where every instruction is counted: for what no count sees.
-    time: Duration,
-    began: Cell<Duration>,
-    looks: Cell<u32>,
-    /// A large piece of memory was asked for: single instructions may take long.
-    large: Cell<bool>,
-    out_of_time: Cell<bool>,
+    /// What the call under way has used.
+    pub count: Rc<Count>,
     depth: Cell<u32>,
-    over: Cell<bool>,
-    /// Somebody outside ends what is under way, from another thread.
-    interrupt: OnceCell<Arc<AtomicBool>>,
     /// Finds the calls that take long; none: all are counted.
     #[cfg(target_os = "linux")]
-    watch: OnceCell<Watch>,
+    watch: OnceCell<CallWatch>,
 }
-
-/// Looks at the count between two looks at the time.
-const LOOKS_WITHOUT_TIME: u32 = 10;
-
-/// Bytes of a piece of memory with which a single instruction may take long.
-const LARGE: usize = 256 * 1024;
-
-const LONG: &str = "are there very long texts or lists?";
 
 impl Budget {
     /// Puts a budget on all code of a Lua state, coroutines included. `time` is the processor time that a call may take
     /// where all is counted.
     pub fn install(lua: &Lua, time: Duration) -> Result<Rc<Self>> {
-        let budget = Rc::new(Self { limit: Cell::new(limits::LUA_INSTRUCTIONS), time, ..Self::default() });
+        let count = Rc::new(Count::new(time));
         exact::begin(lua)?;
-        Ok(budget)
+        #[cfg(target_os = "linux")]
+        let budget = Self { count, depth: Cell::new(0), watch: OnceCell::new() };
+        #[cfg(not(target_os = "linux"))]
+        let budget = Self { count, depth: Cell::new(0) };
+        Ok(Rc::new(budget))
     }
 
-    /// From now on counts the instructions of a call only when it has taken longer than [`limits::CALL_TICK`] on this
-    /// thread. Where the operating system gives no timer for that, every call is counted as before.
-    pub fn count_late(self: &Rc<Self>, lua: &Lua) {
+    /// From now on counts the instructions of a call only when it has taken longer than
+    /// [`limits::CALL_TICK`](crate::limits::CALL_TICK) on this thread. Where the operating system gives no timer for that,
+    /// every call is counted as before.
+    pub fn count_late(&self, lua: &Lua) {
         #[cfg(target_os = "linux")]
         {
-            let budget = Rc::downgrade(self);
-            let look = move |instructions| {
-                budget.upgrade().is_some_and(|budget| {
-                    if instructions == limits::CALL_TICK_INSTRUCTIONS {
-                        budget.ticks.set(budget.ticks.get() + u64::from(instructions));
-                    }
-                    budget.look(instructions)
-                })
-            };
-            if let Some(watch) = Watch::start(lua, look)
+            let count = Rc::downgrade(&self.count);
+            let look = move |instructions| count.upgrade().is_some_and(|count| count.ticked(instructions));
+            if let Some(watch) = CallWatch::start(lua, look)
                 && exact::end(lua).is_ok()
             {
                 let _ = self.watch.set(watch);
+                self.count.count_late();
             }
         }
         #[cfg(not(target_os = "linux"))]
         let _ = lua;
-    }
-
-    /// Once `interrupt` is set a call ends wherever it is, as if its budget were used up, with [`INTERRUPTED`]. For good.
-    pub fn interrupted_by(&self, interrupt: Arc<AtomicBool>) {
-        let _ = self.interrupt.set(interrupt);
-    }
-
-    fn is_interrupted(&self) -> bool {
-        self.interrupt.get().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed))
-    }
-
-    /// Whether the call under way has to end: its budget is used up, or it was interrupted.
-    pub fn is_over(&self) -> bool {
-        self.over.get() || self.is_interrupted()
-    }
-
-    /// What an error says inside a call that [is over](Self::is_over).
-    pub fn ended(&self) -> &'static CStr {
-        if !self.over.get() && self.is_interrupted() { INTERRUPTED } else { ENDED }
-    }
-
-    /// Whether only calls that take long are counted.
-    pub(super) fn counts_late(&self) -> bool {
-        #[cfg(target_os = "linux")]
-        return self.watch.get().is_some();
-        #[cfg(not(target_os = "linux"))]
-        false
-    }
-
-    /// So many instructions more; whether they are too many.
-    pub(super) fn look(&self, instructions: u32) -> bool {
-        self.add(u64::from(instructions))
-    }
-
-    /// The same where every instruction is counted; there the time is looked at too, for what no count sees: instructions
-    /// that compare texts of megabytes, or pass a million values.
-    pub(super) fn look_exactly(&self, instructions: u32) -> bool {
-        self.looks.set(self.looks.get().wrapping_add(1));
-        // Asking for the time takes as long as some twenty instructions.
-        if (self.large.get() || self.looks.get().is_multiple_of(LOOKS_WITHOUT_TIME))
-            && processor_time().saturating_sub(self.began.get()) > self.time
-        {
-            self.out_of_time.set(true);
-            self.over.set(true);
-        }
-        self.look(instructions) || self.is_over()
-    }
-
-    /// Something goes through so many elements; whether that is too much.
-    pub(super) fn gone_through(&self, elements: u64) -> bool {
-        self.more_work(elements / limits::CALL_ELEMENTS)
-    }
-
-    /// Memory is asked for; whether that is too much.
-    pub(super) fn allocated(&self, bytes: usize) -> bool {
-        if bytes >= LARGE {
-            self.large.set(true);
-        }
-        self.more_work((bytes / limits::CALL_BYTES) as u64)
-    }
-
-    fn more_work(&self, instructions: u64) -> bool {
-        self.work.set(self.work.get().saturating_add(instructions));
-        self.add(instructions)
-    }
-
-    fn add(&self, instructions: u64) -> bool {
-        self.used.set(self.used.get().saturating_add(instructions));
-        let over = self.used.get() > self.limit.get();
-        if over {
-            self.over.set(true);
-        }
-        over
-    }
-
-    /// Counts the steps of something that is no Lua, each like an instruction; `false`: they are used up, or it has to end.
-    pub fn steps(&self) -> impl FnMut() -> bool + '_ {
-        let mut steps = 0;
-        move || {
-            steps += 1;
-            if steps < limits::CALL_LOOK {
-                return true;
-            }
-            steps = 0;
-            !(self.more_work(u64::from(limits::CALL_LOOK)) || self.is_over())
-        }
-    }
-
-    /// What a call that is over ends with: what its budget was used up by, if that is why.
-    pub fn error(&self) -> mlua::Error {
-        if !self.over.get() && self.is_interrupted() {
-            return mlua::Error::runtime(INTERRUPTED.to_string_lossy());
-        }
-        let (used, millions) = (self.used.get(), self.limit.get() / 1_000_000);
-        let text = if self.out_of_time.get() {
-            format!("ended after {} s of processor time: {LONG}", self.time.as_secs())
-        } else if self.ticks.get() > used / 2 {
-            let ticks = self.ticks.get() / u64::from(limits::CALL_TICK_INSTRUCTIONS);
-            let seconds = limits::CALL_TICK.as_secs_f64() * ticks as f64;
-            format!("ended after {seconds:.1} s of processor time: {LONG}")
-        } else if self.work.get() > used / 2 {
-            format!("ended: what it let the library do counts as more than {millions} million instructions: {LONG}")
-        } else {
-            format!("ended after {millions} million instructions: is there an endless loop?")
-        };
-        mlua::Error::external(UsedUp(text))
     }
 
     /// Makes a call of at most `limit` instructions. A call inside another shares the outer one's budget.
@@ -209,23 +71,10 @@ impl Budget {
         if !outermost {
             return call();
         }
-        for counter in [&self.used, &self.work, &self.ticks] {
-            counter.set(0);
-        }
-        self.limit.set(limit);
-        if !self.counts_late() {
-            self.began.set(processor_time());
-            self.looks.set(0);
-            self.out_of_time.set(false);
-        }
-        let outcome = exact::during(self, || self.watched(call));
+        self.count.begin(limit);
+        let outcome = exact::during(&self.count, || self.watched(call));
         drop(leave);
-        if self.over.get() {
-            let error = self.error();
-            self.over.set(false);
-            return Err(error);
-        }
-        outcome
+        self.count.end().map_or(outcome, Err)
     }
 
     #[cfg(target_os = "linux")]
@@ -240,16 +89,4 @@ impl Budget {
     fn watched<R>(&self, call: impl FnOnce() -> R) -> R {
         call()
     }
-}
-
-/// The processor's time that this thread has used. Not the time of day: a busy machine must not refuse what an idle one
-/// takes.
-pub fn processor_time() -> Duration {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is a valid place to write to, and the call keeps no reference to it.
-    let answer = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-    if answer != 0 {
-        return Duration::ZERO;
-    }
-    Duration::new(u64::try_from(time.tv_sec).unwrap_or(0), u32::try_from(time.tv_nsec).unwrap_or(0))
 }

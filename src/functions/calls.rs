@@ -1,32 +1,32 @@
 //! The hook: how the engine calls a machine's functions, with what rFSM gives them.
 
-use super::bound::Bound;
+use super::bound::BoundMachine;
 use super::host::Host;
 use super::tracing;
 use crate::limits;
 use crate::model::EventName;
 use crate::model::statechart::FunctionId;
-use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, NodeId, Place, Printer, Queue, Said, Trace, View};
+use crate::statechart::{ActionPlace, Chart, Doo, EdgeId, EventId, Hook, NodeId, Printer, Queue, Said, Trace, View};
 use mlua::thread::ThreadStatus;
-use mlua::{Lua, LuaString, Result, Table, Value};
+use mlua::{Lua, LuaString, Result, Value};
 use std::rc::Rc;
 use std::sync::Arc;
 
 /// Calls the functions of one machine.
-pub struct Calls {
+pub struct Functions {
     /// What a coordinator's functions share; an inner machine's is held by the outermost one's. It goes before the state.
     pub(super) _host: Option<Rc<Host>>,
     pub(super) lua: Lua,
-    pub(super) bound: Rc<Bound>,
+    pub(super) bound: Rc<BoundMachine>,
 }
 
-impl std::fmt::Debug for Calls {
+impl std::fmt::Debug for Functions {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Functions").field("count", &self.bound.tables().functions()).finish()
     }
 }
 
-impl Calls {
+impl Functions {
     /// Calls a step hook with the table of the step's events. `false`: it raised an error that ends the step.
     fn step_hook(&self, field: &LuaString, view: &mut View<'_>) -> bool {
         let bound = &self.bound;
@@ -125,7 +125,7 @@ impl Calls {
     }
 }
 
-impl Hook for Calls {
+impl Hook for Functions {
     fn event(&mut self, _: &Chart, name: EventName) -> EventId {
         match self.lua.create_string(name.as_str()) {
             Ok(text) => self.bound.event(Value::String(text)),
@@ -269,27 +269,29 @@ impl Hook for Calls {
         }
     }
 
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         let bound = &self.bound;
         let tables = bound.tables();
         let function = tables.function(function);
         let outcome = match place {
-            Place::Entry(state) => {
+            ActionPlace::Entry(state) => {
                 bound.calling(view, || function.call::<()>((&bound.fsm, tables.node(state), &bound.words.entry)))
             }
-            Place::Exit(state) => {
+            ActionPlace::Exit(state) => {
                 bound.calling(view, || function.call::<()>((&bound.fsm, tables.node(state), &bound.words.exit)))
             }
-            Place::Effect(edge) => bound.events(&self.lua, view).and_then(|events| {
+            ActionPlace::Effect(edge) => bound.events(&self.lua, view).and_then(|events| {
                 let words = &bound.words;
                 bound.calling(view, || function.call::<()>((&bound.fsm, tables.edge(edge), &words.effect, events)))
             }),
         };
         if let Err(error) = outcome {
             let (tag, text) = match place {
-                Place::Entry(state) => ("ENTRY", format!("error executing entry of {}: ", tables.chart.fqn(state))),
-                Place::Exit(state) => ("EXIT", format!("error executing exit of {}: ", tables.chart.fqn(state))),
-                Place::Effect(edge) => {
+                ActionPlace::Entry(state) => {
+                    ("ENTRY", format!("error executing entry of {}: ", tables.chart.fqn(state)))
+                }
+                ActionPlace::Exit(state) => ("EXIT", format!("error executing exit of {}: ", tables.chart.fqn(state))),
+                ActionPlace::Effect(edge) => {
                     ("EFFECT", format!("error executing effect of {}: ", bound.transition_text(edge)))
                 }
             };
@@ -364,9 +366,4 @@ impl Hook for Calls {
         let text = format!("connectors lead round in a circle at {}: no path is taken", chart.fqn(connector));
         self.bound.voice.say(Printer::Err, &text);
     }
-}
-
-/// A table's address, by which machines and states are known.
-pub fn address(table: &Table) -> usize {
-    table.to_pointer() as usize
 }

@@ -10,11 +10,11 @@ use mlua::{Lua, Result};
 use std::cell::Cell;
 use std::ptr;
 
-use super::budget::Budget;
+use super::count::Count;
 
 thread_local! {
     /// Whose call is under way on this thread.
-    static CURRENT: Cell<*const Budget> = const { Cell::new(ptr::null()) };
+    static CURRENT: Cell<*const Count> = const { Cell::new(ptr::null()) };
 }
 
 /// Counts the instructions of all code of a state for [`during`]. Coroutines inherit it from who makes them.
@@ -29,15 +29,15 @@ pub fn end(lua: &Lua) -> Result<()> {
     unsafe { lua.exec_raw((), |state| set(state, false)) }
 }
 
-/// Makes a call whose instructions `budget` counts.
-pub fn during<R>(budget: &Budget, call: impl FnOnce() -> R) -> R {
-    struct Leave(*const Budget);
+/// Makes a call whose instructions `count` counts.
+pub fn during<R>(count: &Count, call: impl FnOnce() -> R) -> R {
+    struct Leave(*const Count);
     impl Drop for Leave {
         fn drop(&mut self) {
             CURRENT.set(self.0);
         }
     }
-    let _leave = Leave(CURRENT.replace(budget));
+    let _leave = Leave(CURRENT.replace(count));
     call()
 }
 
@@ -45,7 +45,7 @@ pub fn during<R>(budget: &Budget, call: impl FnOnce() -> R) -> R {
 ///
 /// # Safety
 /// For who is called by Lua inside of [`during`], and is done before that is.
-pub unsafe fn current<'a>() -> Option<&'a Budget> {
+pub unsafe fn current<'a>() -> Option<&'a Count> {
     // SAFETY: `during` put it there from a borrow that lives until it has taken it away again.
     unsafe { CURRENT.get().as_ref() }
 }
@@ -54,10 +54,10 @@ pub unsafe fn current<'a>() -> Option<&'a Budget> {
 /// `state` is a living thread of Lua that belongs to this thread of the operating system.
 unsafe fn set(state: *mut lua_State, on: bool) {
     let every = limits::CALL_LOOK_EXACT.cast_signed();
-    // SAFETY: as above; `count` may be called whenever Lua calls hooks.
+    // SAFETY: as above; `hook` may be called whenever Lua calls hooks.
     unsafe {
         if on {
-            ffi::lua_sethook(state, Some(count), ffi::LUA_MASKCOUNT, every)
+            ffi::lua_sethook(state, Some(hook), ffi::LUA_MASKCOUNT, every)
         } else {
             ffi::lua_sethook(state, None, 0, 0)
         }
@@ -65,14 +65,14 @@ unsafe fn set(state: *mut lua_State, on: bool) {
 }
 
 /// The hook. It holds nothing that a jump of Lua's would leave behind.
-unsafe extern "C-unwind" fn count(state: *mut lua_State, _: *mut ffi::lua_Debug) {
+unsafe extern "C-unwind" fn hook(state: *mut lua_State, _: *mut ffi::lua_Debug) {
     // SAFETY: Lua runs inside of `during`. Lua guarantees room for what is pushed here; an error ends the hook and the instruction it was called at.
     unsafe {
-        let Some(budget) = current() else { return };
-        if budget.counts_late() {
+        let Some(count) = current() else { return };
+        if count.counts_late() {
             set(state, false);
-        } else if budget.look_exactly(limits::CALL_LOOK_EXACT) {
-            ffi::lua_pushstring(state, budget.ended().as_ptr());
+        } else if count.look_exactly(limits::CALL_LOOK_EXACT) {
+            ffi::lua_pushstring(state, count.ended().as_ptr());
             ffi::lua_error(state)
         }
     }

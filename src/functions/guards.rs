@@ -19,7 +19,7 @@ const LOOPS: &str = include_str!("lua/loops.lua");
 pub struct Guards {
     /// Of all calls.
     pub budget: Rc<Budget>,
-    _memory: work::Counted,
+    _memory: work::CountedMemory,
 }
 
 /// Puts a budget and its guards on a state that has the libraries it will have. `native` is given what the Lua part borrows.
@@ -34,9 +34,9 @@ pub fn install(lua: &Lua, native: &Table, bytes: usize, time: Duration) -> Resul
     native.raw_set("charge", &charge)?;
     loops(lua, &charge)?;
     let look = budget.clone();
-    native.raw_set("over", lua.create_function(move |_, ()| Ok(look.is_over()))?)?;
+    native.raw_set("over", lua.create_function(move |_, ()| Ok(look.count.is_over()))?)?;
     let ended = budget.clone();
-    let failure = move |lua: &Lua, ()| lua.create_string(ended.ended().to_bytes());
+    let failure = move |lua: &Lua, ()| lua.create_string(ended.count.ended().to_bytes());
     native.raw_set("failure", lua.create_function(failure)?)?;
     native.raw_set(
         "text_of",
@@ -99,8 +99,8 @@ fn patterns_of(lua: &Lua, native: &Table, budget: &Rc<Budget>) -> Result<()> {
             Some(rest) => (true, rest),
             None => (false, &*pattern),
         };
-        match patterns::walk(&text, pattern, from, matches, anchored, &mut spent.steps()) {
-            Err(patterns::Stop::Over) => Err(spent.error()),
+        match patterns::walk(&text, pattern, from, matches, anchored, &mut spent.count.steps()) {
+            Err(patterns::Stop::Over) => Err(spent.count.error()),
             _ => Ok(()),
         }
     };
@@ -108,8 +108,8 @@ fn patterns_of(lua: &Lua, native: &Table, budget: &Rc<Budget>) -> Result<()> {
     let spent = budget.clone();
     let walk_plain = move |_: &Lua, (text, what, from): (LuaString, LuaString, Option<i64>)| {
         let (text, what) = (text.as_bytes(), what.as_bytes());
-        match patterns::walk_plain(&text, &what, start(from, text.len()), &mut spent.steps()) {
-            Err(patterns::Stop::Over) => Err(spent.error()),
+        match patterns::walk_plain(&text, &what, start(from, text.len()), &mut spent.count.steps()) {
+            Err(patterns::Stop::Over) => Err(spent.count.error()),
             _ => Ok(()),
         }
     };

@@ -3,8 +3,7 @@
 //! The Lua part has put the tables in their places and asks here for the chart. Questions are answered by the chart as it
 //! is from then on; a step that is under way goes on with the one it began with.
 
-use super::bound::Bound;
-use super::host::Host;
+use super::bound::BoundMachine;
 use super::lower::{self, Lowered};
 use crate::model::{EventName, Origin};
 use crate::statechart::{Addition, Chart, EventId, NodeId};
@@ -14,15 +13,15 @@ use std::rc::Rc;
 /// Adds `object` to the machine, as a child of `parent` if it has a name; answers what keeps it from that.
 pub fn merge(
     lua: &Lua,
-    host: &Host,
-    bound: &Bound,
+    native: &Table,
+    bound: &BoundMachine,
     (parent, object): (NodeId, &Table),
     name: Option<&str>,
 ) -> Result<Option<String>> {
     if bound.tables().node_of(object).is_some() || bound.tables().edge_of(object).is_some() {
         return Ok(Some("it is in this machine already".to_owned()));
     }
-    let what = if name.is_some() { kind(host, object)? } else { "transition".to_owned() };
+    let what = if name.is_some() { kind(native, object)? } else { "transition".to_owned() };
     // Read as the only thing in an empty root.
     let list = lua.create_table()?;
     let row = |what: &str, scope: usize, table: &Table, name: Option<&str>| -> Result<()> {
@@ -35,7 +34,7 @@ pub fn merge(
     row("state", 0, &lua.create_table()?, Some("root"))?;
     row(&what, 1, object, name)?;
     let Lowered { mut chart, functions, values, problems, .. } =
-        lower::lower(&list, &host.native, &mut |_, _, _| Origin::NONE)?;
+        lower::lower(&list, native, &mut |_, _, _| Origin::NONE)?;
     if !problems.is_empty() {
         let all: Vec<String> = problems.into_iter().map(|problem| problem.message).collect();
         return Ok(Some(all.join("; ")));
@@ -104,7 +103,7 @@ fn unused(chart: &Chart) -> EventName {
 }
 
 /// What a table is, as a model says it.
-fn kind(host: &Host, object: &Table) -> Result<String> {
-    let kind: Function = host.native.raw_get("kind")?;
+fn kind(native: &Table, object: &Table) -> Result<String> {
+    let kind: Function = native.raw_get("kind")?;
     Ok(kind.call::<Option<String>>(object)?.unwrap_or_default())
 }

@@ -12,10 +12,13 @@ mod aside;
 mod bound;
 mod budget;
 mod calls;
+mod count;
 mod errors;
 mod exact;
 mod guards;
 mod host;
+#[cfg(any(test, feature = "internals"))]
+mod lab;
 mod lower;
 mod merge;
 mod native;
@@ -25,13 +28,18 @@ mod tables;
 mod tracing;
 mod unset;
 mod values;
+mod voice;
 #[cfg(target_os = "linux")]
 mod watch;
 mod work;
+mod world;
 
 pub use aside::Field;
-pub use budget::{Budget, INTERRUPTED, processor_time};
+pub use budget::Budget;
+pub use count::{INTERRUPTED, processor_time};
 pub use errors::{Short, message_within};
 pub use guards::{Guards, install as guard, loops};
+#[cfg(any(test, feature = "internals"))]
+pub use lab::Lab;
 pub use lower::{Problem, Spot};
-pub use open::{Functions, Lab, NotOpened, Opener, Reads, read};
+pub use open::{Functions, NotOpened, Opener, Reads, read};

@@ -1,13 +1,14 @@
 //! What the Lua part borrows from here: constructors that remember where they were called, and inner machines.
 
-use super::bound::{Bound, Refused};
-use super::calls::{Calls, address};
+use super::bound::{BoundMachine, Status};
+use super::calls::Functions;
 use super::host::{Host, run};
 use super::lower::Spot;
 use super::merge::merge;
+use super::tables::{Refused, address};
 use super::values::to_json;
 use crate::limits;
-use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, Step};
+use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, TurnResult};
 use crate::time::Time;
 use mlua::{Function, Lua, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
@@ -53,12 +54,14 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let _loading = host.loading(&shown)?;
         Ok(run(lua, &shown, &text)?.pop_front().unwrap_or(Value::Nil))
     })?;
-    shared(lua, host, "json", |_, host, value: Value| Ok(to_json(&value, 0, &mut host.budget.steps())?.to_string()))?;
+    shared(lua, host, "json", |_, host, value: Value| {
+        Ok(to_json(&value, 0, &mut host.budget.count.steps())?.to_string())
+    })?;
     shared(lua, host, "bind", |lua, host, fsm: Table| {
         if host.machines.borrow().len() >= limits::INNER_MACHINES {
             return Ok(Some(format!("a coordinator makes at most {} machines", limits::INNER_MACHINES)));
         }
-        match Bound::new(lua, host, &fsm) {
+        match BoundMachine::new(lua, (&host.budget, &host.voice), &host.native, &fsm) {
             Ok(bound) => {
                 host.machines.borrow_mut().insert(address(&fsm), Rc::new(bound));
                 Ok(None)
@@ -125,7 +128,7 @@ fn constructor(lua: &Lua, host: &Rc<Host>) -> Result<Function> {
 }
 
 /// The machine of a root.
-fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<Bound>> {
+fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<BoundMachine>> {
     host.machines
         .borrow()
         .get(&address(fsm))
@@ -134,7 +137,7 @@ fn machine_of(host: &Host, fsm: &Table) -> Result<Rc<Bound>> {
 }
 
 /// The machine a state belongs to, and which state of it.
-fn state_of(host: &Host, state: &Table) -> Result<(Rc<Bound>, NodeId)> {
+fn state_of(host: &Host, state: &Table) -> Result<(Rc<BoundMachine>, NodeId)> {
     let mut root = state.clone();
     for _ in 0..=limits::CHART_DEPTH {
         match root.raw_get::<Option<Table>>("_parent")? {
@@ -217,7 +220,7 @@ fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let Some(parent) = bound.tables().node_of(&parent) else {
             return Ok(Some("its parent is no state of this machine".to_owned()));
         };
-        let refused = merge(lua, host, &bound, (parent, &object), name.as_deref())?;
+        let refused = merge(lua, &host.native, &bound, (parent, &object), name.as_deref())?;
         if refused.is_none() {
             let mut status = bound.status.borrow_mut();
             status.outbox.iter_mut().for_each(|event| *event = bound.known_now(*event));
@@ -262,7 +265,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let bound = own(host, &fsm, "reset")?;
         let mut machine = taken(&bound)?;
         machine.reset(&bound.tables().chart);
-        *bound.status.borrow_mut() = super::bound::Status { room: limits::CHART_QUEUE, ..Default::default() };
+        *bound.status.borrow_mut() = Status { room: limits::CHART_QUEUE, ..Default::default() };
         bound.show_leaf(None);
         *bound.thread.borrow_mut() = None;
         *bound.machine.borrow_mut() = Some(machine);
@@ -275,7 +278,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
             return Ok(()); // a connector, or nothing of this machine: there is nothing to leave
         };
         let mut machine = taken(&bound)?;
-        machine.leave(&tables.chart, node, &mut Calls { lua: lua.clone(), bound: bound.clone(), _host: None });
+        machine.leave(&tables.chart, node, &mut Functions { lua: lua.clone(), bound: bound.clone(), _host: None });
         bound.status.borrow_mut().leaf = machine.leaf();
         bound.show_leaf(machine.leaf());
         *bound.machine.borrow_mut() = Some(machine);
@@ -293,7 +296,7 @@ fn stepping(lua: &Lua, host: &Rc<Host>) -> Result<()> {
 }
 
 /// A machine that Lua steps.
-fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<Bound>> {
+fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<BoundMachine>> {
     let bound = machine_of(host, fsm)?;
     if bound.driven.get() {
         return Err(mlua::Error::runtime(format!("rfsm.{what}: the coordinator is stepped by Davit")));
@@ -301,13 +304,13 @@ fn own(host: &Host, fsm: &Table, what: &str) -> Result<Rc<Bound>> {
     Ok(bound)
 }
 
-fn taken(bound: &Bound) -> Result<Machine> {
+fn taken(bound: &BoundMachine) -> Result<Machine> {
     let machine = bound.machine.borrow_mut().take();
     machine.ok_or_else(|| mlua::Error::runtime("this machine is being stepped just now"))
 }
 
 /// What was sent to a machine that is not being stepped goes straight into its queue.
-fn flush(bound: &Bound) {
+fn flush(bound: &BoundMachine) {
     if let Some(machine) = bound.machine.borrow_mut().as_mut() {
         let mut status = bound.status.borrow_mut();
         for event in status.outbox.drain(..) {
@@ -319,8 +322,8 @@ fn flush(bound: &Bound) {
 }
 
 /// rFSM's step: turns until `steps` of them counted or nothing is left to do.
-fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps: f64) -> Result<bool> {
-    let mut calls = Calls { lua: lua.clone(), bound: bound.clone(), _host: None };
+fn drive(lua: &Lua, host: &Host, bound: &Rc<BoundMachine>, machine: &mut Machine, steps: f64) -> Result<bool> {
+    let mut calls = Functions { lua: lua.clone(), bound: bound.clone(), _host: None };
     bound.look_for_dbg();
     let mut left = steps;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and the budget ends it long before
@@ -335,14 +338,14 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<Bound>, machine: &mut Machine, steps
             return Err(error);
         }
         let searched = u32::try_from(machine.work().saturating_sub(before)).unwrap_or(u32::MAX);
-        if host.budget.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
-            return Err(host.budget.error());
+        if host.budget.count.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
+            return Err(host.budget.count.error());
         }
         let idle = match turn {
-            Step::NotEntered => return Ok(false),
-            Step::Unmatched => continue,
-            Step::Entered | Step::Taken => false,
-            Step::Quiet { idle } => idle,
+            TurnResult::NotEntered => return Ok(false),
+            TurnResult::Unmatched => continue,
+            TurnResult::Entered | TurnResult::Taken => false,
+            TurnResult::Quiet { idle } => idle,
         };
         left -= 1.0;
         if left < 1.0 {

@@ -1,22 +1,20 @@
 //! From a program to its chart, and from a program to functions that can be called.
 
 use super::aside::{self, Field};
-use super::calls::{Calls, address};
+pub use super::calls::Functions;
 use super::errors::{Short, message_of, short_of, undefined_global};
-use super::host::{Host, Reader, run, run_program, state};
+use super::host::{FileReader, Host};
 use super::lower::{self, Problem, Spot};
-use super::unset::Watch;
+use super::tables::address;
+use super::unset::UnsetWatch;
+use super::world::{run_program, state};
 use crate::limits;
-use crate::model::program::{Beside, Openings, Program};
+use crate::model::program::{Beside, Program};
 use crate::model::{Origin, Statechart};
 use crate::statechart::{Printer, Said};
 use crate::time::Clock;
-use mlua::{Function, Lua, MultiValue, Table, Value};
-use std::collections::BTreeMap;
-use std::rc::Rc;
+use mlua::{Function, Lua, Table, Value};
 use std::sync::Arc;
-
-pub use super::calls::Calls as Functions;
 
 /// Why a program gives no machine.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -37,7 +35,7 @@ pub struct NotOpened {
 }
 
 impl NotOpened {
-    fn new(file: &str, error: &mlua::Error) -> Self {
+    pub(super) fn new(file: &str, error: &mlua::Error) -> Self {
         let syntax = matches!(error, mlua::Error::SyntaxError { .. });
         let full = message_of(error);
         let missing = undefined_global(&full).map(str::to_owned);
@@ -82,12 +80,12 @@ pub struct Reads {
 /// [`NotOpened`]: a text does not parse, fails, is over its budget, or gives no state.
 pub fn read(
     program: &Program,
-    reader: Reader,
+    reader: FileReader,
     place: &mut dyn FnMut(Option<&Spot>, &str) -> Origin,
 ) -> Result<Reads, NotOpened> {
     let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
     let (lua, host) = state(program.open, reader).map_err(failed)?;
-    let watch = Watch::begin(&lua, &host.native).map_err(failed)?;
+    let watch = UnsetWatch::begin(&lua, &host.native).map_err(failed)?;
     let template = template(&lua, &host, program);
     let unset = watch.end(&host.native).map_err(failed)?;
     let template = template?;
@@ -150,7 +148,7 @@ impl Opener {
         let program = &*self.program;
         let failed = |error: mlua::Error| NotOpened::new(&program.file, &error);
         let files = program.files.clone();
-        let reader: Reader = Box::new(move |name| match files.get(name) {
+        let reader: FileReader = Box::new(move |name| match files.get(name) {
             Some((shown, text)) => Ok((shown.clone(), text.to_string())),
             None => Err(format!("`{name}` was not loaded before")),
         });
@@ -184,55 +182,6 @@ impl Opener {
             host.budget.count_late(&lua);
         }
         bound.machine.borrow_mut().take();
-        Ok(Calls { lua, bound, _host: Some(host) })
-    }
-}
-
-/// A Lua state with rFSM in it and no coordinator: texts that make and step machines of their own. For trying things out,
-/// and for tests of the semantics.
-pub struct Lab {
-    host: Rc<Host>,
-    lua: Lua,
-}
-
-impl Lab {
-    /// A fresh one, that can load the given files.
-    ///
-    /// # Errors
-    /// When Lua has no memory for it.
-    pub fn new(files: BTreeMap<String, String>, open: Openings) -> Result<Self, NotOpened> {
-        let reader: Reader = Box::new(move |name| {
-            files
-                .get(name)
-                .map(|text| (name.to_owned(), text.clone()))
-                .ok_or_else(|| format!("there is no file `{name}`"))
-        });
-        let (lua, host) = state(open, reader).map_err(|error| NotOpened::new("", &error))?;
-        Ok(Self { lua, host })
-    }
-
-    /// Runs a text; answers what it returned, as JSON.
-    ///
-    /// # Errors
-    /// [`NotOpened`]: it does not parse, fails, or is over its budget.
-    pub fn run(&self, name: &str, text: &str) -> Result<Vec<serde_json::Value>, NotOpened> {
-        let failed = |error: mlua::Error| NotOpened::new(name, &error);
-        let values: MultiValue =
-            self.host.budget.spend(limits::LUA_INSTRUCTIONS, || run(&self.lua, name, text)).map_err(failed)?;
-        let mut any = || true;
-        values.iter().map(|value| super::values::to_json(value, 0, &mut any).map_err(failed)).collect()
-    }
-
-    /// What was printed since the last time.
-    pub fn said(&self) -> Vec<Said> {
-        let mut said = Vec::new();
-        self.host.voice.drain(&mut said);
-        said
-    }
-}
-
-impl std::fmt::Debug for Lab {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Lab")
+        Ok(Functions { lua, bound, _host: Some(host) })
     }
 }

@@ -62,7 +62,7 @@ pub fn walk(
 ) -> Walked<()> {
     let (mut at, mut last, mut found) = (from, None, 0);
     while at <= text.len() && found < matches {
-        let mut walk = Walk { text, pattern, captures: Vec::new(), depth: 0, spend };
+        let mut walk = PatternWalk { text, pattern, captures: Vec::new(), depth: 0, spend };
         match walk.run(at, 0)? {
             Some(end) if last != Some(end) => {
                 found += 1;
@@ -170,7 +170,7 @@ enum Length {
 }
 
 /// One attempt at one place.
-struct Walk<'a> {
+struct PatternWalk<'a> {
     text: &'a [u8],
     pattern: &'a [u8],
     captures: Vec<(usize, Length)>,
@@ -178,7 +178,7 @@ struct Walk<'a> {
     spend: &'a mut dyn FnMut() -> bool,
 }
 
-impl Walk<'_> {
+impl PatternWalk<'_> {
     /// Where the pattern from `p` on ends when it matches from `s` on.
     fn run(&mut self, s: usize, p: usize) -> Walked<Option<usize>> {
         self.depth += 1;
@@ -356,7 +356,7 @@ mod tests {
                 left -= 1;
                 left > 0
             };
-            let mut walk = Walk { text, pattern, captures: Vec::new(), depth: 0, spend: &mut spend };
+            let mut walk = PatternWalk { text, pattern, captures: Vec::new(), depth: 0, spend: &mut spend };
             if let Some(end) = walk.run(at, 0)? {
                 return Ok(Some((at, end)));
             }

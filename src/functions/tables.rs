@@ -1,8 +1,5 @@
 //! Which function, state, transition and event of a chart is which in Lua.
 
-use super::bound::Refused;
-use super::calls::address;
-use super::host::Host;
 use super::lower::{self, Lowered};
 use crate::model::statechart::FunctionId;
 use crate::model::{EventName, Finding, Origin, Severity, Statechart};
@@ -32,16 +29,28 @@ pub struct Tables {
     odd: Table,
 }
 
+/// Why a machine could not be made of its tables.
+pub enum Refused {
+    Lua(mlua::Error),
+    Findings(Vec<Finding>),
+}
+
+impl From<mlua::Error> for Refused {
+    fn from(error: mlua::Error) -> Self {
+        Self::Lua(error)
+    }
+}
+
 impl Tables {
     /// Compiles a machine's tables; answers also the chart as written.
-    pub fn new(lua: &Lua, host: &Host, fsm: &Table) -> std::result::Result<(Self, Statechart), Refused> {
-        let list = lower::flat(&host.native, fsm)?;
+    pub fn new(lua: &Lua, native: &Table, fsm: &Table) -> std::result::Result<(Self, Statechart), Refused> {
+        let list = lower::flat(native, fsm)?;
         // A transition is known by its number; nothing else needs a place here.
         let mut places = |_: Option<usize>, number: usize, word: &str| {
             if word.is_empty() { Origin(u32::try_from(number).unwrap_or(0)) } else { Origin::NONE }
         };
         let Lowered { chart: written, functions, transitions, values, problems } =
-            lower::lower(&list, &host.native, &mut places)?;
+            lower::lower(&list, native, &mut places)?;
         if !problems.is_empty() {
             let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
             return Err(Refused::Findings(findings.collect()));
@@ -196,4 +205,9 @@ impl Tables {
         }
         Ok(())
     }
+}
+
+/// A table's address, by which machines and states are known.
+pub fn address(table: &Table) -> usize {
+    table.to_pointer() as usize
 }

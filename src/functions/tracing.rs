@@ -1,12 +1,12 @@
 //! The words of a model's own `dbg` printer: rFSM's tags, with the names of what they are about.
 
-use super::bound::Bound;
+use super::bound::BoundMachine;
 use crate::limits;
 use crate::statechart::{Chart, EventId, NodeId, Trace, View};
 use mlua::{Lua, Result, Value};
 
 /// Tells the model's `dbg` what happens. An error of it is told to `err`.
-pub fn tell(lua: &Lua, bound: &Bound, what: Trace<'_>, view: &mut View<'_>) {
+pub fn tell(lua: &Lua, bound: &BoundMachine, what: Trace<'_>, view: &mut View<'_>) {
     let chart = view.chart;
     let fqn = |node: NodeId| chart.fqn(node).to_string();
     let (tag, words) = match what {
@@ -45,20 +45,20 @@ pub fn tell(lua: &Lua, bound: &Bound, what: Trace<'_>, view: &mut View<'_>) {
 }
 
 /// The same outside of a step, where what it sends waits for the next one.
-pub fn tell_idle(lua: &Lua, bound: &Bound) {
+pub fn tell_idle(lua: &Lua, bound: &BoundMachine) {
     let words = ["nothing to do".to_owned()];
     let told = bound.budget.spend(limits::CALL_INSTRUCTIONS, || call(lua, bound, "HIBERNATING", &words));
     complain(bound, told);
 }
 
 /// The same of a `doo`.
-pub fn tell_doo(lua: &Lua, bound: &Bound, word: &str, state: NodeId, view: &mut View<'_>) {
+pub fn tell_doo(lua: &Lua, bound: &BoundMachine, word: &str, state: NodeId, view: &mut View<'_>) {
     let words = [word.to_owned(), view.chart.fqn(state).to_string()];
     let told = bound.calling(view, || call(lua, bound, "DOO", &words));
     complain(bound, told);
 }
 
-fn call(lua: &Lua, bound: &Bound, tag: &str, words: &[String]) -> Result<()> {
+fn call(lua: &Lua, bound: &BoundMachine, tag: &str, words: &[String]) -> Result<()> {
     let Value::Function(dbg) = bound.fsm.raw_get("dbg")? else { return Ok(()) };
     let mut arguments = vec![Value::String(lua.create_string(tag)?)];
     for word in words {
@@ -67,11 +67,11 @@ fn call(lua: &Lua, bound: &Bound, tag: &str, words: &[String]) -> Result<()> {
     dbg.call(mlua::MultiValue::from_vec(arguments))
 }
 
-fn text(bound: &Bound, chart: &Chart, event: EventId) -> String {
+fn text(bound: &BoundMachine, chart: &Chart, event: EventId) -> String {
     bound.event_text(chart, event)
 }
 
-fn complain(bound: &Bound, told: Result<()>) {
+fn complain(bound: &BoundMachine, told: Result<()>) {
     if let Err(error) = told {
         bound.complain("DBG", "error executing dbg: ", &error);
     }

@@ -7,12 +7,12 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 /// Watches reads of globals, until it is asked what it saw.
-pub struct Watch(Rc<RefCell<Vec<(String, Spot)>>>);
+pub struct UnsetWatch(Rc<RefCell<Vec<(String, Spot)>>>);
 
 /// What `lua/base.lua` calls with the name of a global that is not there.
 const KEY: &str = "unset";
 
-impl Watch {
+impl UnsetWatch {
     /// Begins.
     pub fn begin(lua: &Lua, native: &Table) -> Result<Self> {
         let seen: Rc<RefCell<Vec<(String, Spot)>>> = Rc::default();

@@ -7,7 +7,7 @@
 //! `lua_sethook` in a signal handler ("can be called during a signal", `ldebug.c`; the interpreter's own Ctrl-C does it);
 //! from another thread it would be a data race.
 //!
-//! What is absent: verdicts (`budget.rs` counts and decides) and wall clocks: a thread that waits has no ticks. All that
+//! What is absent: verdicts (`count.rs` counts and decides) and wall clocks: a thread that waits has no ticks. All that
 //! touches Lua behind mlua's back is in this file and in `exact.rs`.
 
 use crate::limits;
@@ -20,16 +20,16 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering::Relaxed, compiler_fence};
 
 /// A thread of Lua that runs, or that waits for one it resumed. Lives on the stack for so long.
-struct Running {
+struct RunningThread {
     state: *mut lua_State,
-    resumed_by: *mut Running,
+    resumed_by: *mut RunningThread,
 }
 
 /// Watches the calls of one Lua state.
 ///
 /// What the signal handler reads is atomic. The handler runs on the thread that writes it, so relaxed accesses do; fences
 /// keep the compiler from moving them over what they announce.
-pub struct Watch {
+pub struct CallWatch {
     lua: WeakLua,
     main: *mut lua_State,
     /// Counts so many instructions; whether the budget is used up.
@@ -41,32 +41,36 @@ pub struct Watch {
     seen: AtomicU64,
     counting: AtomicBool,
     /// The innermost one that runs.
-    running: AtomicPtr<Running>,
+    running: AtomicPtr<RunningThread>,
     /// Held for as long as it ticks.
-    timer: Option<Timer>,
+    timer: Option<TickTimer>,
 }
 
 thread_local! {
     /// Whose call is under way on this thread. Without a destructor, so that a signal handler may read it.
-    static CURRENT: AtomicPtr<Watch> = const { AtomicPtr::new(ptr::null_mut()) };
+    static CURRENT: AtomicPtr<CallWatch> = const { AtomicPtr::new(ptr::null_mut()) };
 }
 
 /// The watch whose call is under way on this thread.
-fn current<'a>() -> Option<&'a Watch> {
+fn current<'a>() -> Option<&'a CallWatch> {
     let watch = CURRENT.with(|current| current.load(Relaxed));
-    // SAFETY: `Watch::during` put it there from a borrow that lives until it has taken it away again, and all who ask are
+    // SAFETY: `CallWatch::during` put it there from a borrow that lives until it has taken it away again, and all who ask are
     // called inside of that: the handler on the same thread, and what Lua calls.
     unsafe { watch.cast_const().as_ref() }
 }
 
-impl Watch {
+impl CallWatch {
     /// Watches the calls of `lua` on this thread from now on; `look` is told of every so many instructions of a call that
     /// takes long. None: the operating system gives no timer.
     pub fn start(lua: &Lua, look: impl Fn(u32) -> bool + 'static) -> Option<Self> {
-        Self::with(lua, look, Timer::start).filter(|watch| watch.timer.is_some())
+        Self::with(lua, look, TickTimer::start).filter(|watch| watch.timer.is_some())
     }
 
-    fn with(lua: &Lua, look: impl Fn(u32) -> bool + 'static, timer: impl FnOnce() -> Option<Timer>) -> Option<Self> {
+    fn with(
+        lua: &Lua,
+        look: impl Fn(u32) -> bool + 'static,
+        timer: impl FnOnce() -> Option<TickTimer>,
+    ) -> Option<Self> {
         CURRENT.with(|_| ());
         let mut main = ptr::null_mut();
         let asked: Result<()> = {
@@ -98,8 +102,8 @@ impl Watch {
     /// Makes an outermost call into the state. Calls inside it belong to it.
     pub fn during<R>(&self, call: impl FnOnce() -> R) -> R {
         struct Under<'a> {
-            watch: &'a Watch,
-            before: *mut Watch,
+            watch: &'a CallWatch,
+            before: *mut CallWatch,
             _lua: Lua,
         }
         impl Drop for Under<'_> {
@@ -115,7 +119,7 @@ impl Watch {
         }
         // Held while the handler may look at the state.
         let Some(lua) = self.lua.try_upgrade() else { return call() };
-        let mut main = Running { state: self.main, resumed_by: ptr::null_mut() };
+        let mut main = RunningThread { state: self.main, resumed_by: ptr::null_mut() };
         self.calls.set(self.calls.get().wrapping_add(1));
         self.running.store(&raw mut main, Relaxed);
         let before = CURRENT.with(|current| current.swap(ptr::from_ref(self).cast_mut(), Relaxed));
@@ -158,7 +162,7 @@ impl Watch {
 
     /// Resumes or closes a thread of Lua: while `resume` runs, ticks reach it too. It must not leave by a jump of Lua's.
     fn entered<R>(&self, state: *mut lua_State, resume: impl FnOnce() -> R) -> R {
-        struct Leave<'a>(&'a Watch, *mut Running);
+        struct Leave<'a>(&'a CallWatch, *mut RunningThread);
         impl Drop for Leave<'_> {
             fn drop(&mut self) {
                 self.0.running.store(self.1, Relaxed);
@@ -166,7 +170,7 @@ impl Watch {
             }
         }
         let resumed_by = self.running.load(Relaxed);
-        let mut entry = Running { state, resumed_by };
+        let mut entry = RunningThread { state, resumed_by };
         compiler_fence(std::sync::atomic::Ordering::SeqCst);
         self.running.store(&raw mut entry, Relaxed);
         compiler_fence(std::sync::atomic::Ordering::SeqCst);
@@ -226,7 +230,7 @@ unsafe extern "C-unwind" fn look(state: *mut lua_State, _: *mut ffi::lua_Debug) 
             instructions = limits::CALL_TICK_INSTRUCTIONS;
         }
         if (watch.look)(instructions) {
-            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
+            ffi::lua_pushstring(state, super::count::ENDED.as_ptr());
             ffi::lua_error(state)
         }
     }
@@ -288,9 +292,9 @@ pub fn functions(lua: &Lua) -> Result<(Function, Function)> {
 }
 
 /// A timer that signals this thread after every [`limits::CALL_TICK`] of its processor time.
-struct Timer(libc::timer_t);
+struct TickTimer(libc::timer_t);
 
-impl Timer {
+impl TickTimer {
     fn start() -> Option<Self> {
         let signal = signal()?;
         let period = libc::timespec { tv_sec: 0, tv_nsec: limits::CALL_TICK.subsec_nanos().into() };
@@ -312,7 +316,7 @@ impl Timer {
     }
 }
 
-impl Drop for Timer {
+impl Drop for TickTimer {
     fn drop(&mut self) {
         // SAFETY: made by `start`, deleted once. A signal that is still on its way finds no call under way.
         unsafe { libc::timer_delete(self.0) };
@@ -327,7 +331,7 @@ fn signal() -> Option<c_int> {
         // SAFETY: the handler reads a thread-local without destructor, atomics, and calls `lua_sethook`: no allocation, no
         // lock, no panic. Whoever else sends the signal, to whatever thread, causes at most one tick.
         let registered =
-            unsafe { signal_hook::low_level::register(signal, || current().into_iter().for_each(Watch::tick)) };
+            unsafe { signal_hook::low_level::register(signal, || current().into_iter().for_each(CallWatch::tick)) };
         registered.ok().map(|_| signal)
     })
 }
@@ -339,7 +343,7 @@ mod tests {
     use std::rc::Rc;
 
     /// A state whose function `tick` is a tick, the only ones there are, and whose calls are over after so many looks.
-    fn watched(looks: u64) -> (Lua, Watch, Rc<Cell<u64>>) {
+    fn watched(looks: u64) -> (Lua, CallWatch, Rc<Cell<u64>>) {
         let lua = Lua::new();
         let seen = Rc::new(Cell::new(0));
         let counted = seen.clone();
@@ -347,7 +351,7 @@ mod tests {
             counted.set(counted.get() + 1);
             counted.get() >= looks
         };
-        let watch = Watch::with(&lua, look, || None).expect("a main thread");
+        let watch = CallWatch::with(&lua, look, || None).expect("a main thread");
         let tick = lua.create_function(|_, ()| {
             current().expect("a call").tick();
             Ok(())
@@ -435,7 +439,7 @@ mod tests {
             counted.set(counted.get() + u64::from(instructions));
             false
         };
-        let watch = Watch::with(&lua, look, || None).expect("a main thread");
+        let watch = CallWatch::with(&lua, look, || None).expect("a main thread");
         let tick = lua.create_function(|_, ()| {
             current().expect("a call").tick();
             Ok(())

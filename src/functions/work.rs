@@ -4,7 +4,7 @@
 //! Memory is counted where it is asked for: copies of texts, lists that grow and texts put together have that in common,
 //! whoever does it. A call that is over is given no large piece any more, so that it ends at once.
 
-use super::budget::Budget;
+use super::count::ENDED;
 use super::exact;
 use crate::limits;
 use mlua::ffi::{self, lua_State};
@@ -22,14 +22,14 @@ thread_local! {
 }
 
 /// For as long as this lives, the memory that a state asks for is counted.
-pub struct Counted {
+pub struct CountedMemory {
     lua: WeakLua,
     plain: ffi::lua_Alloc,
 }
 
 /// Counts the memory that a state asks for, for who is in a call (`exact::during`). The state's limit of memory must have
 /// been set before.
-pub fn count_memory(lua: &Lua) -> Result<Counted> {
+pub fn count_memory(lua: &Lua) -> Result<CountedMemory> {
     let mut plain: Option<ffi::lua_Alloc> = None;
     {
         let plain = &mut plain;
@@ -46,10 +46,10 @@ pub fn count_memory(lua: &Lua) -> Result<Counted> {
         }
     }
     let plain = plain.ok_or_else(|| mlua::Error::runtime("no allocator"))?;
-    Ok(Counted { lua: lua.weak(), plain })
+    Ok(CountedMemory { lua: lua.weak(), plain })
 }
 
-impl Drop for Counted {
+impl Drop for CountedMemory {
     fn drop(&mut self) {
         // mlua frees the allocator's data only when it finds its own allocator.
         let Some(lua) = self.lua.try_upgrade() else { return };
@@ -75,8 +75,8 @@ unsafe extern "C" fn counting(data: *mut c_void, at: *mut c_void, before: usize,
     let grows = at.is_null() || now > before;
     if grows && now >= limits::CALL_BYTES {
         // SAFETY: see `exact::current`.
-        if let Some(budget) = unsafe { exact::current() }
-            && budget.allocated(now)
+        if let Some(count) = unsafe { exact::current() }
+            && count.allocated(now)
             && now > SMALL
         {
             return ptr::null_mut();
@@ -98,8 +98,8 @@ unsafe extern "C-unwind" fn charged(state: *mut lua_State) -> c_int {
         let elements = ffi::lua_tonumber(state, 1);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and no number is zero
         let elements = elements.ceil() as u64;
-        if exact::current().is_some_and(|budget: &Budget| budget.gone_through(elements)) {
-            ffi::lua_pushstring(state, super::budget::ENDED.as_ptr());
+        if exact::current().is_some_and(|count| count.gone_through(elements)) {
+            ffi::lua_pushstring(state, ENDED.as_ptr());
             ffi::lua_error(state)
         }
     }

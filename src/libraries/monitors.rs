@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// The library with the component type that evaluates `monitors`.
 pub fn library(monitors: &[Monitor]) -> Library {
-    let plan = Arc::new(Plan::new(monitors));
+    let plan = Arc::new(MonitorPlan::new(monitors));
     Library::new("davit").with_kind(Kind::made_by(MONITORS_TYPE, move |b| Monitors::new_of(&plan, b)))
 }
 
@@ -23,13 +23,13 @@ pub fn added_to(libraries: Libraries, monitors: &[Monitor]) -> Libraries {
 }
 
 /// What all instances share.
-struct Plan {
+struct MonitorPlan {
     monitors: Vec<Monitor>,
     bank: Bank,
     sight: Sight,
 }
 
-impl Plan {
+impl MonitorPlan {
     fn new(monitors: &[Monitor]) -> Self {
         let bank = Bank::new(monitors);
         let sight = Sight::of(bank.inputs());
@@ -39,7 +39,7 @@ impl Plan {
 
 /// The monitors at work.
 struct Monitors {
-    plan: Arc<Plan>,
+    plan: Arc<MonitorPlan>,
     bank: Bank,
     enabled: Vec<Prop<bool>>,
     is_enabled: Vec<bool>,
@@ -95,7 +95,7 @@ impl Component for Monitors {
 }
 
 impl Monitors {
-    fn new_of(plan: &Arc<Plan>, b: &mut Builder<Self>) -> Self {
+    fn new_of(plan: &Arc<MonitorPlan>, b: &mut Builder<Self>) -> Self {
         b.describe(
             "The deployment's monitors. Each is a property, true while it is enabled, with its verdict and how far it is \
              from the other one as ports. Enabled again, a monitor begins with an empty history.",

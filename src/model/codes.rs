@@ -201,7 +201,7 @@ codes! {
          would lose the same. A promise that is not kept is worse than none, so the key is refused. Leave it out.";
     DEPLOY_UNKNOWN_LIBRARY = "deploy::unknown_library", "there is no such component library",
         "`libraries` names the component libraries that this program was built with. A library of your own is linked into \
-         a program of your own: `davit::cli::main(libraries)`. `davit types` lists what this program has.";
+         a program of your own: `davit::main(libraries)`. `davit types` lists what this program has.";
     TYPE_UNKNOWN_TYPE = "type::unknown_type", "a component type refers to a type that there is not",
         "`start_after` and `stop_before` name other component types, whose components start before and stop after those of \
          this one. A name that no type has would silently order nothing. Correct it, or leave it out.";

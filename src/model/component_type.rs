@@ -184,7 +184,7 @@ impl PropertyType {
     /// `value` as a value of this property: of its type, within its limits.
     ///
     /// # Errors
-    /// [`ValueError`] naming the number or element at fault.
+    /// `ValueError`, naming the number or element at fault.
     pub fn fit(&self, value: Value) -> Result<Value, ValueError> {
         let value = value.fit(&self.ty)?;
         let mut bad = None;

@@ -224,7 +224,7 @@ pub struct TakeDown {
     pub rest: Vec<(ConfigId, Origin)>,
 }
 
-/// Bounds the user may set; defaults are in [`crate::limits`].
+/// Bounds the user may set. Each has a default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeploymentLimits {
     /// Frames on the stack before the oldest are squashed.

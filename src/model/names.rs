@@ -49,7 +49,7 @@ macro_rules! name {
             /// The name, or why `text` cannot be one.
             ///
             /// # Errors
-            /// [`NameError`] when `text` does not follow the grammar above.
+            /// When `text` does not follow the grammar above.
             pub fn new(text: &str) -> Result<Self, NameError> {
                 let valid: fn(&str) -> bool = $valid;
                 if valid(text) {

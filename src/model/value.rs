@@ -152,7 +152,7 @@ impl Value {
     /// fields come into the type's order, an empty record stands for an empty array (Lua writes both `{}`).
     ///
     /// # Errors
-    /// [`FitError`] naming the element at fault.
+    /// `FitError`, naming the element at fault.
     pub fn fit(self, ty: &ValueType) -> Result<Self, FitError> {
         match (ty, self) {
             (ValueType::Bool, v @ Self::Bool(_))

@@ -1,7 +1,7 @@
 //! All monitors of a deployment, over inputs that are sampled once.
 
 use super::compile::{PIECES, compile};
-use super::program::Program;
+use super::program::CompiledCondition;
 use crate::model::monitor::{Condition, Counter, Monitor, PortSignal, Sampling};
 use crate::model::{ComponentName, EventName, Ident, MemberRef, Origin, RunState};
 use crate::time::Time;
@@ -106,15 +106,15 @@ pub struct Bank {
     /// Of which the value matters, not only when it comes.
     valued: Vec<bool>,
     samples: Vec<Sample>,
-    watches: Vec<Watch>,
+    watches: Vec<WatchedMonitor>,
     last: Time,
     troubles: Troubles,
 }
 
 /// One monitor at work.
 #[derive(Debug, Clone)]
-struct Watch {
-    program: Program,
+struct WatchedMonitor {
+    program: CompiledCondition,
     /// Its inputs in the bank, and what they held when it was last evaluated.
     slots: Box<[usize]>,
     held: Box<[Sample]>,
@@ -182,7 +182,7 @@ impl Bank {
                     slot
                 })
                 .collect();
-            Watch {
+            WatchedMonitor {
                 program,
                 held: vec![Sample::default(); slots.len()].into(),
                 slots,
@@ -266,14 +266,6 @@ impl Bank {
         watch.program.clear();
     }
 
-    /// Whether a monitor is switched on.
-    ///
-    /// # Panics
-    /// When there is no monitor of that index.
-    pub fn is_enabled(&self, monitor: usize) -> bool {
-        self.watches[monitor].enabled
-    }
-
     /// What a monitor's condition was when last evaluated; none when it is off, or new.
     ///
     /// # Panics
@@ -294,7 +286,7 @@ impl Bank {
     /// When a step is due though no sample comes: a time passes, a rate falls, an event is to be repeated, a monitor that
     /// runs at a rate has its turn. Never before the last step.
     pub fn next_wake(&self) -> Option<Time> {
-        let times = self.watches.iter().filter(|w| w.enabled).map(Watch::wake);
+        let times = self.watches.iter().filter(|w| w.enabled).map(WatchedMonitor::wake);
         times.min().filter(|wake| *wake != Time::NEVER).map(|wake| wake.max(self.last))
     }
 
@@ -323,7 +315,7 @@ fn time_of(position: u64) -> Time {
     if position == u64::MAX { Time::NEVER } else { Time(position / 2 + position % 2) }
 }
 
-impl Watch {
+impl WatchedMonitor {
     fn wake(&self) -> Time {
         match (self.verdict, self.sampling) {
             (None, _) => self.waits,

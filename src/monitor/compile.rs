@@ -2,8 +2,8 @@
 
 use super::bank::{Input, state_value};
 use super::nodes::{Number, Rate, Truth};
-use super::program::Program;
-use super::window::{Since, Window};
+use super::program::CompiledCondition;
+use super::window::{SinceWindow, Window};
 use crate::limits::MONITOR_PIECES;
 use crate::model::monitor::{Comparison, Condition, ConditionKind, Interval, Signal, SignalKind};
 use std::time::Duration;
@@ -19,10 +19,10 @@ pub fn positions(time: Duration) -> u64 {
 /// What must be merged because the memory of an operator is used up makes the whole condition less true, never more: an
 /// event is raised only when it would be with all the memory in the world. Under an odd number of negations an operator
 /// therefore errs to the other side.
-pub fn compile(condition: &Condition, pieces: usize) -> (Program, Vec<(Input, bool)>) {
+pub fn compile(condition: &Condition, pieces: usize) -> (CompiledCondition, Vec<(Input, bool)>) {
     let mut compiler = Compiler { numbers: Vec::new(), truths: Vec::new(), slots: Vec::new(), pieces };
     compiler.condition(condition, false);
-    (Program::new(compiler.numbers, compiler.truths), compiler.slots)
+    (CompiledCondition::new(compiler.numbers, compiler.truths), compiler.slots)
 }
 
 /// Pieces an operator keeps where nothing else is said.
@@ -164,7 +164,7 @@ impl Compiler {
         let (hold, from) = (self.condition(hold, upward), self.condition(from, upward));
         let (newest, oldest) = ends(interval);
         let length = if oldest == u64::MAX { oldest } else { oldest.saturating_sub(newest) };
-        let since = Truth::Since(hold, from, Since::new(length, self.pieces, upward));
+        let since = Truth::Since(hold, from, SinceWindow::new(length, self.pieces, upward));
         if newest == 0 {
             return since;
         }

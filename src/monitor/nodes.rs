@@ -3,7 +3,7 @@
 use super::bank::Sample;
 use super::grade::Grade;
 use super::ring::{Ring, grain};
-use super::window::{Since, Window};
+use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
 
 /// A number, from samples and from numbers before it in the list.
@@ -59,7 +59,7 @@ impl Number {
 
 /// Samples of one moment, or of some that lie close together.
 #[derive(Debug, Clone, Copy)]
-struct Moment {
+struct NodeMoment {
     first: u64,
     at: u64,
     count: u64,
@@ -76,7 +76,7 @@ pub struct Rate {
     /// Of the input, when last looked at.
     writes: u64,
     /// Old to new.
-    counts: Ring<Moment>,
+    counts: Ring<NodeMoment>,
     total: u64,
     most: usize,
     merged: u64,
@@ -122,7 +122,7 @@ impl Rate {
                         if self.counts.len() == self.most {
                             self.merge();
                         }
-                        self.counts.push_back(Moment { first: at, at, count: new });
+                        self.counts.push_back(NodeMoment { first: at, at, count: new });
                     }
                 }
             }
@@ -143,8 +143,12 @@ impl Rate {
     /// Counts moments that lie close together at the newest of them.
     fn merge(&mut self) {
         let grain = grain(self.window, self.most);
-        let one = |old: Moment, new: Moment| Moment { first: old.first, at: new.at, count: old.count + new.count };
-        let joined = |old: Moment, new: Moment| (new.at - old.first <= grain).then(|| one(old, new));
+        let one = |old: NodeMoment, new: NodeMoment| NodeMoment {
+            first: old.first,
+            at: new.at,
+            count: old.count + new.count,
+        };
+        let joined = |old: NodeMoment, new: NodeMoment| (new.at - old.first <= grain).then(|| one(old, new));
         self.merged += self.counts.join(joined, one) as u64;
     }
 
@@ -181,7 +185,7 @@ pub enum Truth {
     /// The smallest in a window: the window holds the contraries.
     Historically(usize, Window),
     /// The first since the second.
-    Since(usize, usize, Since),
+    Since(usize, usize, SinceWindow),
     /// The history is this many positions long.
     Lived(u64, Option<u64>),
 }

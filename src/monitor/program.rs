@@ -6,7 +6,7 @@ use super::nodes::{Number, Truth};
 
 /// A condition with its history.
 #[derive(Debug, Clone)]
-pub struct Program {
+pub struct CompiledCondition {
     numbers: Vec<Number>,
     truths: Vec<Truth>,
     values: Vec<f64>,
@@ -19,7 +19,7 @@ pub struct Program {
     wake: u64,
 }
 
-impl Program {
+impl CompiledCondition {
     /// The last of the truths is the condition.
     pub fn new(numbers: Vec<Number>, truths: Vec<Truth>) -> Self {
         let (values, grades) = (vec![f64::NAN; numbers.len()], vec![Grade::BOTTOM; truths.len()]);

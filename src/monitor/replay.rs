@@ -1,7 +1,7 @@
 //! Monitors over recorded samples.
 
 use super::bank::{Bank, Input, Sample, Troubles};
-use super::table::{Columns, Problem};
+use super::table::{Columns, TableProblem};
 use crate::limits::SAMPLES_WAKES;
 use crate::model::{EventName, Monitor};
 use crate::time::Time;
@@ -109,7 +109,7 @@ impl Replay {
     ///
     /// # Errors
     /// What is wrong with the line; nothing of it has been taken then.
-    pub fn line(&mut self, line: &str, raised: &mut dyn FnMut(Raised)) -> Result<(), Problem> {
+    pub fn line(&mut self, line: &str, raised: &mut dyn FnMut(Raised)) -> Result<(), TableProblem> {
         let mut fresh = Vec::new();
         let at = self.columns.line(line, &self.wanted, &mut |column, value| fresh.push((column, value)))?;
         // The history begins at the first line, not when the clock did.

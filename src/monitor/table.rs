@@ -9,7 +9,7 @@ use crate::time::Time;
 
 /// What is wrong with a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct TableProblem {
     /// Its code.
     pub code: Code,
     /// One sentence.
@@ -31,23 +31,29 @@ pub struct Columns {
 }
 
 /// A cell: its text without blanks and quotes, and where it stands, in bytes.
-struct Cell<'a> {
+struct TableCell<'a> {
     text: &'a str,
     start: usize,
 }
 
 /// The cells of a line.
-fn cells(line: &str) -> impl Iterator<Item = Cell<'_>> {
+fn cells(line: &str) -> impl Iterator<Item = TableCell<'_>> {
     line.split(',').map(move |raw| {
         let trimmed = raw.trim();
         let text = trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed);
-        Cell { text, start: text.as_ptr() as usize - line.as_ptr() as usize }
+        TableCell { text, start: text.as_ptr() as usize - line.as_ptr() as usize }
     })
 }
 
-fn problem(code: Code, line: &str, cell: &Cell<'_>, message: String, help: impl Into<String>) -> Problem {
+fn problem(code: Code, line: &str, cell: &TableCell<'_>, message: String, help: impl Into<String>) -> TableProblem {
     let count = |text: &str| u32::try_from(text.chars().count()).unwrap_or(u32::MAX);
-    Problem { code, message, column: count(&line[..cell.start]), length: count(cell.text).max(1), help: help.into() }
+    TableProblem {
+        code,
+        message,
+        column: count(&line[..cell.start]),
+        length: count(cell.text).max(1),
+        help: help.into(),
+    }
 }
 
 /// A text without its line end and a mark of byte order.
@@ -65,9 +71,10 @@ impl Columns {
     ///
     /// # Errors
     /// When there is no column `time`, or a name is missing or stands twice.
-    pub fn new(line: &str) -> Result<Self, Problem> {
+    pub fn new(line: &str) -> Result<Self, TableProblem> {
         let line = clean(line);
-        let wrong = |cell: &Cell<'_>, message: String, help: &str| problem(SAMPLES_COLUMNS, line, cell, message, help);
+        let wrong =
+            |cell: &TableCell<'_>, message: String, help: &str| problem(SAMPLES_COLUMNS, line, cell, message, help);
         let mut names: Vec<String> = Vec::new();
         for cell in cells(line) {
             if cell.text.is_empty() {
@@ -87,7 +94,7 @@ impl Columns {
             names.push(cell.text.to_owned());
         }
         let Some(time) = names.iter().position(|name| name == "time") else {
-            let whole = Cell { text: line, start: 0 };
+            let whole = TableCell { text: line, start: 0 };
             let help = if names.len() == 1 && line.contains([';', '\t']) {
                 "columns are separated by commas"
             } else {
@@ -113,7 +120,12 @@ impl Columns {
     ///
     /// # Errors
     /// When it has another number of cells, no time or one before that of the last line, or a cell that is no number.
-    pub fn line(&mut self, line: &str, wanted: &[bool], cell: &mut dyn FnMut(usize, f64)) -> Result<Time, Problem> {
+    pub fn line(
+        &mut self,
+        line: &str,
+        wanted: &[bool],
+        cell: &mut dyn FnMut(usize, f64),
+    ) -> Result<Time, TableProblem> {
         let line = clean(line);
         let mut at = None;
         let mut count = 0;
@@ -153,7 +165,7 @@ impl Columns {
             }
         }
         if count != self.names.len() {
-            let whole = Cell { text: line, start: 0 };
+            let whole = TableCell { text: line, start: 0 };
             let message = format!("this line has {count} cells, the first one {}", self.names.len());
             let help = "every line has as many cells as there are columns; one without a new sample is left empty";
             return Err(problem(SAMPLES_COLUMNS, line, &whole, message, help));
@@ -165,9 +177,9 @@ impl Columns {
 }
 
 /// What is wrong with a recording without lines.
-pub fn empty(header: bool) -> Problem {
+pub fn empty(header: bool) -> TableProblem {
     let message = if header { "there is no line after the first" } else { "the file is empty" };
-    Problem {
+    TableProblem {
         code: SAMPLES_EMPTY,
         message: message.to_owned(),
         column: 0,

@@ -125,13 +125,13 @@ impl Window {
 ///
 /// With a newer end in the past it is what this was then, and `hold` ever after: see `compile`.
 #[derive(Debug, Clone)]
-pub struct Since {
+pub struct SinceWindow {
     oldest: u64,
     open: Option<(Grade, Grade)>,
     pieces: Pieces,
 }
 
-impl Since {
+impl SinceWindow {
     /// An interval from now to `oldest` positions ago (`u64::MAX`: to the beginning). `most` and `upward` as in
     /// [`Pieces::new`].
     pub fn new(oldest: u64, most: usize, upward: bool) -> Self {

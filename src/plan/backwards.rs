@@ -64,13 +64,13 @@ impl Backwards {
 mod tests {
     use super::*;
     use crate::model::{Origin, Step};
-    use crate::plan::Stage;
+    use crate::plan::PlanStage;
     use crate::system::{Reversibility, Undo};
 
     fn step(id: StepId, wave: u32, after: &[StepId]) -> PlannedStep {
         PlannedStep {
             id,
-            stage: Stage::Changes,
+            stage: PlanStage::Changes,
             wave,
             after: SmallVec::from_slice(after),
             step: Step::Destroy { component: "a".parse().unwrap() },

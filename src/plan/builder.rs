@@ -2,7 +2,7 @@
 
 use super::footprint::{Footprint, Saved};
 use super::{
-    Context, Plan, PlannedStep, Refusal, SavedValue, Stage, StepId, changes, conflicts, lists, order, replace,
+    Context, Plan, PlanStage, PlannedStep, Refusal, SavedValue, StepId, changes, conflicts, lists, order, replace,
 };
 use crate::model::codes;
 use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, Findings, Origin, Step, Target};
@@ -10,11 +10,11 @@ use crate::system::{Overlay, Reversibility, Undo, Violation, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
-pub(super) struct Builder<'o, 's, 'c> {
+pub(super) struct PlanBuilder<'o, 's, 'c> {
     pub(super) view: &'o mut Overlay<'s>,
     pub(super) configuration: &'c Configuration,
     pub(super) context: &'c Context,
-    pub(super) stage: Stage,
+    pub(super) stage: PlanStage,
     pub(super) steps: Vec<PlannedStep>,
     pub(super) footprint: Footprint,
     pub(super) saved: Vec<SavedValue>,
@@ -32,11 +32,11 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
     let created = configuration.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Create { .. })).count();
     let defaulted = configuration.post.iter().any(|entry| entry.target == Target::Default);
     let moved = if defaulted { 2 * created } else { 0 };
-    let mut b = Builder {
+    let mut b = PlanBuilder {
         view,
         configuration,
         context,
-        stage: Stage::Pre,
+        stage: PlanStage::Pre,
         steps: Vec::with_capacity(
             configuration.changes.len() + 2 * (configuration.pre.len() + configuration.post.len()) + moved,
         ),
@@ -49,14 +49,14 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
     b.footprint.touches.reserve(2 * configuration.changes.len() - created + moved);
     let sorted = conflicts::sort(configuration, &mut b.findings);
     b.blamed.extend(&sorted.disputed);
-    lists::apply(&mut b, &configuration.pre, Stage::Pre, &sorted, &[]);
+    lists::apply(&mut b, &configuration.pre, PlanStage::Pre, &sorted, &[]);
     let stood = lists::stood(&b, &replaced);
-    b.stage = Stage::Changes;
+    b.stage = PlanStage::Changes;
     let from = b.steps.len();
     changes::apply(&mut b, &sorted);
     order::irreversible_last(&mut b.steps, from, &mut b.saved);
-    b.stage = Stage::Post;
-    lists::apply(&mut b, &configuration.post, Stage::Post, &sorted, &stood);
+    b.stage = PlanStage::Post;
+    lists::apply(&mut b, &configuration.post, PlanStage::Post, &sorted, &stood);
     if !b.findings.is_empty() {
         return Err(Refusal { findings: b.findings, request: 0 });
     }
@@ -71,7 +71,7 @@ pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, conte
     })
 }
 
-impl Builder<'_, '_, '_> {
+impl PlanBuilder<'_, '_, '_> {
     /// The number that the next step gets.
     pub(super) fn next(&self) -> StepId {
         StepId::try_from(self.steps.len()).expect("fewer steps than that")

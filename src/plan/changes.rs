@@ -5,7 +5,7 @@
 //! the written order was.
 
 use super::StepId;
-use super::builder::Builder;
+use super::builder::PlanBuilder;
 use super::conflicts::{Sorted, Use, clash};
 use super::meant::Meant;
 use crate::model::{Change, ChangeKind, ComponentName, MemberRef, Origin, RunState, Step, Wanted};
@@ -17,7 +17,7 @@ type After = SmallVec<[StepId; 4]>;
 
 /// Steps that later ones may have to wait for.
 #[derive(Default)]
-struct Waits {
+struct ChangeWaits {
     create: FxHashMap<ComponentName, StepId>,
     destroy: FxHashMap<ComponentName, StepId>,
     /// The last of the chained disconnects of an in-port.
@@ -25,7 +25,7 @@ struct Waits {
     cuts_of: FxHashMap<ComponentName, Vec<StepId>>,
 }
 
-impl Waits {
+impl ChangeWaits {
     fn created(&self, component: ComponentName, after: &mut After) {
         if !self.create.is_empty()
             && let Some(id) = self.create.get(&component)
@@ -44,7 +44,7 @@ impl Waits {
     }
 }
 
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
+pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let mut classes: [Vec<u32>; 5] = Default::default();
     for (i, change) in changes.iter().enumerate() {
@@ -64,7 +64,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
     if classes[2].len() + classes[4].len() > 64 {
         b.view.reserve(classes[2].len(), classes[4].len());
     }
-    let mut waits = Waits::default();
+    let mut waits = ChangeWaits::default();
     waits.create.reserve(classes[2].len());
     for i in classes.iter().flatten() {
         let change = &changes[*i as usize];
@@ -87,8 +87,8 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, sorted: &Sorted) {
 }
 
 fn disconnect(
-    b: &mut Builder<'_, '_, '_>,
-    w: &mut Waits,
+    b: &mut PlanBuilder<'_, '_, '_>,
+    w: &mut ChangeWaits,
     from: MemberRef,
     to: MemberRef,
     origin: Origin,
@@ -106,7 +106,7 @@ fn disconnect(
     }
 }
 
-fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, origin: Origin) {
+fn destroy(b: &mut PlanBuilder<'_, '_, '_>, w: &mut ChangeWaits, component: ComponentName, origin: Origin) {
     let mut after = After::new();
     if let Some(state) = b.view.component(component).map(|n| n.state)
         && state != RunState::Faulted
@@ -124,7 +124,13 @@ fn destroy(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName,
     }
 }
 
-fn create(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, meant: Meant, origin: Origin) {
+fn create(
+    b: &mut PlanBuilder<'_, '_, '_>,
+    w: &mut ChangeWaits,
+    component: ComponentName,
+    meant: Meant,
+    origin: Origin,
+) {
     let Meant { step: what, wrong, .. } = meant;
     let Step::Create { ty, .. } = &what else { return };
     let known = b.view.types().get(*ty).is_some();
@@ -152,7 +158,7 @@ fn create(b: &mut Builder<'_, '_, '_>, w: &mut Waits, component: ComponentName, 
 }
 
 /// The change that a rival change competes with, unless that one is wrong by itself.
-fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
+fn rival<'c>(b: &PlanBuilder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
     let configuration = b.configuration;
     let Use::Rival(first) = usage else { return None };
     let first = &configuration.changes[first];
@@ -160,8 +166,8 @@ fn rival<'c>(b: &Builder<'_, '_, 'c>, usage: Use) -> Option<&'c Change> {
 }
 
 fn set(
-    b: &mut Builder<'_, '_, '_>,
-    w: &Waits,
+    b: &mut PlanBuilder<'_, '_, '_>,
+    w: &ChangeWaits,
     property: MemberRef,
     what: Step,
     change: &Change,
@@ -197,7 +203,7 @@ fn set(
     }
 }
 
-fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, change: &Change, usage: Use) {
+fn write(b: &mut PlanBuilder<'_, '_, '_>, w: &ChangeWaits, port: MemberRef, what: Step, change: &Change, usage: Use) {
     let mut after = After::new();
     w.created(port.component, &mut after);
     w.cut(port, &mut after);
@@ -222,7 +228,7 @@ fn write(b: &mut Builder<'_, '_, '_>, w: &Waits, port: MemberRef, what: Step, ch
     }
 }
 
-fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Change) {
+fn operation(b: &mut PlanBuilder<'_, '_, '_>, w: &ChangeWaits, meant: Meant, change: &Change) {
     let mut after = After::new();
     for component in change.kind.components() {
         w.created(component, &mut after);
@@ -231,8 +237,8 @@ fn operation(b: &mut Builder<'_, '_, '_>, w: &Waits, meant: Meant, change: &Chan
 }
 
 fn connect(
-    b: &mut Builder<'_, '_, '_>,
-    w: &Waits,
+    b: &mut PlanBuilder<'_, '_, '_>,
+    w: &ChangeWaits,
     from: MemberRef,
     to: MemberRef,
     what: Step,

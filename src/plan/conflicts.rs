@@ -7,7 +7,7 @@ use std::collections::hash_map::Entry;
 
 /// What a change is about; two changes with one subject are the same act twice, or they clash.
 #[derive(PartialEq, Eq, Hash, Clone, Copy)]
-enum Subject {
+enum ConflictSubject {
     Create(ComponentName),
     Destroy(ComponentName),
     Connect(MemberRef, MemberRef),
@@ -17,7 +17,7 @@ enum Subject {
     Operation(MemberRef),
 }
 
-impl Subject {
+impl ConflictSubject {
     fn of(kind: &ChangeKind) -> Self {
         match kind {
             ChangeKind::Create { component, .. } | ChangeKind::Replace { component, .. } => Self::Create(*component),
@@ -61,7 +61,7 @@ pub(super) fn clash(first: &Change, second: &Change) -> Finding {
 
 pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -> Sorted {
     let changes = &configuration.changes;
-    let mut seen: FxHashMap<Subject, u32> = FxHashMap::default();
+    let mut seen: FxHashMap<ConflictSubject, u32> = FxHashMap::default();
     seen.reserve(changes.len());
     let mut sorted = Sorted {
         uses: vec![Use::Yes; changes.len()],
@@ -71,7 +71,7 @@ pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -
     };
     let mut writes = false;
     for (i, change) in changes.iter().enumerate() {
-        match seen.entry(Subject::of(&change.kind)) {
+        match seen.entry(ConflictSubject::of(&change.kind)) {
             Entry::Vacant(free) => {
                 free.insert(u32::try_from(i).expect("fewer changes than that"));
                 match &change.kind {
@@ -103,7 +103,7 @@ pub(super) fn sort(configuration: &Configuration, findings: &mut Vec<Finding>) -
         for (i, change) in changes.iter().enumerate() {
             if let ChangeKind::Connect { to, .. } = &change.kind
                 && sorted.uses[i] == Use::Yes
-                && let Some(write) = seen.get(&Subject::Port(*to))
+                && let Some(write) = seen.get(&ConflictSubject::Port(*to))
             {
                 let write = *write as usize;
                 findings.push(clash(&changes[write.min(i)], &changes[write.max(i)]));

@@ -1,10 +1,10 @@
 //! The pre- and post-state lists: entries in order, `_default` expanded at its place.
 
-use super::builder::Builder;
+use super::builder::PlanBuilder;
 use super::conflicts::Sorted;
 use super::footprint::{Access, Slot};
-use super::order::{self, Move};
-use super::{PlannedStep, Stage, StepId};
+use super::order::{self, OrderMove};
+use super::{PlanStage, PlannedStep, StepId};
 use crate::model::codes;
 use crate::model::{ComponentName, Finding, Origin, RunState, StateEntry, StateList, Step, Target, Transition, Wanted};
 use crate::system::{View, Violation};
@@ -18,7 +18,7 @@ pub(super) struct Stood {
 }
 
 /// The run states in which the changes find what they replace. What is faulted stands nowhere that anyone may demand.
-pub(super) fn stood(b: &Builder<'_, '_, '_>, replaced: &[(ComponentName, Origin)]) -> Vec<Stood> {
+pub(super) fn stood(b: &PlanBuilder<'_, '_, '_>, replaced: &[(ComponentName, Origin)]) -> Vec<Stood> {
     let one = |(component, origin): &(ComponentName, Origin)| {
         let state = b.view.component(*component)?.state.wanted()?;
         Some(Stood { component: *component, state, origin: *origin })
@@ -27,7 +27,13 @@ pub(super) fn stood(b: &Builder<'_, '_, '_>, replaced: &[(ComponentName, Origin)
 }
 
 /// Carries out a list; before its entries what was replaced comes to the run state in which the old one `stood`.
-pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage, sorted: &Sorted, stood: &[Stood]) {
+pub(super) fn apply(
+    b: &mut PlanBuilder<'_, '_, '_>,
+    list: &StateList,
+    stage: PlanStage,
+    sorted: &Sorted,
+    stood: &[Stood],
+) {
     b.stage = stage;
     let mut frontier: Vec<StepId> = Vec::new();
     for state in [Wanted::Stopped, Wanted::Running] {
@@ -46,7 +52,7 @@ pub(super) fn apply(b: &mut Builder<'_, '_, '_>, list: &StateList, stage: Stage,
 }
 
 fn named(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     component: ComponentName,
     entry: StateEntry,
     sorted: &Sorted,
@@ -68,18 +74,18 @@ fn named(
     }
 }
 
-fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
+fn unknown(b: &mut PlanBuilder<'_, '_, '_>, component: ComponentName, entry: StateEntry, sorted: &Sorted) {
     let changes = &b.configuration.changes;
     let finding = match (b.stage, sorted.created.get(&component), sorted.destroyed.get(&component)) {
         // One that is destroyed and created again concerns the component that was there before.
-        (Stage::Pre, Some(create), None) => {
+        (PlanStage::Pre, Some(create), None) => {
             let message =
                 format!("`{component}` is created by this configuration and does not exist before the changes");
             Finding::error(codes::PRE_ON_CREATED, message)
                 .also(changes[*create].origin, "created here")
                 .help("put the entry into post_conf_state")
         }
-        (Stage::Post, None, Some(destroy)) if !b.blamed.contains(&component) => {
+        (PlanStage::Post, None, Some(destroy)) if !b.blamed.contains(&component) => {
             let message =
                 format!("`{component}` is destroyed by this configuration and does not exist after the changes");
             Finding::error(codes::POST_ON_DESTROYED, message)
@@ -92,12 +98,12 @@ fn unknown(b: &mut Builder<'_, '_, '_>, component: ComponentName, entry: StateEn
     b.findings.push(finding.at(entry.origin));
 }
 
-fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
+fn expand(b: &mut PlanBuilder<'_, '_, '_>, list: &StateList, entry: StateEntry, frontier: &mut Vec<StepId>) {
     let named: FxHashSet<ComponentName> = list.named().collect();
     let scope = b.configuration.id.prefix();
     let wanted = RunState::from(entry.state);
     // Before the changes it is a matter of standing still, and what has faulted does: to bring it out of that could only fail.
-    let stands = |state| state == RunState::Faulted && b.stage == Stage::Pre && wanted == RunState::Stopped;
+    let stands = |state| state == RunState::Faulted && b.stage == PlanStage::Pre && wanted == RunState::Stopped;
     let mut moving: Vec<ComponentName> = Vec::new();
     b.view.for_each_component(&mut |node| {
         if node.state != wanted
@@ -124,7 +130,7 @@ fn expand(b: &mut Builder<'_, '_, '_>, list: &StateList, entry: StateEntry, fron
 }
 
 /// The actuators that the steps from there on start or stop.
-fn actuators(b: &Builder<'_, '_, '_>, from: usize) -> Vec<(ComponentName, Transition)> {
+fn actuators(b: &PlanBuilder<'_, '_, '_>, from: usize) -> Vec<(ComponentName, Transition)> {
     let one = |step: &PlannedStep| match step.step {
         Step::State { component, transition: transition @ (Transition::Start | Transition::Stop) } => {
             b.view.component(component).filter(|node| node.ty.actuator).map(|_| (component, transition))
@@ -135,7 +141,7 @@ fn actuators(b: &Builder<'_, '_, '_>, from: usize) -> Vec<(ComponentName, Transi
 }
 
 /// Whether a list says to which run state a component comes.
-fn says(b: &Builder<'_, '_, '_>, list: &StateList, component: ComponentName) -> bool {
+fn says(b: &PlanBuilder<'_, '_, '_>, list: &StateList, component: ComponentName) -> bool {
     let by_default = || {
         component.prefix() == b.configuration.id.prefix()
             && !b.context.avoid.contains(&component)
@@ -146,7 +152,7 @@ fn says(b: &Builder<'_, '_, '_>, list: &StateList, component: ComponentName) -> 
 
 /// Brings these components to a run state, in the order of the data flow.
 fn bring(
-    b: &mut Builder<'_, '_, '_>,
+    b: &mut PlanBuilder<'_, '_, '_>,
     moving: Vec<ComponentName>,
     wanted: Wanted,
     origin: &dyn Fn(ComponentName) -> Origin,
@@ -166,7 +172,7 @@ fn bring(
     // The number of the start or stop of each move; a move without one (never running) is waited for by nobody.
     let mut keys: Vec<Option<StepId>> = Vec::with_capacity(moves.len());
     let mut waits: Vec<StepId> = Vec::new();
-    for Move { component, after } in &moves {
+    for OrderMove { component, after } in &moves {
         let node = b.view.component(*component).expect("it was just seen");
         let state = node.state;
         let mut own = None;

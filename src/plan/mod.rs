@@ -41,7 +41,7 @@ impl Context {
 /// The stage a step belongs to. Stages are barriers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Stage {
+pub enum PlanStage {
     /// The pre-state list.
     Pre,
     /// The changes.
@@ -59,7 +59,7 @@ pub struct PlannedStep {
     /// Its number: its place in the list.
     pub id: StepId,
     /// The stage it belongs to (for an inverse: the stage of the step it undoes).
-    pub stage: Stage,
+    pub stage: PlanStage,
     /// Barriers: a step begins only when all steps of smaller waves are done. Never decreases along the list.
     pub wave: u32,
     /// Steps of the same wave that must be done before; all have smaller numbers.
@@ -110,20 +110,8 @@ pub struct Plan {
     pub warnings: Findings,
 }
 
-impl Plan {
-    /// Why the plan cannot be undone, if a step of it cannot.
-    pub fn irreversible(&self) -> Option<&str> {
-        irreversible(&self.steps)
-    }
-
-    /// The steps that undo the plan on the system it leads to, in order.
-    pub fn undo_steps(&self) -> impl Iterator<Item = &Step> {
-        self.steps.iter().rev().flat_map(|s| s.undo.steps())
-    }
-}
-
 /// The reason of the first step that cannot be undone.
-pub(crate) fn irreversible(steps: &[PlannedStep]) -> Option<&str> {
+pub fn irreversible(steps: &[PlannedStep]) -> Option<&str> {
     steps.iter().find_map(|s| match &s.undo {
         Undo::Irreversible(reason) => Some(reason.as_str()),
         _ => None,

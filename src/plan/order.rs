@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 /// A component that moves, and the moves (places in the list) that its start or stop waits for.
-pub(super) struct Move {
+pub(super) struct OrderMove {
     pub(super) component: ComponentName,
     pub(super) after: SmallVec<[u32; 4]>,
 }
@@ -23,9 +23,9 @@ const FAN: usize = 8;
 /// The order in which components of `moving` start (consumers before producers) or stop (producers before consumers).
 /// Inside a feedback loop `start_after` and `stop_before` decide, then the name, one at a time. Iterative: chains of a
 /// hundred thousand components are ordinary.
-pub(super) fn data_flow(view: &Overlay<'_>, moving: Vec<ComponentName>, key: Transition) -> Vec<Move> {
+pub(super) fn data_flow(view: &Overlay<'_>, moving: Vec<ComponentName>, key: Transition) -> Vec<OrderMove> {
     if moving.len() == 1 {
-        return moving.into_iter().map(|component| Move { component, after: SmallVec::new() }).collect();
+        return moving.into_iter().map(|component| OrderMove { component, after: SmallVec::new() }).collect();
     }
     let mut graph: DiGraph<ComponentName, ()> = DiGraph::new();
     let mut at: FxHashMap<ComponentName, NodeIndex> = FxHashMap::default();
@@ -45,7 +45,7 @@ pub(super) fn data_flow(view: &Overlay<'_>, moving: Vec<ComponentName>, key: Tra
     if key != Transition::Start {
         loops.reverse();
     }
-    let mut moves: Vec<Move> = Vec::with_capacity(moving.len());
+    let mut moves: Vec<OrderMove> = Vec::with_capacity(moving.len());
     // What follows a component waits for these moves.
     let mut exits: Vec<SmallVec<[u32; 2]>> = vec![SmallVec::new(); graph.node_count()];
     for members in &loops {
@@ -74,7 +74,7 @@ pub(super) fn data_flow(view: &Overlay<'_>, moving: Vec<ComponentName>, key: Tra
         }
         for component in in_loop(view, movers, key) {
             let id = u32::try_from(moves.len()).expect("fewer components than that");
-            moves.push(Move { component, after: std::mem::take(&mut waits) });
+            moves.push(OrderMove { component, after: std::mem::take(&mut waits) });
             waits.push(id);
         }
         for member in members {

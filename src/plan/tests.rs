@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, PlannedStep, Refusal, Stage, plan};
+use super::{Context, Plan, PlanStage, PlannedStep, Refusal, irreversible, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -197,9 +197,9 @@ fn the_clean_example_is_planned_in_derived_order() {
     let after: Vec<Vec<u32>> = plan.steps.iter().map(|s| s.after.to_vec()).collect();
     assert_eq!(after[4], [3, 1], "destroy waits for cleanup and for the disconnect");
     assert_eq!((after[5].as_slice(), after[6].as_slice(), after[7].as_slice()), (&[4][..], &[5][..], &[5, 1][..]));
-    assert_eq!(plan.steps[0].stage, Stage::Pre);
-    assert_eq!(plan.steps[10].stage, Stage::Post);
-    assert!(plan.warnings.is_empty() && plan.irreversible().is_none());
+    assert_eq!(plan.steps[0].stage, PlanStage::Pre);
+    assert_eq!(plan.steps[10].stage, PlanStage::Post);
+    assert!(plan.warnings.is_empty() && irreversible(&plan.steps).is_none());
 }
 
 #[test]
@@ -382,7 +382,7 @@ fn reversibility_is_known_beforehand() {
     assert_eq!(plan.steps[0].reversibility, Reversibility::Compensated);
     let close = Call { operation: member("A.close"), args: vec![Value::Float(1.0)] };
     assert_eq!(plan.steps[0].undo, Undo::One(Step::Operation(close)));
-    assert!(plan.irreversible().is_some());
+    assert!(irreversible(&plan.steps).is_some());
     assert_eq!(plan.warnings[0].code, codes::IRREVERSIBLE);
     let mut meant = conf("c", &[], vec![call("A.weld", None)], &[]);
     meant.irreversible = true;

@@ -5,7 +5,7 @@
 
 use super::backwards::Backwards;
 use super::footprint::{Saved, Slot};
-use super::{PlannedStep, SavedValue, Stage, StepId};
+use super::{PlanStage, PlannedStep, SavedValue, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 pub use crate::system::step::absolute;
 use crate::system::touch::{components, slot};
@@ -24,7 +24,7 @@ pub struct Item {
     /// The policy of the connection it removes, where it is a disconnect and the policy is known.
     pub was: Option<Policy>,
     /// The stage of the configuration's step it is or undoes.
-    pub stage: Stage,
+    pub stage: PlanStage,
     /// Where that was written.
     pub origin: Origin,
     /// Its place in the list it was taken from; means nothing to the planner.
@@ -67,7 +67,7 @@ impl Item {
     }
 
     /// A step by itself.
-    pub(crate) fn bare(step: Step, stage: Stage, origin: Origin) -> Self {
+    pub(crate) fn bare(step: Step, stage: PlanStage, origin: Origin) -> Self {
         Self { step, call: None, was: None, stage, origin, of: Self::NOWHERE }
     }
 }
@@ -81,7 +81,7 @@ pub struct Script<'o, 's> {
     /// The place that each step's item had in the list it was taken from.
     pub of: Vec<u32>,
     /// Where failed components are to go, once something needs them there.
-    goals: BTreeMap<ComponentName, (Wanted, Stage, Origin)>,
+    goals: BTreeMap<ComponentName, (Wanted, PlanStage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
     failed: BTreeSet<ComponentName>,
     /// What concerns a component that is not there is left out: nothing of it is to be taken back.
@@ -357,7 +357,7 @@ fn restore(
     wave: u32,
 ) -> Result<(), Vec<Violation>> {
     if let (false, Some(step)) = (skip(saved.slot), restoring(saved)) {
-        script.add(Item::bare(step, Stage::Changes, Origin::NONE), wave, &[])?;
+        script.add(Item::bare(step, PlanStage::Changes, Origin::NONE), wave, &[])?;
     }
     Ok(())
 }
@@ -369,7 +369,7 @@ pub fn items(steps: &[PlannedStep], saved: &[SavedValue]) -> Vec<Item> {
     let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();
     unwritten.sort_by_key(|s| s.at);
     let mut list = Vec::with_capacity(steps.len() + unwritten.len());
-    let plain = |saved: &SavedValue| restoring(saved).map(|step| Item::bare(step, Stage::Changes, Origin::NONE));
+    let plain = |saved: &SavedValue| restoring(saved).map(|step| Item::bare(step, PlanStage::Changes, Origin::NONE));
     for (i, done) in steps.iter().enumerate().rev() {
         while unwritten.last().is_some_and(|s| s.at as usize > i) {
             list.extend(unwritten.pop().and_then(plain));
@@ -402,7 +402,7 @@ pub fn in_order(system: &System, steps: Vec<Step>) -> Result<Vec<PlannedStep>, V
     let mut script = Script::new(&mut view);
     for step in steps {
         let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-        let item = Item::bare(step, Stage::Changes, Origin::NONE);
+        let item = Item::bare(step, PlanStage::Changes, Origin::NONE);
         // Not through `add`: a difference knows what it does with failed components.
         script.push(item, 0, &after)?;
     }

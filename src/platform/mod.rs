@@ -108,7 +108,7 @@ pub trait Platform: Send + Sync {
 
     /// Carries out brief steps, none of which needs another one, in their order: each has `each` from its beginning, and
     /// `until` at most. Begins no further one after one that is not done, nor after
-    /// [`BRIEF_TURN`](crate::limits::BRIEF_TURN), nor once `stop` is set. Answers for those that were begun, at least one;
+    /// `limits::BRIEF_TURN` (10 ms), nor once `stop` is set. Answers for those that were begun, at least one;
     /// the others did not happen.
     ///
     /// A platform that calls steps brief carries out several; by itself this carries out the first.

@@ -41,7 +41,7 @@ struct Counters {
 }
 
 /// What is done with a component that was put in quarantine and has come back.
-pub(crate) type Late = Box<dyn Fn(&Arc<Cell>) + Send + Sync>;
+pub(crate) type LateCall = Box<dyn Fn(&Arc<Cell>) + Send + Sync>;
 
 pub(crate) struct Activity {
     pub(crate) name: Ident,
@@ -57,11 +57,11 @@ pub(crate) struct Activity {
     busy_since: AtomicU64,
     counters: Counters,
     complaint: Mutex<Option<String>>,
-    late: Late,
+    late: LateCall,
 }
 
 impl Activity {
-    pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: Late) -> Self {
+    pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: LateCall) -> Self {
         Self {
             name,
             spec,

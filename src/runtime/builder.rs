@@ -30,7 +30,7 @@ pub(crate) type OperationFn<C> = Box<dyn Fn(&mut C, &mut Context, &[Value]) -> O
 pub(crate) type CallerFn = Arc<dyn Fn(&[Value]) -> Reply + Send + Sync>;
 
 /// What all components of a type share, in terms of their Rust type.
-pub(crate) struct Table<C> {
+pub(crate) struct MemberTable<C> {
     /// Ports in the order of declaration, with the index in the order of names.
     ports: Vec<(Ident, usize)>,
     properties: Vec<(Ident, usize)>,
@@ -50,17 +50,17 @@ pub(crate) fn hook_index(transition: Transition) -> usize {
 
 /// Declares a component's members. Words about one come before it: `b.doc("Force on the tool.").unit("N").input("f")`.
 pub struct Builder<C> {
-    mode: Mode<C>,
+    mode: BuilderMode<C>,
 }
 
-enum Mode<C> {
+enum BuilderMode<C> {
     Describe(Box<Description<C>>),
-    Make(Making<C>),
+    Make(MakingMembers<C>),
 }
 
 struct Description<C> {
     ty: ComponentType,
-    words: Words,
+    words: MemberWords,
     ports: Vec<Ident>,
     properties: Vec<Ident>,
     operations: Vec<(Ident, Option<OperationFn<C>>)>,
@@ -68,7 +68,7 @@ struct Description<C> {
 }
 
 #[derive(Default)]
-pub(super) struct Words {
+pub(super) struct MemberWords {
     pub(super) doc: String,
     pub(super) unit: Option<Arc<str>>,
     pub(super) min: Option<f64>,
@@ -81,8 +81,8 @@ pub(super) struct Words {
     pub(super) settled_by: Option<Condition>,
 }
 
-struct Making<C> {
-    table: Arc<Table<C>>,
+struct MakingMembers<C> {
+    table: Arc<MemberTable<C>>,
     beat: Arc<Beat>,
     values: Vec<Value>,
     made: Ends,
@@ -105,18 +105,18 @@ pub(super) fn ident(name: &str) -> Ident {
 
 impl<C: Component> Builder<C> {
     /// The type as its constructor declares it.
-    pub(crate) fn describe_type(name: &str, new: impl FnOnce(&mut Self) -> C) -> (ComponentType, Table<C>) {
+    pub(crate) fn describe_type(name: &str, new: impl FnOnce(&mut Self) -> C) -> (ComponentType, MemberTable<C>) {
         let description = Description {
             ty: ComponentType::new(name, ""),
-            words: Words::default(),
+            words: MemberWords::default(),
             ports: Vec::new(),
             properties: Vec::new(),
             operations: Vec::new(),
             hooks: [None; 4],
         };
-        let mut builder = Self { mode: Mode::Describe(Box::new(description)) };
+        let mut builder = Self { mode: BuilderMode::Describe(Box::new(description)) };
         drop(new(&mut builder));
-        let Mode::Describe(mut d) = builder.mode else { unreachable!("the mode never changes") };
+        let BuilderMode::Describe(mut d) = builder.mode else { unreachable!("the mode never changes") };
         let ports: Vec<Ident> = d.ty.ports.keys().copied().collect();
         let properties: Vec<Ident> = d.ty.properties.keys().copied().collect();
         let indexed = |order: &[Ident], sorted: &[Ident]| {
@@ -128,7 +128,7 @@ impl<C: Component> Builder<C> {
                 assert!(d.ty.operations.contains_key(undo), "{name}: there is no operation `{undo}` to undo another");
             }
         }
-        let table = Table {
+        let table = MemberTable {
             ports: indexed(&d.ports, &ports),
             properties: indexed(&d.properties, &properties),
             operations: d.operations.into_iter().map(|(_, f)| f).collect(),
@@ -142,7 +142,7 @@ impl<C: Component> Builder<C> {
     /// # Errors
     /// In words, when a value does not fit its property's Rust type.
     pub(crate) fn make(
-        table: &Arc<Table<C>>,
+        table: &Arc<MemberTable<C>>,
         beat: &Arc<Beat>,
         values: Vec<Value>,
         new: impl FnOnce(&mut Self) -> C,
@@ -155,7 +155,7 @@ impl<C: Component> Builder<C> {
         if values.len() != table.properties.len() {
             return Err(format!("{} for {}", count(values.len(), "value"), count(table.properties.len(), "property")));
         }
-        let making = Making {
+        let making = MakingMembers {
             table: table.clone(),
             beat: beat.clone(),
             values,
@@ -164,24 +164,24 @@ impl<C: Component> Builder<C> {
             next_property: 0,
             error: None,
         };
-        let mut builder = Self { mode: Mode::Make(making) };
+        let mut builder = Self { mode: BuilderMode::Make(making) };
         let component = new(&mut builder);
-        let Mode::Make(making) = builder.mode else { unreachable!("the mode never changes") };
+        let BuilderMode::Make(making) = builder.mode else { unreachable!("the mode never changes") };
         match making.error {
             Some(error) => Err(error),
             None => Ok((component, making.made, making.values)),
         }
     }
 
-    pub(super) fn words(&mut self, f: impl FnOnce(&mut Words)) -> &mut Self {
-        if let Mode::Describe(d) = &mut self.mode {
+    pub(super) fn words(&mut self, f: impl FnOnce(&mut MemberWords)) -> &mut Self {
+        if let BuilderMode::Describe(d) = &mut self.mode {
             f(&mut d.words);
         }
         self
     }
 
     pub(super) fn ty(&mut self, f: impl FnOnce(&mut ComponentType)) -> &mut Self {
-        if let Mode::Describe(d) = &mut self.mode {
+        if let BuilderMode::Describe(d) = &mut self.mode {
             f(&mut d.ty);
         }
         self
@@ -211,7 +211,7 @@ impl<C: Component> Builder<C> {
     }
 
     fn hook(&mut self, transition: Transition, hook: HookFn<C>) -> &mut Self {
-        if let Mode::Describe(d) = &mut self.mode {
+        if let BuilderMode::Describe(d) = &mut self.mode {
             d.hooks[hook_index(transition)] = Some(hook);
         }
         self
@@ -222,11 +222,11 @@ impl<C: Component> Builder<C> {
     /// An in-port.
     pub fn input<T: PortValue>(&mut self, name: &str) -> In<T> {
         match &mut self.mode {
-            Mode::Describe(d) => {
+            BuilderMode::Describe(d) => {
                 d.port(name, Direction::In, T::value_type());
                 In::loose()
             }
-            Mode::Make(m) => {
+            BuilderMode::Make(m) => {
                 let (port, end) = In::new(&m.beat);
                 m.put_port(name, PortEnd::In(end));
                 port
@@ -237,11 +237,11 @@ impl<C: Component> Builder<C> {
     /// An out-port.
     pub fn output<T: PortValue>(&mut self, name: &str) -> Out<T> {
         match &mut self.mode {
-            Mode::Describe(d) => {
+            BuilderMode::Describe(d) => {
                 d.port(name, Direction::Out, T::value_type());
                 Out::loose()
             }
-            Mode::Make(m) => {
+            BuilderMode::Make(m) => {
                 let (port, end) = Out::new(&m.beat);
                 m.put_port(name, PortEnd::Out(end));
                 port
@@ -272,11 +272,11 @@ impl<C: Component> Builder<C> {
 
     fn any_property<T: PortValue>(&mut self, name: &str, value: T, is_default: bool) -> Prop<T> {
         match &mut self.mode {
-            Mode::Describe(d) => {
+            BuilderMode::Describe(d) => {
                 d.property(name, is_default.then(|| value.to_value()), T::value_type(), T::limits());
                 Prop::loose(value)
             }
-            Mode::Make(m) => {
+            BuilderMode::Make(m) => {
                 let (index, given) = m.next_value(name);
                 let fitting = given.and_then(T::from_value);
                 if fitting.is_none() {
@@ -298,7 +298,7 @@ impl<C: Component> Builder<C> {
         name: &str,
         f: impl Fn(&mut C, &mut Context, A) -> Answer<R> + Send + Sync + 'static,
     ) -> &mut Self {
-        if let Mode::Describe(d) = &mut self.mode {
+        if let BuilderMode::Describe(d) = &mut self.mode {
             let erased: OperationFn<C> = Box::new(move |component, cx, args| {
                 let Some(args) = A::from_values(args) else {
                     return Some(Reply::Refused("an argument does not fit".to_owned()));
@@ -324,8 +324,8 @@ impl<C: Component> Builder<C> {
         f: impl Fn(A) -> Answer<R> + Send + Sync + 'static,
     ) -> &mut Self {
         match &mut self.mode {
-            Mode::Describe(d) => d.operation(name, A::types(), R::value_type(), None),
-            Mode::Make(m) => {
+            BuilderMode::Describe(d) => d.operation(name, A::types(), R::value_type(), None),
+            BuilderMode::Make(m) => {
                 let erased: CallerFn = Arc::new(move |args| match A::from_values(args).map(&f) {
                     None => Reply::Refused("an argument does not fit".to_owned()),
                     Some(Answer::Done(value)) => Reply::Done(value.into_value()),
@@ -341,8 +341,8 @@ impl<C: Component> Builder<C> {
     /// Probes of what is `wanted`, beside connections. They come and go with what they look at; a component has one set.
     pub fn probes(&mut self, wanted: Arc<[Observed]>) -> Probes {
         match &mut self.mode {
-            Mode::Describe(_) => Probes::loose(),
-            Mode::Make(m) => {
+            BuilderMode::Describe(_) => Probes::loose(),
+            BuilderMode::Make(m) => {
                 let (probes, end) = Probes::new(wanted, &m.beat);
                 m.made.probes = Some(end);
                 probes
@@ -409,7 +409,7 @@ impl<C> Description<C> {
     }
 }
 
-impl<C> Making<C> {
+impl<C> MakingMembers<C> {
     fn put_port(&mut self, name: &str, end: PortEnd) {
         let (declared, index) = self.table.ports.get(self.next_port).copied().unwrap_or_else(|| undeclared(name));
         assert!(declared.as_str() == name, "declared `{name}` where the type has `{declared}`");

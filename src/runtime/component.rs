@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering;
 /// A component type, written in Rust.
 ///
 /// ```
-/// use davit::runtime::{Builder, Component, Context, In, Out, Prop};
+/// use davit::component::{Builder, Component, Context, In, Library, Out, Prop};
 ///
 /// struct Scale { u: In<f64>, y: Out<f64>, k: Prop<f64> }
 ///
@@ -35,7 +35,7 @@ use std::sync::atomic::Ordering;
 ///     }
 /// }
 ///
-/// let library = davit::runtime::Library::new("mine").with::<Scale>("Scale");
+/// let library = Library::new("mine").with::<Scale>("Scale");
 /// assert_eq!(library.catalogue().iter().next().unwrap().properties.len(), 1);
 /// ```
 ///

@@ -189,14 +189,14 @@ pub(crate) struct Left {
     pub(crate) quarantined: bool,
 }
 
-enum Of<'a, G> {
+enum GateOf<'a, G> {
     Lent(&'a G),
     Shared(Arc<G>),
 }
 
 /// The right to touch what is behind a gate: whoever has it has set `BUSY`. Dropped, it leaves.
 pub(crate) struct Inside<'a, G: Gated> {
-    of: Of<'a, G>,
+    of: GateOf<'a, G>,
     /// Whether the gate is left as it is when this is dropped.
     over: bool,
 }
@@ -205,7 +205,7 @@ impl<'a, G: Gated> Inside<'a, G> {
     /// For who has just set `BUSY`, and nobody else: dropped, it takes the bit back.
     #[inline]
     fn lent(of: &'a G) -> Self {
-        Self { of: Of::Lent(of), over: false }
+        Self { of: GateOf::Lent(of), over: false }
     }
 
     /// Enters to update: only when it runs and nobody is inside.
@@ -236,14 +236,14 @@ impl<'a, G: Gated> Inside<'a, G> {
     pub(crate) fn sent(mut self, with: &Arc<G>) -> Inside<'static, G> {
         assert!(std::ptr::eq(self.at(), &raw const **with), "the right is one of another gate");
         self.over = true;
-        Inside { of: Of::Shared(with.clone()), over: false }
+        Inside { of: GateOf::Shared(with.clone()), over: false }
     }
 
     #[inline]
     fn at(&self) -> &G {
         match &self.of {
-            Of::Lent(of) => of,
-            Of::Shared(of) => of,
+            GateOf::Lent(of) => of,
+            GateOf::Shared(of) => of,
         }
     }
 

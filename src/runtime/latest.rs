@@ -32,17 +32,7 @@ pub struct Writer<T> {
 }
 
 /// The side that reads. It may go to another thread with values that may; several threads may look at it at once only where
-/// they may look at the value at once:
-///
-/// ```
-/// fn shared<T: Sync>(_: &T) {}
-/// shared(&davit::runtime::latest::latest(0_u64).1);
-/// ```
-///
-/// ```compile_fail,E0277
-/// fn shared<T: Sync>(_: &T) {}
-/// shared(&davit::runtime::latest::latest(std::cell::Cell::new(0_u64)).1);
-/// ```
+/// they may look at the value at once.
 pub struct Reader<T> {
     shared: Arc<Slots<T>>,
     own: u8,

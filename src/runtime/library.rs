@@ -1,7 +1,7 @@
 //! Libraries: named sets of component types. A catalogue starts nothing.
 
 use super::beat::Beat;
-use super::builder::{Builder, Ends, Table, hook_index};
+use super::builder::{Builder, Ends, MemberTable, hook_index};
 use super::call::Reply;
 use super::component::{Component, Context, HookResult};
 use crate::model::{Catalogue, ComponentType, Ident, Transition, TypeName, Value};
@@ -18,7 +18,7 @@ pub(crate) trait Body: Send {
 
 struct Typed<C> {
     component: C,
-    table: Arc<Table<C>>,
+    table: Arc<MemberTable<C>>,
 }
 
 impl<C: Component> Body for Typed<C> {
@@ -42,13 +42,13 @@ impl<C: Component> Body for Typed<C> {
 }
 
 /// A component with the configurator's ends of its members and the values of its properties.
-pub(crate) struct Made {
+pub(crate) struct MadeComponent {
     pub(crate) body: Box<dyn Body>,
     pub(crate) ends: Ends,
     pub(crate) values: Vec<Value>,
 }
 
-type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<Made, String> + Send + Sync>;
+type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<MadeComponent, String> + Send + Sync>;
 
 /// A component type that this program can make.
 pub struct Kind {
@@ -94,7 +94,7 @@ impl Kind {
         let operations = ty.operations.keys().copied().collect();
         let make: Maker = Box::new(move |beat, values| {
             let (component, ends, values) = Builder::make(&table, beat, values, &new)?;
-            Ok(Made { body: Box::new(Typed { component, table: table.clone() }), ends, values })
+            Ok(MadeComponent { body: Box::new(Typed { component, table: table.clone() }), ends, values })
         });
         Self { ty: Arc::new(ty), hooks, immediate: false, ports, properties, operations, make }
     }
@@ -122,7 +122,7 @@ impl Kind {
         self.hooks.contains(&true)
     }
 
-    pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<Made, String> {
+    pub(crate) fn make(&self, beat: &Arc<Beat>, values: Vec<Value>) -> Result<MadeComponent, String> {
         (self.make)(beat, values)
     }
 }
@@ -146,17 +146,18 @@ impl Library {
     /// With the component type `C`, under the name that deployments use: `Gain`, `youbot.Dynamics`.
     ///
     /// # Panics
-    /// When the declaration is wrong; see [`Kind::of`].
+    /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with<C: Component>(mut self, type_name: &str) -> Self {
         self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
         self
     }
 
-    /// As [`Library::with`], with the promise of [`Kind::immediate`].
+    /// As [`Library::with`], with the promise that `C` does nothing but declare when it is made, and waits for nothing when it
+    /// is dropped: both are then done without a worker.
     ///
     /// # Panics
-    /// When the declaration is wrong; see [`Kind::of`].
+    /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with_immediate<C: Component>(self, type_name: &str) -> Self {
         self.with_kind(Kind::of::<C>(type_name).immediate())

@@ -10,7 +10,7 @@
 use super::sync::{Arc, AtomicPtr, Ordering};
 use std::ptr::null_mut;
 
-struct Node<L> {
+struct ChainNode<L> {
     next: Option<Box<Self>>,
     id: u64,
     /// The link to add; none: remove the one with this number.
@@ -19,9 +19,9 @@ struct Node<L> {
 
 struct Boxes<L> {
     /// Orders, oldest first. Filled by the configurator, emptied by either.
-    inbox: AtomicPtr<Node<L>>,
+    inbox: AtomicPtr<ChainNode<L>>,
     /// What may be dropped. Filled by the owner, emptied by the configurator.
-    outbox: AtomicPtr<Node<L>>,
+    outbox: AtomicPtr<ChainNode<L>>,
 }
 
 // SAFETY: the pointers are owned chains of boxes, handed over whole by acquire-release exchanges; whoever takes one out owns it
@@ -30,7 +30,7 @@ struct Boxes<L> {
 unsafe impl<L: Send> Sync for Boxes<L> {}
 unsafe impl<L: Send> Send for Boxes<L> {}
 
-fn take<L>(slot: &AtomicPtr<Node<L>>) -> Option<Box<Node<L>>> {
+fn take<L>(slot: &AtomicPtr<ChainNode<L>>) -> Option<Box<ChainNode<L>>> {
     let taken = slot.swap(null_mut(), Ordering::AcqRel);
     // SAFETY: what is not null came from `put` below and has just been taken out: it is ours alone.
     (!taken.is_null()).then(|| unsafe { Box::from_raw(taken) })
@@ -38,7 +38,7 @@ fn take<L>(slot: &AtomicPtr<Node<L>>) -> Option<Box<Node<L>>> {
 
 /// Puts a chain in an empty slot. Only one side fills a slot, and the other only empties it, so it is still empty. An exchange
 /// all the same, not a store: it is as cheap on a way that is taken only when something changes, and what it finds is seen.
-fn put<L>(slot: &AtomicPtr<Node<L>>, chain: Option<Box<Node<L>>>) {
+fn put<L>(slot: &AtomicPtr<ChainNode<L>>, chain: Option<Box<ChainNode<L>>>) {
     if let Some(chain) = chain {
         let before = slot.swap(Box::into_raw(chain), Ordering::AcqRel);
         debug_assert!(before.is_null(), "filled by one side only");
@@ -46,7 +46,7 @@ fn put<L>(slot: &AtomicPtr<Node<L>>, chain: Option<Box<Node<L>>>) {
 }
 
 /// Frees a chain one node at a time: the compiler's own drop would recurse.
-fn free<L>(mut chain: Option<Box<Node<L>>>) {
+fn free<L>(mut chain: Option<Box<ChainNode<L>>>) {
     while let Some(mut node) = chain {
         chain = node.next.take();
     }
@@ -65,7 +65,7 @@ pub struct Sender<L>(Arc<Boxes<L>>);
 /// The owner's side.
 pub struct Links<L> {
     boxes: Arc<Boxes<L>>,
-    first: Option<Box<Node<L>>>,
+    first: Option<Box<ChainNode<L>>>,
 }
 
 /// An empty list.
@@ -77,15 +77,15 @@ pub fn links<L>() -> (Sender<L>, Links<L>) {
 impl<L> Sender<L> {
     /// Adds a link at the end of the list.
     pub fn add(&mut self, id: u64, link: L) {
-        self.order(Box::new(Node { next: None, id, link: Some(link) }));
+        self.order(Box::new(ChainNode { next: None, id, link: Some(link) }));
     }
 
     /// Removes the link of that number.
     pub fn remove(&mut self, id: u64) {
-        self.order(Box::new(Node { next: None, id, link: None }));
+        self.order(Box::new(ChainNode { next: None, id, link: None }));
     }
 
-    fn order(&mut self, node: Box<Node<L>>) {
+    fn order(&mut self, node: Box<ChainNode<L>>) {
         free(take(&self.0.outbox));
         let mut chain = take(&self.0.inbox);
         // A link the owner has not even seen is taken back: orders of a port that nobody uses do not pile up.
@@ -98,7 +98,7 @@ impl<L> Sender<L> {
     }
 }
 
-fn append<L>(chain: &mut Option<Box<Node<L>>>, node: Box<Node<L>>) {
+fn append<L>(chain: &mut Option<Box<ChainNode<L>>>, node: Box<ChainNode<L>>) {
     let mut end = chain;
     while let Some(next) = end {
         end = &mut next.next;
@@ -106,7 +106,7 @@ fn append<L>(chain: &mut Option<Box<Node<L>>>, node: Box<Node<L>>) {
     *end = Some(node);
 }
 
-fn remove_from<L>(chain: &mut Option<Box<Node<L>>>, id: u64) -> Option<Box<Node<L>>> {
+fn remove_from<L>(chain: &mut Option<Box<ChainNode<L>>>, id: u64) -> Option<Box<ChainNode<L>>> {
     let mut at = chain;
     while at.as_ref().is_some_and(|node| node.id != id || node.link.is_none()) {
         at = &mut at.as_mut().expect("looked at just now").next;

@@ -7,7 +7,7 @@
 use super::beat::Beat;
 use super::latest::{Reader, Writer, latest};
 use super::links::{Links, Sender, links};
-use super::probe::{Tap, Tapped};
+use super::probe::{ProbeTap, Tapped};
 use super::value::PortValue;
 use crate::model::{EventName, Policy, Value};
 use crate::time::Time;
@@ -18,12 +18,12 @@ use std::time::Duration;
 
 /// A value with the moment it was written; none: never written.
 #[derive(Debug, Clone)]
-pub(super) struct Slot<T> {
+pub(super) struct Stamped<T> {
     pub(super) value: Option<T>,
     pub(super) at: Time,
 }
 
-impl<T: Clone> Slot<T> {
+impl<T: Clone> Stamped<T> {
     const EMPTY: Self = Self { value: None, at: Time(0) };
 
     fn set(&mut self, value: &T, at: Time) {
@@ -37,10 +37,10 @@ impl<T: Clone> Slot<T> {
 
 /// Where an in-port's values come from.
 enum Source<T> {
-    Data(Reader<Slot<T>>),
+    Data(Reader<Stamped<T>>),
     Fifo(rtrb::Consumer<(T, Time)>, Arc<AtomicU64>),
     /// What `port_write` writes; in force while nothing else is there.
-    Written(Reader<Slot<T>>),
+    Written(Reader<Stamped<T>>),
 }
 
 /// What an in-port was read to hold.
@@ -62,11 +62,11 @@ pub struct Sample<'a, T> {
 pub struct In<T> {
     links: Links<Source<T>>,
     /// The value popped last from a queue.
-    popped: Slot<T>,
+    popped: Stamped<T>,
     beat: Option<Arc<Beat>>,
 }
 
-enum Found {
+enum FoundSource {
     Data,
     Fifo,
     Written,
@@ -76,40 +76,40 @@ enum Found {
 impl<T: PortValue> In<T> {
     /// A port of nobody: what a description of a type holds.
     pub(crate) fn loose() -> Self {
-        Self { links: links().1, popped: Slot::EMPTY, beat: None }
+        Self { links: links().1, popped: Stamped::EMPTY, beat: None }
     }
 
     pub(crate) fn new(beat: &Arc<Beat>) -> (Self, Box<dyn InEnd>) {
         let (sender, list) = links();
-        let port = Self { links: list, popped: Slot::EMPTY, beat: Some(beat.clone()) };
-        (port, Box::new(End::<T> { sender, written: None, beat: beat.clone() }))
+        let port = Self { links: list, popped: Stamped::EMPTY, beat: Some(beat.clone()) };
+        (port, Box::new(InPortEnd::<T> { sender, written: None, beat: beat.clone() }))
     }
 
     /// Reads: the value, when it was written, and whether it has been read before.
     pub fn sample(&mut self) -> Option<Sample<'_, T>> {
         self.links.refresh();
-        let mut found = Found::Nothing;
+        let mut found = FoundSource::Nothing;
         for link in self.links.iter_mut() {
             match link {
                 Source::Data(_) => {
-                    found = Found::Data;
+                    found = FoundSource::Data;
                     break;
                 }
                 Source::Fifo(..) => {
-                    found = Found::Fifo;
+                    found = FoundSource::Fifo;
                     break;
                 }
-                Source::Written(_) => found = Found::Written,
+                Source::Written(_) => found = FoundSource::Written,
             }
         }
         let (slot, fresh) = match found {
-            Found::Nothing => return None,
-            Found::Fifo => {
+            FoundSource::Nothing => return None,
+            FoundSource::Fifo => {
                 let fresh = self.pop();
                 (&self.popped, fresh)
             }
-            Found::Data | Found::Written => {
-                let data = matches!(found, Found::Data);
+            FoundSource::Data | FoundSource::Written => {
+                let data = matches!(found, FoundSource::Data);
                 let reader = self.links.iter_mut().find_map(|link| match link {
                     Source::Data(reader) if data => Some(reader),
                     Source::Written(reader) if !data => Some(reader),
@@ -136,7 +136,7 @@ impl<T: PortValue> In<T> {
         }
         match oldest.and_then(|(_, queue)| queue.pop().ok()) {
             Some((value, at)) => {
-                self.popped = Slot { value: Some(value), at };
+                self.popped = Stamped { value: Some(value), at };
                 true
             }
             None => false,
@@ -185,9 +185,9 @@ pub struct Inlet<T> {
 }
 
 enum InletKind<T> {
-    Data(Writer<Slot<T>>),
+    Data(Writer<Stamped<T>>),
     /// A probe: the latest value, and how often there was one.
-    Tap(Writer<(Slot<T>, u64)>, u64),
+    Tap(Writer<(Stamped<T>, u64)>, u64),
     Fifo(rtrb::Producer<(T, Time)>, Arc<AtomicU64>),
 }
 
@@ -240,14 +240,14 @@ impl<T: PortValue> Feed for Inlet<T> {
     }
 }
 
-enum Target<T> {
+enum PortTarget<T> {
     Same(Inlet<T>),
     Converted(Box<dyn Feed>),
 }
 
 /// An out-port. A write goes to all its connections; without any it goes nowhere.
 pub struct Out<T> {
-    links: Links<Target<T>>,
+    links: Links<PortTarget<T>>,
     beat: Option<Arc<Beat>>,
 }
 
@@ -257,7 +257,7 @@ impl<T: PortValue> Out<T> {
     }
 
     pub(crate) fn new(beat: &Arc<Beat>) -> (Self, Box<dyn OutEnd>) {
-        let (sender, list) = links::<Target<T>>();
+        let (sender, list) = links::<PortTarget<T>>();
         (Self { links: list, beat: Some(beat.clone()) }, Box::new(sender))
     }
 
@@ -279,8 +279,8 @@ impl<T: PortValue> Out<T> {
         self.links.refresh();
         for link in self.links.iter_mut() {
             match link {
-                Target::Same(inlet) => inlet.put(value, at),
-                Target::Converted(feed) => feed.put_value(&value.to_value(), at),
+                PortTarget::Same(inlet) => inlet.put(value, at),
+                PortTarget::Converted(feed) => feed.put_value(&value.to_value(), at),
             }
         }
     }
@@ -316,8 +316,8 @@ pub type EventIn = In<EventName>;
 
 /// An in-port as the configurator sees it.
 pub trait InEnd: Send {
-    /// Makes connection `id`, and gives its writing end and the count of values lost.
-    fn open(&mut self, id: u64, policy: Policy) -> (Box<dyn Feed>, Option<Arc<AtomicU64>>);
+    /// Makes connection `id`, and gives its writing end.
+    fn open(&mut self, id: u64, policy: Policy) -> Box<dyn Feed>;
     /// Ends connection `id`.
     fn close(&mut self, id: u64);
     /// Takes the memory that writes need.
@@ -326,29 +326,29 @@ pub trait InEnd: Send {
     fn write(&mut self, value: Option<&Value>, at: Time) -> bool;
 }
 
-struct End<T> {
+struct InPortEnd<T> {
     sender: Sender<Source<T>>,
-    written: Option<Writer<Slot<T>>>,
+    written: Option<Writer<Stamped<T>>>,
     beat: Arc<Beat>,
 }
 
 /// The number of the pseudo-connection that carries written values; connections are counted from 1.
 const WRITTEN: u64 = 0;
 
-impl<T: PortValue> InEnd for End<T> {
-    fn open(&mut self, id: u64, policy: Policy) -> (Box<dyn Feed>, Option<Arc<AtomicU64>>) {
+impl<T: PortValue> InEnd for InPortEnd<T> {
+    fn open(&mut self, id: u64, policy: Policy) -> Box<dyn Feed> {
         let wake = self.beat.is_event_driven().then(|| self.beat.clone());
         match policy {
             Policy::Data => {
-                let (writer, reader) = latest(Slot::EMPTY);
+                let (writer, reader) = latest(Stamped::EMPTY);
                 self.sender.add(id, Source::Data(reader));
-                (Box::new(Inlet { kind: InletKind::Data(writer), wake }), None)
+                Box::new(Inlet { kind: InletKind::Data(writer), wake })
             }
             Policy::Buffer(n) => {
                 let (producer, consumer) = rtrb::RingBuffer::new(n.max(1) as usize);
                 let lost = Arc::new(AtomicU64::new(0));
                 self.sender.add(id, Source::Fifo(consumer, lost.clone()));
-                (Box::new(Inlet { kind: InletKind::Fifo(producer, lost.clone()), wake }), Some(lost))
+                Box::new(Inlet { kind: InletKind::Fifo(producer, lost), wake })
             }
         }
     }
@@ -359,7 +359,7 @@ impl<T: PortValue> InEnd for End<T> {
 
     fn prepare(&mut self) {
         if self.written.is_none() {
-            let (writer, reader) = latest(Slot::EMPTY);
+            let (writer, reader) = latest(Stamped::EMPTY);
             self.sender.add(WRITTEN, Source::Written(reader));
             self.written = Some(writer);
         }
@@ -373,7 +373,7 @@ impl<T: PortValue> InEnd for End<T> {
         };
         self.prepare();
         if let Some(writer) = &mut self.written {
-            writer.write(|slot| *slot = Slot { value, at });
+            writer.write(|slot| *slot = Stamped { value, at });
         }
         self.beat.poke();
         true
@@ -387,18 +387,18 @@ pub(crate) trait OutEnd: Send {
     /// Removes connection or probe `id`.
     fn detach(&mut self, id: u64);
     /// Adds the probe `id`; every write wakes `wake`.
-    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap>;
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn ProbeTap>;
 }
 
-impl<T: PortValue> OutEnd for Sender<Target<T>> {
+impl<T: PortValue> OutEnd for Sender<PortTarget<T>> {
     fn attach(&mut self, id: u64, feed: Box<dyn Feed>) {
         let target = if feed.as_any().is::<Inlet<T>>() {
             match feed.into_any().downcast::<Inlet<T>>() {
-                Ok(inlet) => Target::Same(*inlet),
+                Ok(inlet) => PortTarget::Same(*inlet),
                 Err(_) => unreachable!("recognised just now"),
             }
         } else {
-            Target::Converted(feed)
+            PortTarget::Converted(feed)
         };
         self.add(id, target);
     }
@@ -407,9 +407,9 @@ impl<T: PortValue> OutEnd for Sender<Target<T>> {
         self.remove(id);
     }
 
-    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn Tap> {
-        let (writer, reader) = latest((Slot::EMPTY, 0));
-        self.add(id, Target::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
+    fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn ProbeTap> {
+        let (writer, reader) = latest((Stamped::EMPTY, 0));
+        self.add(id, PortTarget::Same(Inlet { kind: InletKind::Tap(writer, 0), wake }));
         Box::new(Tapped { reader })
     }
 }
@@ -431,7 +431,7 @@ mod tests {
         let (mut input, mut in_end) = In::<f64>::new(&b);
         assert_eq!(input.get(), None);
         out.write(1.0);
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         assert_eq!(input.get(), None, "a connection carries what is written from now on");
         a.set_now(Time(1_000));
         out.write(2.0);
@@ -450,7 +450,7 @@ mod tests {
         assert!(in_end.write(Some(&Value::Float(7.0)), Time(3)));
         assert!(!in_end.write(Some(&Value::Bool(true)), Time(3)));
         assert_eq!(input.take(), Some(7.0));
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         assert_eq!(input.get(), None);
         out.write(1.0);
         assert_eq!(input.get(), Some(1.0));
@@ -469,8 +469,8 @@ mod tests {
         let (mut first, mut first_end) = Out::<i64>::new(&a);
         let (mut second, mut second_end) = Out::<i64>::new(&b);
         let (mut input, mut in_end) = In::<i64>::new(&c);
-        first_end.attach(1, in_end.open(1, Policy::Buffer(2)).0);
-        second_end.attach(2, in_end.open(2, Policy::Buffer(2)).0);
+        first_end.attach(1, in_end.open(1, Policy::Buffer(2)));
+        second_end.attach(2, in_end.open(2, Policy::Buffer(2)));
         for (t, value) in [(10, 1), (30, 3), (50, 5)] {
             a.set_now(Time(t));
             first.write(value);
@@ -486,7 +486,7 @@ mod tests {
         let (a, b) = (beat("a"), beat("b"));
         let (mut out, mut out_end) = Out::<[f64; 2]>::new(&a);
         let (mut input, mut in_end) = In::<nalgebra::Vector2<f64>>::new(&b);
-        out_end.attach(1, in_end.open(1, Policy::Data).0);
+        out_end.attach(1, in_end.open(1, Policy::Data));
         out.write([1.0, 2.0]);
         assert_eq!(input.get(), Some(nalgebra::Vector2::new(1.0, 2.0)));
     }

@@ -8,7 +8,7 @@ use super::beat::Beat;
 use super::cell::Cell;
 use super::latest::Reader;
 use super::links::{Links, Sender, links};
-use super::port::Slot;
+use super::port::Stamped;
 use super::value::PortValue;
 use crate::model::monitor::{Counter, Part};
 use crate::model::{ComponentName, Ident, MemberRef, RunState};
@@ -27,7 +27,7 @@ pub enum Observed {
 }
 
 /// A port seen from outside.
-pub(crate) trait Tap: Send {
+pub(crate) trait ProbeTap: Send {
     /// Fetches the newest value; answers when it was written and how often so far. None: never, since the tap is there.
     fn fetch(&mut self) -> Option<(Time, u64)>;
 
@@ -37,10 +37,10 @@ pub(crate) trait Tap: Send {
 
 /// The reading end of a probe.
 pub(super) struct Tapped<T> {
-    pub(super) reader: Reader<(Slot<T>, u64)>,
+    pub(super) reader: Reader<(Stamped<T>, u64)>,
 }
 
-impl<T: PortValue> Tap for Tapped<T> {
+impl<T: PortValue> ProbeTap for Tapped<T> {
     fn fetch(&mut self) -> Option<(Time, u64)> {
         self.reader.update();
         let (slot, writes) = self.reader.value();
@@ -54,7 +54,7 @@ impl<T: PortValue> Tap for Tapped<T> {
 
 /// One probe.
 pub(crate) enum Probe {
-    Port(Box<dyn Tap>),
+    Port(Box<dyn ProbeTap>),
     Component(Arc<Cell>),
     Activity(Arc<Activity>),
 }

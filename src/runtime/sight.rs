@@ -12,11 +12,11 @@ use std::sync::Arc;
 pub struct Sight {
     wanted: Arc<[Observed]>,
     /// The inputs that each probe serves.
-    served: Arc<[Vec<(usize, What)>]>,
+    served: Arc<[Vec<(usize, SightOf)>]>,
 }
 
 /// What an input takes from its probe.
-enum What {
+enum SightOf {
     Number(Vec<Part>),
     State,
     Faulted,
@@ -27,13 +27,13 @@ impl Sight {
     /// What serves these inputs.
     pub fn of(inputs: &[Input]) -> Self {
         let mut wanted: Vec<Observed> = Vec::new();
-        let mut served: Vec<Vec<(usize, What)>> = Vec::new();
+        let mut served: Vec<Vec<(usize, SightOf)>> = Vec::new();
         for (i, input) in inputs.iter().enumerate() {
             let (of, what) = match input {
-                Input::Port(signal) => (Observed::Port(signal.member), What::Number(signal.path.clone())),
-                Input::State(component) => (Observed::Component(*component), What::State),
-                Input::Faulted(component) => (Observed::Component(*component), What::Faulted),
-                Input::Activity { activity, counter } => (Observed::Activity(*activity), What::Counter(*counter)),
+                Input::Port(signal) => (Observed::Port(signal.member), SightOf::Number(signal.path.clone())),
+                Input::State(component) => (Observed::Component(*component), SightOf::State),
+                Input::Faulted(component) => (Observed::Component(*component), SightOf::Faulted),
+                Input::Activity { activity, counter } => (Observed::Activity(*activity), SightOf::Counter(*counter)),
             };
             let place = wanted.iter().position(|w| *w == of).unwrap_or_else(|| {
                 wanted.push(of);
@@ -59,14 +59,14 @@ impl Sight {
             let written = seen.written();
             for (input, what) in &self.served[place] {
                 let sample = match what {
-                    What::Number(path) => {
+                    SightOf::Number(path) => {
                         written.map(|(at, writes)| (seen.number(path).unwrap_or(f64::NAN), at, writes))
                     }
-                    What::State => seen.state().map(|state| (state_value(state), now, 0)),
-                    What::Faulted => {
+                    SightOf::State => seen.state().map(|state| (state_value(state), now, 0)),
+                    SightOf::Faulted => {
                         seen.state().map(|state| (f64::from(u8::from(state == RunState::Faulted)), now, 0))
                     }
-                    What::Counter(counter) => seen.counter(*counter).map(|value| (value, now, 0)),
+                    SightOf::Counter(counter) => seen.counter(*counter).map(|value| (value, now, 0)),
                 };
                 if let Some((value, at, writes)) = sample {
                     samples[*input] = Sample { value, at, writes, present: true };

@@ -267,7 +267,7 @@ pub fn field_name(name: &str) -> Ident {
 ///         pub vel: [f64; 5],
 ///     }
 /// }
-/// use davit::runtime::PortValue;
+/// use davit::component::PortValue;
 /// assert_eq!(JointState::value_type().to_string(), "{pos: float[5], vel: float[5]}");
 /// ```
 ///
@@ -283,26 +283,26 @@ macro_rules! record {
             $($(#[$field_attribute])* $field_vis $field: $ty,)+
         }
 
-        impl $crate::runtime::PortValue for $name {
-            fn value_type() -> $crate::model::ValueType {
-                $crate::model::ValueType::Record(vec![$((
-                    $crate::runtime::value::field_name(stringify!($field)),
-                    <$ty as $crate::runtime::PortValue>::value_type(),
+        impl $crate::component::PortValue for $name {
+            fn value_type() -> $crate::ValueType {
+                $crate::ValueType::Record(vec![$((
+                    $crate::component::recorded::field_name(stringify!($field)),
+                    <$ty as $crate::component::PortValue>::value_type(),
                 )),+])
             }
-            fn to_value(&self) -> $crate::model::Value {
-                $crate::model::Value::Record(vec![$((
-                    $crate::runtime::value::field_name(stringify!($field)),
-                    $crate::runtime::PortValue::to_value(&self.$field),
+            fn to_value(&self) -> $crate::Value {
+                $crate::Value::Record(vec![$((
+                    $crate::component::recorded::field_name(stringify!($field)),
+                    $crate::component::PortValue::to_value(&self.$field),
                 )),+])
             }
-            fn from_value(value: &$crate::model::Value) -> Option<Self> {
-                Some(Self { $($field: $crate::runtime::value::field(value, stringify!($field))?),+ })
+            fn from_value(value: &$crate::Value) -> Option<Self> {
+                Some(Self { $($field: $crate::component::recorded::field(value, stringify!($field))?),+ })
             }
-            fn number(&self, path: &[$crate::model::monitor::Part]) -> Option<f64> {
-                let ($crate::model::monitor::Part::Field(field), rest) = path.split_first()? else { return None };
+            fn number(&self, path: &[$crate::component::ValuePart]) -> Option<f64> {
+                let ($crate::component::ValuePart::Field(field), rest) = path.split_first()? else { return None };
                 $(if field.as_str() == stringify!($field) {
-                    return $crate::runtime::PortValue::number(&self.$field, rest);
+                    return $crate::component::PortValue::number(&self.$field, rest);
                 })+
                 None
             }

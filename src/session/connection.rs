@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 /// A client, at the other end of a stream.
-pub(super) struct Connection {
+pub(super) struct SocketConnection {
     /// Its number among all, from 2 (scripts have the number 1).
     pub number: u32,
     stream: UnixStream,
@@ -18,7 +18,7 @@ pub(super) struct Connection {
     writing: Mutex<()>,
 }
 
-impl Connection {
+impl SocketConnection {
     /// Its client may take so long to accept what is written to it.
     pub fn new(number: u32, stream: UnixStream, write: Duration) -> io::Result<Self> {
         // A client that does not read must not hold a thread for ever.
@@ -51,7 +51,7 @@ impl Connection {
 }
 
 /// What a client said next.
-pub(super) enum Said {
+pub(super) enum SaidTo {
     Line(String),
     NotText,
     TooLong,
@@ -71,12 +71,12 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub fn of(connection: &'a Connection) -> Self {
+    pub fn of(connection: &'a SocketConnection) -> Self {
         Lines { stream: &connection.stream, clock: Clock::real(), buffer: Vec::new(), seen: 0 }
     }
 
     /// The next line, if it is whole within `limit`.
-    pub fn next(&mut self, limit: Option<Duration>) -> io::Result<Said> {
+    pub fn next(&mut self, limit: Option<Duration>) -> io::Result<SaidTo> {
         let deadline = limit.map(|limit| self.clock.now() + limit);
         let mut chunk = [0; 8192];
         loop {
@@ -87,22 +87,22 @@ impl<'a> Lines<'a> {
             }
             self.seen = self.buffer.len();
             if self.seen > limits::SOCKET_LINE {
-                return Ok(Said::TooLong);
+                return Ok(SaidTo::TooLong);
             }
             let left = deadline.map(|deadline| deadline.since(self.clock.now()));
             if left == Some(Duration::ZERO) {
-                return Ok(Said::Nothing);
+                return Ok(SaidTo::Nothing);
             }
             self.stream.set_read_timeout(left)?;
             match self.stream.read(&mut chunk) {
-                Ok(0) if self.buffer.is_empty() => return Ok(Said::End),
+                Ok(0) if self.buffer.is_empty() => return Ok(SaidTo::End),
                 Ok(0) => {
                     self.seen = 0;
                     return Ok(text(std::mem::take(&mut self.buffer)));
                 }
                 Ok(n) => self.buffer.extend_from_slice(&chunk[..n]),
                 Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
-                    return Ok(Said::Nothing);
+                    return Ok(SaidTo::Nothing);
                 }
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(e) => return Err(e),
@@ -111,9 +111,9 @@ impl<'a> Lines<'a> {
     }
 }
 
-fn text(line: Vec<u8>) -> Said {
+fn text(line: Vec<u8>) -> SaidTo {
     if line.len() > limits::SOCKET_LINE {
-        return Said::TooLong;
+        return SaidTo::TooLong;
     }
-    String::from_utf8(line).map_or(Said::NotText, Said::Line)
+    String::from_utf8(line).map_or(SaidTo::NotText, SaidTo::Line)
 }

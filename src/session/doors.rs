@@ -1,9 +1,9 @@
 //! Who is let in at the control socket: places, those that are kept, and what is done when there is none.
 
-use super::connection::Connection;
+use super::connection::SocketConnection;
 use super::place;
 use super::rpc::{self, RpcError};
-use super::serving::{Shared, serve, too_many};
+use super::serving::{ServingShared, serve, too_many};
 use crate::time::lock;
 use serde_json::Value as Json;
 use std::fs::File;
@@ -15,28 +15,28 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 /// The connections there are, and whether there may be more.
 #[derive(Default)]
 pub(super) struct Doors {
-    inside: Mutex<Inside>,
+    inside: Mutex<InsideDoor>,
     closed: Condvar,
 }
 
 #[derive(Default)]
-struct Inside {
+struct InsideDoor {
     closed: bool,
     places: usize,
     kept: usize,
-    connections: Vec<Weak<Connection>>,
+    connections: Vec<Weak<SocketConnection>>,
 }
 
 /// One that is let in, and finds no thread: the system has none left.
-type Waiting = (Arc<Connection>, Place);
+type Waiting = (Arc<SocketConnection>, DoorPlace);
 
 /// A place, until it is dropped.
-struct Place {
+struct DoorPlace {
     doors: Arc<Doors>,
     kept: bool,
 }
 
-impl Drop for Place {
+impl Drop for DoorPlace {
     fn drop(&mut self) {
         let mut inside = lock(&self.doors.inside);
         *(if self.kept { &mut inside.kept } else { &mut inside.places }) -= 1;
@@ -61,34 +61,34 @@ impl Doors {
     }
 
     /// A place, an ordinary one if there is one left.
-    fn place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+    fn place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         let kept = inside.places >= shared.bounds.connections;
         if kept && inside.kept >= shared.bounds.kept {
             return None;
         }
         *(if kept { &mut inside.kept } else { &mut inside.places }) += 1;
-        Some(Place { doors: self.clone(), kept })
+        Some(DoorPlace { doors: self.clone(), kept })
     }
 
     /// A place of those that are kept.
-    fn kept_place(self: &Arc<Self>, shared: &Shared) -> Option<Place> {
+    fn kept_place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
         if inside.kept >= shared.bounds.kept {
             return None;
         }
         inside.kept += 1;
-        Some(Place { doors: self.clone(), kept: true })
+        Some(DoorPlace { doors: self.clone(), kept: true })
     }
 
-    fn enter(&self, connection: &Arc<Connection>) {
+    fn enter(&self, connection: &Arc<SocketConnection>) {
         let mut inside = lock(&self.inside);
         inside.connections.retain(|there| there.strong_count() > 0);
         inside.connections.push(Arc::downgrade(connection));
     }
 
     /// Lets clients in until the doors are closed.
-    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<Shared>) {
+    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<ServingShared>) {
         // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
         let mut spare = File::open("/dev/null").ok();
         // There before there is none left: an emergency stop needs no thread.
@@ -120,21 +120,27 @@ impl Doors {
     }
 
     /// Waits a little, or until the doors are closed.
-    fn pause(&self, shared: &Shared) {
+    fn pause(&self, shared: &ServingShared) {
         let inside = lock(&self.inside);
-        let still = |inside: &mut Inside| !inside.closed;
+        let still = |inside: &mut InsideDoor| !inside.closed;
         drop(
             self.closed.wait_timeout_while(inside, shared.bounds.pause, still).unwrap_or_else(PoisonError::into_inner),
         );
     }
 
-    fn admit(self: &Arc<Self>, number: u32, stream: UnixStream, shared: &Arc<Shared>, waiting: &SyncSender<Waiting>) {
+    fn admit(
+        self: &Arc<Self>,
+        number: u32,
+        stream: UnixStream,
+        shared: &Arc<ServingShared>,
+        waiting: &SyncSender<Waiting>,
+    ) {
         if !place::is_own(&stream) {
             let why = "this socket is for the processes of its own user";
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
         }
         let Some(place) = self.place(shared) else { return refuse(number, stream, shared, too_many()) };
-        let Ok(connection) = Connection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
+        let Ok(connection) = SocketConnection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
         self.enter(&connection);
         let may = {
             let inside = lock(&self.inside);
@@ -157,15 +163,15 @@ impl Doors {
 }
 
 /// Answers one connection to its end.
-fn attend(connection: &Arc<Connection>, shared: &Shared, kept: bool) {
+fn attend(connection: &Arc<SocketConnection>, shared: &ServingShared, kept: bool) {
     let _ = serve(connection, shared, kept);
     shared.subscribers.remove(connection.number);
     connection.cut();
 }
 
-fn refuse(number: u32, stream: UnixStream, shared: &Shared, why: RpcError) {
+fn refuse(number: u32, stream: UnixStream, shared: &ServingShared, why: RpcError) {
     // A line of a new connection finds room: nobody waits here.
-    if let Ok(connection) = Connection::new(number, stream, shared.bounds.write) {
+    if let Ok(connection) = SocketConnection::new(number, stream, shared.bounds.write) {
         let _ = connection.send(&rpc::answer(&Json::Null, Err(why)));
     }
 }

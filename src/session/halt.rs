@@ -53,12 +53,12 @@ impl std::fmt::Display for StandsStill {
 
 /// Of one session.
 #[derive(Default)]
-pub(super) struct Halt {
+pub(super) struct StoppingState {
     /// Declared safety events.
     safety: FxHashSet<EventName>,
     /// The safe configurations, in the order written.
     safe: Vec<ConfigId>,
-    state: Mutex<State>,
+    state: Mutex<HaltState>,
 }
 
 /// What a safety event does that acts by itself.
@@ -70,7 +70,7 @@ pub(super) struct Heeded<'h> {
 }
 
 #[derive(Default)]
-struct State {
+struct HaltState {
     /// Stopping has begun.
     began: bool,
     stage: Option<Stage>,
@@ -83,7 +83,7 @@ struct State {
     reported: Vec<String>,
 }
 
-impl Halt {
+impl StoppingState {
     pub fn new(safety: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
         Self { safety: safety.into_iter().collect(), safe, state: Mutex::default() }
     }

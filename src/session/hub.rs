@@ -3,9 +3,9 @@
 //!
 //! All of it is called from the threads of others and never waits for anything but short locks of its own.
 
-use super::halt::Halt;
+use super::halt::StoppingState;
 use super::lanes::Lanes;
-use super::log::{Answered, Entry, Fault, Happening, Log, Phase};
+use super::log::{Answered, Fault, Happening, Log, LogEntry, Phase};
 use super::names::Unlisted;
 use super::tap::Hears;
 use crate::coordinator::{Put, Refused};
@@ -27,7 +27,7 @@ pub struct Hub {
     clock: Clock,
     /// For those who wait outside.
     real: Clock,
-    state: Mutex<State>,
+    state: Mutex<HubState>,
     /// Whether events were dropped that nobody was told of.
     untold: AtomicBool,
     /// Wakes whoever drives the session.
@@ -38,10 +38,10 @@ pub struct Hub {
     emits: FxHashSet<EventName>,
     /// Names from outside that only functions may hear.
     pub(super) unlisted: Unlisted,
-    halt: Halt,
+    halt: StoppingState,
 }
 
-struct State {
+struct HubState {
     phase: Phase,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
@@ -71,8 +71,6 @@ pub struct Outstanding {
     pub ask: Ask,
     /// Who asked.
     pub by: String,
-    /// When.
-    pub at: Time,
 }
 
 /// What a name raised by a coordinator means.
@@ -98,7 +96,7 @@ impl Hub {
         Self {
             clock: clock.clone(),
             real: Clock::real(),
-            state: Mutex::new(State {
+            state: Mutex::new(HubState {
                 phase: Phase::Down,
                 next: 1,
                 outstanding: FxHashMap::default(),
@@ -120,18 +118,18 @@ impl Hub {
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
             unlisted: Unlisted::default(),
-            halt: Halt::default(),
+            halt: StoppingState::default(),
         }
     }
 
     /// With the events that make it safe, and what is applied then, when no coordinator hears them any more.
     #[must_use]
     pub fn with_safety(self, events: impl IntoIterator<Item = EventName>, safe: Vec<ConfigId>) -> Self {
-        Self { halt: Halt::new(events, safe), ..self }
+        Self { halt: StoppingState::new(events, safe), ..self }
     }
 
     /// How far stopping is.
-    pub(super) fn halt(&self) -> &Halt {
+    pub(super) fn halt(&self) -> &StoppingState {
         &self.halt
     }
 
@@ -140,7 +138,7 @@ impl Hub {
         self.halt.has_begun()
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, HubState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -208,7 +206,7 @@ impl Hub {
                 state.heard.push(event, is_report);
             }
             state.epoch += 1;
-            let entry = Arc::new(Entry { at: now.as_secs_f64(), what });
+            let entry = Arc::new(LogEntry { at: now.as_secs_f64(), what });
             state.log.push(entry.clone(), is_report);
             // Under the lock, so that all hear it in one order.
             state.taps.iter().for_each(|tap| tap.hear(&entry));
@@ -277,7 +275,7 @@ impl Hub {
 
     /// A request of that number is made.
     pub fn requested(&self, id: RequestId, ask: Ask, by: &str) {
-        let outstanding = Outstanding { ask, by: by.to_owned(), at: self.clock.now() };
+        let outstanding = Outstanding { ask, by: by.to_owned() };
         self.lock().outstanding.insert(id, outstanding);
         self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
     }
@@ -384,7 +382,7 @@ impl Hub {
     }
 
     /// The newest entries of the log, oldest first.
-    pub fn log(&self, last: usize) -> Vec<Arc<Entry>> {
+    pub fn log(&self, last: usize) -> Vec<Arc<LogEntry>> {
         self.lock().log.last(last)
     }
 

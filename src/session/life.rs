@@ -38,7 +38,8 @@ impl Ended {
 }
 
 /// Why a deployment did not come up; it was stopped, as `ended` says.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
+#[error("{why}")]
 pub struct NotUp {
     /// One sentence.
     pub why: String,

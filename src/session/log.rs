@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// One thing that happened.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Entry {
+pub struct LogEntry {
     /// When, in seconds of the deployment's clock since its start.
     pub at: f64,
     /// What.
@@ -216,7 +216,7 @@ impl Phase {
 
 /// What happened, in memory.
 #[derive(Debug)]
-pub struct Log(Lanes<Arc<Entry>>);
+pub struct Log(Lanes<Arc<LogEntry>>);
 
 impl Default for Log {
     fn default() -> Self {
@@ -226,12 +226,12 @@ impl Default for Log {
 
 impl Log {
     /// Adds an entry, dropping the oldest of its kind past the bound. `is_report`: a component raised an event.
-    pub fn push(&mut self, entry: Arc<Entry>, is_report: bool) {
+    pub fn push(&mut self, entry: Arc<LogEntry>, is_report: bool) {
         self.0.push(entry, is_report);
     }
 
     /// The newest `last` entries, oldest first.
-    pub fn last(&self, last: usize) -> Vec<Arc<Entry>> {
+    pub fn last(&self, last: usize) -> Vec<Arc<LogEntry>> {
         self.0.newest(last).cloned().collect()
     }
 }
@@ -295,7 +295,7 @@ pub struct StatusView {
     /// Events that found a coordinator's inbox, or its own queue, full, since the session began.
     pub dropped: Dropped,
     /// For how many seconds coordinators have been in one function, by name; those that have been for longer than
-    /// [`limits::REACTION_LONG`].
+    /// a second.
     pub slow: BTreeMap<String, f64>,
     /// Seconds of its clock since its start.
     pub at: f64,

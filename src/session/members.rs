@@ -18,7 +18,7 @@ use std::time::Duration;
 /// What a member is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum MemberKind {
     /// A property.
     Property,
     /// An in-port.
@@ -33,7 +33,7 @@ pub struct MemberView {
     /// Which: `Component.member`.
     pub name: String,
     /// What it is.
-    pub kind: Kind,
+    pub kind: MemberKind,
     /// Its type.
     #[serde(rename = "type")]
     pub ty: String,
@@ -67,9 +67,9 @@ fn no(message: impl Into<String>, help: impl Into<String>) -> NoMember {
 }
 
 /// A member that is there.
-struct Found {
+struct FoundMember {
     member: MemberRef,
-    kind: Kind,
+    kind: MemberKind,
     ty: ValueType,
     unit: Option<Arc<str>>,
 }
@@ -80,7 +80,7 @@ impl Session {
     /// # Errors
     /// When there is none of that name, or the platform cannot be read.
     pub fn get(&self, name: &str, within: Duration) -> Result<MemberView, NoMember> {
-        let Found { member, kind, ty, unit } = self.member(name)?;
+        let FoundMember { member, kind, ty, unit } = self.member(name)?;
         let busy = |why: String| no(why, "something may keep it busy: `davit status` shows it");
         let seen = self.platform().observe_some(&[member.component], self.clock().now() + limits::VIEW);
         let seen = seen.map_err(|why| busy(why.to_string()))?;
@@ -89,15 +89,15 @@ impl Session {
             seen.connections.keys().filter(|(_, to)| *to == member).map(|(from, _)| *from).collect();
         let json = |value: &Value| serde_json::to_value(value).expect("values are plain data");
         let (value, at, why) = match kind {
-            Kind::Property => {
+            MemberKind::Property => {
                 let value = seen.components.get(&member.component).and_then(|c| c.properties.get(&member.member));
                 (value.map(json), Some(now), value.is_none().then(|| "it is not there any more".to_owned()))
             }
-            Kind::In if driven_by.is_empty() => {
+            MemberKind::In if driven_by.is_empty() => {
                 let value = seen.ports.get(&member);
                 (value.map(json), value.map(|_| now), value.is_none().then(|| "it was never written".to_owned()))
             }
-            Kind::In | Kind::Out => match self.sample(member, &ty, within) {
+            MemberKind::In | MemberKind::Out => match self.sample(member, &ty, within) {
                 Ok((value, at)) => (Some(value), Some(at), None),
                 Err(why) => (None, None, Some(why)),
             },
@@ -112,13 +112,13 @@ impl Session {
     /// # Errors
     /// When there is nothing of that name that can be set to this.
     pub fn set(&self, line: u32, name: &str, value: &Json, force: bool) -> Result<RequestId, NoMember> {
-        let Found { member, kind, ty, .. } = self.member(name)?;
+        let FoundMember { member, kind, ty, .. } = self.member(name)?;
         let wanted = |why: String| no(format!("`{member}` is a {ty}: {why}"), format!("give a value of the type {ty}"));
         let value = value_of(value).map_err(wanted)?.fit(&ty).map_err(|why| wanted(why.to_string()))?;
         let change = match kind {
-            Kind::Property => ChangeKind::PropertySet { property: member, value },
-            Kind::In => ChangeKind::PortWrite { port: member, value },
-            Kind::Out => {
+            MemberKind::Property => ChangeKind::PropertySet { property: member, value },
+            MemberKind::In => ChangeKind::PortWrite { port: member, value },
+            MemberKind::Out => {
                 return Err(no(
                     format!("`{member}` is an out-port: its component alone sends on it"),
                     "an operator can set properties, and write in-ports that nothing drives",
@@ -146,7 +146,7 @@ impl Session {
     }
 
     /// Of a component that is there.
-    fn member(&self, name: &str) -> Result<Found, NoMember> {
+    fn member(&self, name: &str) -> Result<FoundMember, NoMember> {
         // Asked before it becomes a name: names are kept for ever.
         let (of, member) = name
             .split_once('.')
@@ -163,12 +163,12 @@ impl Session {
             })?;
         if let Some((known, property)) = ty.properties.iter().find(|(known, _)| known.as_str() == member) {
             let (ty, unit) = (property.ty.clone(), property.unit.clone());
-            return Ok(Found { member: component.member(*known), kind: Kind::Property, ty, unit });
+            return Ok(FoundMember { member: component.member(*known), kind: MemberKind::Property, ty, unit });
         }
         let port = ty.ports.iter().find(|(known, _)| known.as_str() == member);
         let (known, port) = port.ok_or_else(|| unknown(component, member, ty))?;
-        let kind = if port.direction == Direction::In { Kind::In } else { Kind::Out };
-        Ok(Found { member: component.member(*known), kind, ty: port.ty.clone(), unit: port.unit.clone() })
+        let kind = if port.direction == Direction::In { MemberKind::In } else { MemberKind::Out };
+        Ok(FoundMember { member: component.member(*known), kind, ty: port.ty.clone(), unit: port.unit.clone() })
     }
 
     /// The next that goes through a port.

@@ -42,7 +42,7 @@ pub use names::{NotFromOutside, NotNamed};
 pub use raising::NotRaised;
 pub use recovery::{Difference, NO_FORWARD, Recovered, recovery};
 pub use stages::Stage;
-pub use wiring::{Session, Setup, Unanswered};
+pub use wiring::{Session, SessionSetup, Unanswered};
 
 /// What may be asked of whoever drives a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -91,7 +91,7 @@ impl Session {
     /// Whether somebody outside may raise an event: everything that comes from there is asked this, by whichever way it comes.
     ///
     /// # Errors
-    /// [`NotFromOutside`].
+    /// Nobody outside may raise it.
     pub fn may_raise(&self, event: &str) -> Result<(), NotFromOutside> {
         let deployment = self.deployment();
         let Some(message) = deployment.never_from_outside(event) else { return Ok(()) };
@@ -119,7 +119,7 @@ impl Session {
     /// The event that a text from outside names. Asked before it becomes a name: names are kept for ever.
     ///
     /// # Errors
-    /// [`NotNamed`]: nobody outside may raise it, nobody here can hear it, or there are too many that only functions may hear.
+    /// Nobody outside may raise it, nobody here can hear it, or there are too many that only functions may hear.
     pub fn named(&self, name: &str) -> Result<EventName, NotNamed> {
         self.may_raise(name)?;
         match self.events().into_iter().find(|known| known.as_str() == name) {

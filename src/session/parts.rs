@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 /// One coordinator of a session.
-pub(super) struct Part {
+pub(super) struct CoordinatorPart {
     pub name: Ident,
     pub chart: Arc<Chart>,
     pub coordinator: Coordinator,
@@ -28,7 +28,7 @@ pub(super) struct Part {
     failed: Vec<(NodeId, String)>,
 }
 
-impl Part {
+impl CoordinatorPart {
     /// Starts all coordinators of a deployment and makes them known to the junction.
     pub fn start_all(
         deployment: &Deployment,

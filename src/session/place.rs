@@ -138,12 +138,12 @@ pub fn is_alive(socket: &Path) -> bool {
 
 /// A file, known by what it is and not by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Known {
+pub struct KnownName {
     device: u64,
     inode: u64,
 }
 
-impl Known {
+impl KnownName {
     /// The file of that name.
     ///
     /// # Errors

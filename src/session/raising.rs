@@ -3,7 +3,7 @@
 use super::Session;
 use super::log::Happening;
 use super::names::NotFromOutside;
-use super::parts::Part;
+use super::parts::CoordinatorPart;
 use super::routes::{Acted, NO_MORE, make_safe};
 use crate::coordinator::{Class, Refused};
 use crate::model::{EventName, Ident};
@@ -26,7 +26,7 @@ pub enum NotRaised {
     /// It begins the deployment, which is being stopped.
     #[error("{NO_MORE}")]
     Stopping,
-    /// [`Refused::Full`]: a coordinator that may hear it does not keep up.
+    /// A coordinator that may hear it does not keep up.
     #[error(transparent)]
     Refused(#[from] Refused),
 }
@@ -55,8 +55,8 @@ impl Session {
         self.deliver(event, from, 0, |name| to.contains(&name)).map(drop)
     }
 
-    /// The same as [`raise`](Self::raise); [`Hub::was_heard`] says with the number that this answers what became of it, until it is
-    /// [forgotten](Hub::forget).
+    /// The same as [`raise`](Self::raise); the hub (`was_heard`) says with the number that this answers what became of it, until it is
+    /// forgotten.
     ///
     /// # Errors
     /// As [`Session::offer`].
@@ -105,7 +105,7 @@ impl Session {
         }
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
-        let (mut held, mut gone): (Vec<&Part>, bool) = (Vec::with_capacity(self.parts().len()), false);
+        let (mut held, mut gone): (Vec<&CoordinatorPart>, bool) = (Vec::with_capacity(self.parts().len()), false);
         for part in self.parts().iter().filter(|part| to(part.name)) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),

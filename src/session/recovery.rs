@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::log::Happening;
-use crate::configurator::{Drift, Recovery, Residual, View};
+use crate::configurator::{ConfiguratorView, Drift, Recovery, Residual};
 use crate::model::{ComponentName, Step};
 use serde::Serialize;
 use std::fmt;
@@ -14,7 +14,7 @@ use std::time::Duration;
 pub struct Difference {
     how: How,
     #[serde(flatten)]
-    what: What,
+    what: DifferenceIn,
     text: String,
 }
 
@@ -37,7 +37,7 @@ enum How {
 /// What it is about.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-enum What {
+enum DifferenceIn {
     Step(Step),
     Component { target: ComponentName },
 }
@@ -49,12 +49,12 @@ impl Difference {
             How::Irreversible => format!("{step} (cannot be undone)"),
             _ => step.to_string(),
         };
-        Self { how, what: What::Step(step.clone()), text }
+        Self { how, what: DifferenceIn::Step(step.clone()), text }
     }
 
     fn component(how: How, target: ComponentName) -> Self {
         let word = if how == How::Faulted { "faulted" } else { "in quarantine" };
-        Self { how, what: What::Component { target }, text: format!("{target} is {word}") }
+        Self { how, what: DifferenceIn::Component { target }, text: format!("{target} is {word}") }
     }
 
     /// What the platform shows that should not be so, and what it cannot show.
@@ -68,14 +68,14 @@ impl Difference {
 
     /// Everything that is not as it should be, each once: all that is broken, what partial frames hold, and components that
     /// still have not come back from a call.
-    pub(super) fn of_view(view: &View) -> Vec<Self> {
+    pub(super) fn of_view(view: &ConfiguratorView) -> Vec<Self> {
         let residuals = view.residuals.iter().map(|residual| &**residual).chain(&view.partial);
         let mut all: Vec<Self> = Vec::new();
         let quarantined = view.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
         for one in residuals.flat_map(Self::of_residual).chain(quarantined) {
             // A call that was out then may have come back since.
             let back = |name: &ComponentName| one.how == How::Quarantined && !view.quarantined.contains(name);
-            let over = matches!(&one.what, What::Component { target } if back(target));
+            let over = matches!(&one.what, DifferenceIn::Component { target } if back(target));
             if !over && !all.contains(&one) {
                 all.push(one);
             }
@@ -181,7 +181,7 @@ mod tests {
             quarantined: quarantined.iter().map(|text| name(text)).collect(),
             ..Residual::of(Reason::Busy)
         };
-        let view = View {
+        let view = ConfiguratorView {
             system: None,
             stack: Vec::new(),
             broken: None,

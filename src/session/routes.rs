@@ -6,7 +6,7 @@ use super::hub::{Hub, Meaning};
 use super::log::{Answered, Happening, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
-use crate::coordinator::{Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag, Trouble};
+use crate::coordinator::{ChartTrouble, Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag};
 use crate::model::{Ask, Deployment, EventName, FAULTED, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
@@ -204,7 +204,7 @@ impl Listener for ToConfigurator {
         self.hub.note(Happening::Forced { note });
     }
 
-    fn trouble(&mut self, chart: &Chart, trouble: Trouble) {
+    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
         self.hub.note(Happening::Forced { note: trouble.finding(chart).message });
     }
 }

@@ -6,7 +6,7 @@ use serde_json::{Value as Json, json};
 
 /// A request or a notification (without `id`).
 #[derive(Debug, Clone, Deserialize)]
-pub struct Call {
+pub struct RpcCall {
     /// `"2.0"`.
     #[serde(default)]
     pub jsonrpc: String,
@@ -65,7 +65,7 @@ fn given<'de, D: serde::Deserializer<'de>>(id: D) -> Result<Option<Json>, D::Err
 ///
 /// # Errors
 /// The error answer to send, and the `id` to send it to as far as the line has one.
-pub fn parse(line: &str) -> Result<Call, (Json, RpcError)> {
+pub fn parse(line: &str) -> Result<RpcCall, (Json, RpcError)> {
     let json: Json = serde_json::from_str(line)
         .map_err(|e| (Json::Null, RpcError::new(PARSE_ERROR, format!("the line is not one JSON object: {e}"))))?;
     let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or(Json::Null);
@@ -73,7 +73,7 @@ pub fn parse(line: &str) -> Result<Call, (Json, RpcError)> {
     if json.is_array() {
         return Err(refused("batches are not supported: send one object a line".to_owned()));
     }
-    let call: Call = serde_json::from_value(json).map_err(|e| refused(format!("not a JSON-RPC request: {e}")))?;
+    let call: RpcCall = serde_json::from_value(json).map_err(|e| refused(format!("not a JSON-RPC request: {e}")))?;
     if call.jsonrpc != "2.0" {
         return Err(refused("`jsonrpc` must be \"2.0\"".to_owned()));
     }

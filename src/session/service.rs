@@ -90,13 +90,13 @@ fn view(value: &impl serde::Serialize) -> Json {
 }
 
 /// Whether nobody waits for the answer any more.
-type Gone<'a> = &'a dyn Fn() -> bool;
+type ServiceGone<'a> = &'a dyn Fn() -> bool;
 
 /// Waits outside the clock for what `look` finds, as long as somebody wants to know.
 fn wait<T>(
     session: &Session,
     limit: Duration,
-    gone: Gone<'_>,
+    gone: ServiceGone<'_>,
     late: impl FnOnce() -> String,
     look: impl Fn(&Hub) -> Option<T>,
 ) -> Result<T, RpcError> {
@@ -123,7 +123,7 @@ impl Service for SessionService {
         }
     }
 
-    fn call_while(&self, line: u32, method: &str, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
+    fn call_while(&self, line: u32, method: &str, params: &Json, gone: ServiceGone<'_>) -> Result<Json, RpcError> {
         known(method, params)?;
         let session = self.session.upgrade().ok_or_else(|| RpcError::new(GOING_DOWN, "the deployment is down"))?;
         refused_while_stopping(&session, method, params)?;
@@ -232,7 +232,7 @@ fn configuration(session: &Session, name: &str) -> Result<ConfigId, RpcError> {
     })
 }
 
-fn event(session: &Session, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
+fn event(session: &Session, params: &Json, gone: ServiceGone<'_>) -> Result<Json, RpcError> {
     let name: String = param(params, "event")?;
     let wait_for: Option<String> = optional(params, "wait_for")?;
     let waits: bool = optional(params, "wait")?.unwrap_or(false);
@@ -339,7 +339,7 @@ fn forced(params: &Json) -> Result<bool, RpcError> {
     Ok(optional(params, "force")?.unwrap_or(false))
 }
 
-fn request(session: &Session, line: u32, ask: Ask, params: &Json, gone: Gone<'_>) -> Result<Json, RpcError> {
+fn request(session: &Session, line: u32, ask: Ask, params: &Json, gone: ServiceGone<'_>) -> Result<Json, RpcError> {
     within(params, WITHIN)?;
     let request = session.request_on(line, ask, "operator", forced(params)?);
     answer_to(session, request, &ask.to_string(), params, gone)
@@ -351,7 +351,7 @@ fn answer_to(
     request: RequestId,
     what: &str,
     params: &Json,
-    gone: Gone<'_>,
+    gone: ServiceGone<'_>,
 ) -> Result<Json, RpcError> {
     let waits: bool = optional(params, "wait")?.unwrap_or(false);
     let within = within(params, WITHIN)?;

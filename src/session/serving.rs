@@ -1,6 +1,6 @@
 //! What is done with the lines of a connection: who answers them, and within which bounds.
 
-use super::connection::{Connection, Lines, Said};
+use super::connection::{Lines, SaidTo, SocketConnection};
 use super::rpc::{self, RpcError};
 use super::subscribers::Subscribers;
 use crate::limits;
@@ -73,12 +73,12 @@ impl Default for Bounds {
 
 /// Calls that are being answered.
 #[derive(Default)]
-pub(super) struct Calls {
+pub(super) struct ServedCalls {
     open: Mutex<usize>,
     ended: Condvar,
 }
 
-impl Calls {
+impl ServedCalls {
     pub fn run<T>(&self, call: impl FnOnce() -> T) -> T {
         *lock(&self.open) += 1;
         let result = call();
@@ -99,10 +99,10 @@ impl Calls {
 }
 
 /// What the connections of one socket share.
-pub(super) struct Shared {
+pub(super) struct ServingShared {
     pub bounds: Bounds,
     pub subscribers: Arc<Subscribers>,
-    pub calls: Calls,
+    pub calls: ServedCalls,
     pub service: Arc<dyn Service>,
 }
 
@@ -118,7 +118,7 @@ pub(super) fn too_many() -> RpcError {
 }
 
 /// Answers the calls of one connection until it closes. `kept`: it has one of the places kept for what must get through.
-pub(super) fn serve(connection: &Arc<Connection>, shared: &Shared, kept: bool) -> io::Result<()> {
+pub(super) fn serve(connection: &Arc<SocketConnection>, shared: &ServingShared, kept: bool) -> io::Result<()> {
     let mut lines = Lines::of(connection);
     let mut subscribed = false;
     let bounds = &shared.bounds;
@@ -126,18 +126,18 @@ pub(super) fn serve(connection: &Arc<Connection>, shared: &Shared, kept: bool) -
     loop {
         let limit = if kept { bounds.say } else { bounds.idle };
         let call = match lines.next((!subscribed).then_some(limit))? {
-            Said::End => return Ok(()),
-            Said::Nothing if kept => return refuse(&Json::Null, too_many()),
-            Said::Nothing => {
+            SaidTo::End => return Ok(()),
+            SaidTo::Nothing if kept => return refuse(&Json::Null, too_many()),
+            SaidTo::Nothing => {
                 let why = format!("closed: nothing was said for {} s", bounds.idle.as_secs_f64());
                 return refuse(&Json::Null, RpcError::new(rpc::REFUSED, why));
             }
-            Said::TooLong => {
+            SaidTo::TooLong => {
                 return refuse(&Json::Null, RpcError::new(rpc::INVALID_REQUEST, "the line is too long"));
             }
-            Said::NotText => Err((Json::Null, RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))),
-            Said::Line(line) if line.trim().is_empty() => continue,
-            Said::Line(line) => rpc::parse(&line),
+            SaidTo::NotText => Err((Json::Null, RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))),
+            SaidTo::Line(line) if line.trim().is_empty() => continue,
+            SaidTo::Line(line) => rpc::parse(&line),
         };
         let call = match call {
             Ok(call) => call,

@@ -6,21 +6,19 @@
 
 use super::doors::Doors;
 use super::owner::Owner;
-use super::place::{self, Known};
-use super::rpc;
-use super::serving::{Calls, Shared};
+use super::place::{self, KnownName};
+use super::serving::{ServedCalls, ServingShared};
 use super::subscribers::{Subscribers, ToSubscribers};
 use super::tap::Hears;
 use crate::limits;
 use crate::time::{Clock, lock};
-use serde_json::Value as Json;
 use std::fs;
 use std::io;
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
@@ -30,11 +28,11 @@ pub use super::serving::{Bounds, Service};
 pub struct ControlSocket {
     path: PathBuf,
     /// The file it made.
-    file: Known,
+    file: KnownName,
     /// The listening socket, to end it.
     listening: UnixStream,
     doors: Arc<Doors>,
-    shared: Arc<Shared>,
+    shared: Arc<ServingShared>,
     observer: Mutex<Option<ToSubscribers>>,
     accepting: Option<JoinHandle<()>>,
     /// Held longest.
@@ -86,11 +84,11 @@ impl ControlSocket {
             _ => {}
         }
         let listener = UnixListener::bind(&path).map_err(io)?;
-        let file = Known::at(&path).map_err(io)?;
+        let file = KnownName::at(&path).map_err(io)?;
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
         let subscribers = Arc::new(Subscribers::new(bounds.queue));
-        let shared = Arc::new(Shared { bounds, subscribers, calls: Calls::default(), service });
+        let shared = Arc::new(ServingShared { bounds, subscribers, calls: ServedCalls::default(), service });
         let doors = Arc::new(Doors::default());
         let accepting = {
             let (doors, shared) = (doors.clone(), shared.clone());
@@ -112,13 +110,15 @@ impl ControlSocket {
     }
 
     /// Where it listens.
-    pub fn path(&self) -> &Path {
+    #[cfg(any(test, feature = "internals"))]
+    pub fn path(&self) -> &std::path::Path {
         &self.path
     }
 
     /// Sends a notification to all subscribers; never waits.
-    pub fn notify(&self, method: &str, params: &Json) {
-        self.shared.subscribers.send(&rpc::notification(method, params));
+    #[cfg(any(test, feature = "internals"))]
+    pub fn notify(&self, method: &str, params: &serde_json::Value) {
+        self.shared.subscribers.send(&super::rpc::notification(method, params));
     }
 
     /// What to give to a session on `clock`, so that the subscribers hear all that happens.

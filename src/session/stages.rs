@@ -38,7 +38,7 @@ pub enum Came {
 
 /// What follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
+pub enum NextStage {
     /// It is over.
     Over,
     /// The next stage begins.
@@ -57,16 +57,16 @@ pub fn first(force: bool, leads: bool) -> Stage {
 }
 
 /// What follows a stage that ended so. `held`: a safe configuration is in force that nobody has let go.
-pub fn next(stage: Stage, came: &Came, held: bool) -> Next {
+pub fn next(stage: Stage, came: &Came, held: bool) -> NextStage {
     match (stage, came) {
-        (_, Came::Empty) => Next::Over,
+        (_, Came::Empty) => NextStage::Over,
         // An emergency while it was forced.
-        (Stage::Forced, Came::Left(_)) if held => Next::Held,
-        (Stage::Forced, _) => Next::Over,
-        (_, Came::Hurried) => Next::Stage(Stage::Forced),
-        (Stage::Led, Came::Left(_)) => Next::Stage(Stage::TakenBack),
-        (Stage::TakenBack, Came::Left(_)) if held => Next::Held,
-        (Stage::TakenBack, Came::Left(_)) => Next::Stage(Stage::Forced),
+        (Stage::Forced, Came::Left(_)) if held => NextStage::Held,
+        (Stage::Forced, _) => NextStage::Over,
+        (_, Came::Hurried) => NextStage::Stage(Stage::Forced),
+        (Stage::Led, Came::Left(_)) => NextStage::Stage(Stage::TakenBack),
+        (Stage::TakenBack, Came::Left(_)) if held => NextStage::Held,
+        (Stage::TakenBack, Came::Left(_)) => NextStage::Stage(Stage::Forced),
     }
 }
 
@@ -79,18 +79,18 @@ mod tests {
         let left = || Came::Left("late".to_owned());
         for held in [false, true] {
             for stage in [Stage::Led, Stage::TakenBack, Stage::Forced] {
-                assert_eq!(next(stage, &Came::Empty, held), Next::Over);
+                assert_eq!(next(stage, &Came::Empty, held), NextStage::Over);
             }
-            assert_eq!(next(Stage::Led, &left(), held), Next::Stage(Stage::TakenBack));
-            assert_eq!(next(Stage::Led, &Came::Hurried, held), Next::Stage(Stage::Forced));
-            assert_eq!(next(Stage::TakenBack, &Came::Hurried, held), Next::Stage(Stage::Forced));
+            assert_eq!(next(Stage::Led, &left(), held), NextStage::Stage(Stage::TakenBack));
+            assert_eq!(next(Stage::Led, &Came::Hurried, held), NextStage::Stage(Stage::Forced));
+            assert_eq!(next(Stage::TakenBack, &Came::Hurried, held), NextStage::Stage(Stage::Forced));
         }
-        assert_eq!(next(Stage::Forced, &left(), false), Next::Over, "nothing comes after force");
-        assert_eq!(next(Stage::Forced, &left(), true), Next::Held, "an emergency meanwhile");
-        assert_eq!(next(Stage::TakenBack, &left(), false), Next::Stage(Stage::Forced));
+        assert_eq!(next(Stage::Forced, &left(), false), NextStage::Over, "nothing comes after force");
+        assert_eq!(next(Stage::Forced, &left(), true), NextStage::Held, "an emergency meanwhile");
+        assert_eq!(next(Stage::TakenBack, &left(), false), NextStage::Stage(Stage::Forced));
         assert_eq!(
             next(Stage::TakenBack, &left(), true),
-            Next::Held,
+            NextStage::Held,
             "what is held still is let go by nobody but people"
         );
         assert_eq!(

@@ -21,17 +21,17 @@ pub(super) struct Evaluator {
     platform: Arc<dyn Platform>,
     junction: Weak<Junction>,
     wake: Signal,
-    state: Mutex<State>,
+    state: Mutex<StandsState>,
 }
 
 #[derive(Default)]
-struct State {
-    under: BTreeMap<u64, Under>,
+struct StandsState {
+    under: BTreeMap<u64, UnderWatch>,
     closing: bool,
 }
 
 /// A condition under evaluation.
-struct Under {
+struct UnderWatch {
     bank: Bank,
     watch: Option<Box<dyn Watch>>,
     /// Of the bank's inputs, then whether each component is faulted.
@@ -50,7 +50,7 @@ pub(super) fn needed(deployment: &Deployment, catalogue: &Catalogue) -> bool {
     deployment.configurations.iter().any(|c| c.holds.is_some()) || catalogue.iter().any(|ty| settles(ty))
 }
 
-impl Under {
+impl UnderWatch {
     fn new(condition: &Condition, platform: &dyn Platform, wake: &Signal, now: Time) -> Self {
         let bank = Bank::alone(condition, now);
         let mut inputs = bank.inputs().to_vec();
@@ -153,7 +153,7 @@ impl Evaluator {
 
 impl Conditions for Evaluator {
     fn begin(&self, number: u64, condition: &Condition) {
-        let under = Under::new(condition, &*self.platform, &self.wake, self.clock.now());
+        let under = UnderWatch::new(condition, &*self.platform, &self.wake, self.clock.now());
         let before = lock(&self.state).under.insert(number, under);
         drop(before);
         self.wake.notify();

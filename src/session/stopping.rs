@@ -3,7 +3,7 @@
 use super::halt::StandsStill;
 use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
-use super::stages::{Came, Next, Stage, first, next};
+use super::stages::{Came, NextStage, Stage, first, next};
 use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::limits;
@@ -15,21 +15,21 @@ use std::time::Duration;
 
 /// Whether what is left is held by a safe configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Held {
+enum HeldUp {
     No,
     Yes,
     /// The configurator has not answered: people decide, as if it were.
     NotKnown,
 }
 
-impl Held {
+impl HeldUp {
     fn of(held: bool) -> Self {
         if held { Self::Yes } else { Self::No }
     }
 }
 
 /// What stopping has come to so far.
-struct Told {
+struct Announced {
     /// The last stage that had something to do.
     stage: Stage,
     /// What went otherwise than in order, one line each.
@@ -57,7 +57,7 @@ impl Session {
         hub.halt().begin();
         self.configurator().stopping();
         let _ = survived(|| hub.set_phase(Phase::ShuttingDown));
-        let mut told = Told { stage: Stage::Led, notes: Vec::new(), coming_up };
+        let mut told = Announced { stage: Stage::Led, notes: Vec::new(), coming_up };
         let mut stage = first(force, self.leads());
         let mut why = match stage {
             Stage::Led => None,
@@ -70,7 +70,7 @@ impl Session {
             let (came, held) = began
                 .and_then(|()| {
                     survived(|| match stage {
-                        Stage::Led => (self.lead_down(&told), Held::No),
+                        Stage::Led => (self.lead_down(&told), HeldUp::No),
                         Stage::TakenBack => self.take_all_back(&mut told),
                         Stage::Forced => self.force_all(&mut told),
                     })
@@ -78,24 +78,24 @@ impl Session {
                 .unwrap_or_else(|panic| {
                     let why = format!("davit itself has panicked: {panic}");
                     told.notes.push(why.clone());
-                    (Came::Left(why), Held::No)
+                    (Came::Left(why), HeldUp::No)
                 });
-            let came_to = next(stage, &came, held != Held::No);
+            let came_to = next(stage, &came, held != HeldUp::No);
             why = match came {
                 Came::Left(why) => Some(why),
                 Came::Hurried => Some("as asked for".to_owned()),
                 Came::Empty => None,
             };
             match came_to {
-                Next::Over => break,
-                Next::Stage(next) => stage = next,
-                Next::Held if !self.attended.load(Ordering::Relaxed) => {
+                NextStage::Over => break,
+                NextStage::Stage(next) => stage = next,
+                NextStage::Held if !self.attended.load(Ordering::Relaxed) => {
                     let what = self.what_holds(held);
                     let note = format!("{what}, and nobody is there to ask for force: what is left stays as it is");
                     self.note_all(vec![note], &mut told);
                     break;
                 }
-                Next::Held => {
+                NextStage::Held => {
                     let what = self.what_holds(held);
                     let note = format!("{what}: what is left stays as it is until a second signal or `--force`");
                     hub.note(Happening::Forced { note });
@@ -112,7 +112,7 @@ impl Session {
         ended
     }
 
-    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Told) {
+    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Announced) {
         let hub = self.hub();
         if let Some(why) = &why {
             told.notes.push(format!("stopped {}: {why}", stage.words()));
@@ -140,12 +140,12 @@ impl Session {
     }
 
     /// Which safe configuration is in force, in words.
-    fn what_holds(&self, held: Held) -> String {
+    fn what_holds(&self, held: HeldUp) -> String {
         let frames = self.frames().unwrap_or_default();
         let safe = frames.into_iter().map(|frame| frame.configuration).find(|id| self.is_safe(*id));
         match (held, safe) {
             (_, Some(id)) => format!("`{id}` is in force"),
-            (Held::NotKnown, None) => "whether a safe configuration is in force is not known".to_owned(),
+            (HeldUp::NotKnown, None) => "whether a safe configuration is in force is not known".to_owned(),
             (_, None) => "a safe configuration is in force".to_owned(),
         }
     }
@@ -157,7 +157,7 @@ impl Session {
     }
 
     /// The first stage.
-    fn lead_down(&self, told: &Told) -> Came {
+    fn lead_down(&self, told: &Announced) -> Came {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
         let goal = self.deployment().down_states();
@@ -215,7 +215,7 @@ impl Session {
     }
 
     /// The second stage, and whether what is left is held by a safe configuration.
-    fn take_all_back(&self, told: &mut Told) -> (Came, Held) {
+    fn take_all_back(&self, told: &mut Announced) -> (Came, HeldUp) {
         let deadline = self.clock().now() + self.deployment().shutdown.within;
         let Some(down) = self.stage_of(self.configurator().take_back(deadline), deadline) else {
             told.notes.push(Unanswered.to_string());
@@ -229,7 +229,7 @@ impl Session {
         notes.extend(down.kept.iter().map(|id| format!("`{id}` not undone")));
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
-        let held = Held::of(down.still);
+        let held = HeldUp::of(down.still);
         if self.is_hurried() {
             return (Came::Hurried, held);
         }
@@ -252,7 +252,7 @@ impl Session {
     }
 
     /// The third stage.
-    fn force_all(&self, told: &mut Told) -> (Came, Held) {
+    fn force_all(&self, told: &mut Announced) -> (Came, HeldUp) {
         // What brings it to rest takes nothing of the time in which everything is removed.
         let rest = |(id, _): &(ConfigId, Origin)| self.deployment().configuration(*id).and_then(|c| c.timeout);
         let step = self.deployment().limits.step_timeout;
@@ -261,7 +261,7 @@ impl Session {
         let deadline = self.clock().now() + within;
         let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             told.notes.push(Unanswered.to_string());
-            return (Came::Left(Unanswered.to_string()), Held::No);
+            return (Came::Left(Unanswered.to_string()), HeldUp::No);
         };
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));
         let applied = applied.chain(down.rest.iter().map(|id| (format!("`{id}`, to come to rest,"), id)));
@@ -271,8 +271,8 @@ impl Session {
         notes.extend(down.troubles.iter().map(ToString::to_string));
         self.note_all(notes, told);
         match down.is_clean() {
-            true => (Came::Empty, Held::No),
-            false => (Came::Left("something is left".to_owned()), Held::of(down.still)),
+            true => (Came::Empty, HeldUp::No),
+            false => (Came::Left("something is left".to_owned()), HeldUp::of(down.still)),
         }
     }
 
@@ -285,7 +285,7 @@ impl Session {
         })
     }
 
-    fn note_all(&self, notes: Vec<String>, told: &mut Told) {
+    fn note_all(&self, notes: Vec<String>, told: &mut Announced) {
         for note in &notes {
             self.hub().note(Happening::Forced { note: note.clone() });
         }
@@ -306,11 +306,11 @@ impl Session {
     }
 
     /// Whether what is left is held by a safe configuration, where the configurator has not said so.
-    fn is_held(&self) -> Held {
+    fn is_held(&self) -> HeldUp {
         match self.frames() {
-            _ if !self.has_safe() => Held::No,
-            Ok(frames) => Held::of(frames.iter().any(|frame| self.is_safe(frame.configuration))),
-            Err(Unanswered) => Held::NotKnown,
+            _ if !self.has_safe() => HeldUp::No,
+            Ok(frames) => HeldUp::of(frames.iter().any(|frame| self.is_safe(frame.configuration))),
+            Err(Unanswered) => HeldUp::NotKnown,
         }
     }
 

@@ -1,8 +1,8 @@
 //! Who hears what happens over the control socket: each behind a [tap](super::tap) of its own, and all behind one that
 //! turns what happens into lines, so that nothing of it is done in a thread that acts.
 
-use super::connection::Connection;
-use super::log::Entry;
+use super::connection::SocketConnection;
+use super::log::LogEntry;
 use super::rpc;
 use super::tap::{Full, Hears, News, Tap};
 use crate::limits;
@@ -23,7 +23,7 @@ pub(super) struct Subscribers {
 }
 
 struct Subscriber {
-    connection: Arc<Connection>,
+    connection: Arc<SocketConnection>,
     tap: Tap<Arc<str>>,
 }
 
@@ -37,7 +37,7 @@ impl Subscribers {
     ///
     /// # Errors
     /// When the operating system has no thread left.
-    pub fn add(&self, connection: &Arc<Connection>) -> io::Result<bool> {
+    pub fn add(&self, connection: &Arc<SocketConnection>) -> io::Result<bool> {
         let mut list = lock(&self.list);
         if list.iter().any(|s| s.connection.number == connection.number) {
             return Ok(false);
@@ -99,7 +99,7 @@ impl Subscribers {
     pub fn observer(self: &Arc<Self>, clock: &Clock) -> io::Result<ToSubscribers> {
         lock(&self.clock).clone_from(clock);
         let (to, clock_of) = (self.clone(), clock.clone());
-        let tap = Tap::new("davit-notify", limits::TAP, clock, move |news: News<Arc<Entry>>| {
+        let tap = Tap::new("davit-notify", limits::TAP, clock, move |news: News<Arc<LogEntry>>| {
             to.send(&match news {
                 News::One(entry) => rpc::notification("log", &json!(entry)),
                 News::Missed(entries) => {
@@ -116,7 +116,7 @@ impl Subscribers {
 /// Hears what happens, for those who subscribed.
 #[derive(Clone)]
 pub(super) struct ToSubscribers {
-    tap: Tap<Arc<Entry>>,
+    tap: Tap<Arc<LogEntry>>,
     subscribers: Arc<Subscribers>,
 }
 
@@ -128,7 +128,7 @@ impl ToSubscribers {
 }
 
 impl Hears for ToSubscribers {
-    fn hear(&self, entry: &Arc<Entry>) {
+    fn hear(&self, entry: &Arc<LogEntry>) {
         // Nobody listens: no thread is woken.
         if self.subscribers.count.load(Ordering::Acquire) > 0 {
             self.tap.put(entry.clone());

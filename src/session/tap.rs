@@ -8,7 +8,7 @@
 //! simulation waits for the observer ([`Tap::keep_pace`]), and nothing is lost, unless the observer takes nothing at all
 //! for [`limits::TAP_PATIENCE`].
 
-use super::log::Entry;
+use super::log::LogEntry;
 use crate::limits;
 use crate::time::{Clock, Time, lock};
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ use std::time::Duration;
 /// Something that hears all that happens. Never waits, but where it is asked to keep pace.
 pub trait Hears: Send + Sync {
     /// Called in the thread that acts, in the order in which things happen.
-    fn hear(&self, entry: &Arc<Entry>);
+    fn hear(&self, entry: &Arc<LogEntry>);
 
     /// Called in simulated time, behind it and without any lock of the session: may wait for a slow observer.
     fn keep_pace(&self) {}
@@ -40,22 +40,22 @@ pub struct Full;
 
 /// An observer's queue and thread. Clones are the same; when the last one is gone, the observer ends with what waits.
 pub struct Tap<T> {
-    end: Arc<End<T>>,
+    end: Arc<TapEnd<T>>,
 }
 
-struct End<T>(Arc<Shared<T>>);
+struct TapEnd<T>(Arc<TapShared<T>>);
 
-struct Shared<T> {
+struct TapShared<T> {
     clock: Clock,
     bound: usize,
-    state: Mutex<State<T>>,
+    state: Mutex<TapState<T>>,
     /// Wakes the observer.
     put: Condvar,
     /// Wakes who waits for the observer.
     taken: Condvar,
 }
 
-struct State<T> {
+struct TapState<T> {
     queue: VecDeque<News<T>>,
     /// What was dropped since the queue was full; as long as it is not told, everything is dropped.
     missing: u64,
@@ -78,7 +78,7 @@ impl<T> Clone for Tap<T> {
     }
 }
 
-impl<T> Drop for End<T> {
+impl<T> Drop for TapEnd<T> {
     fn drop(&mut self) {
         lock(&self.0.state).closed = true;
         self.0.put.notify_all();
@@ -97,7 +97,7 @@ impl<T: Send + 'static> Tap<T> {
         clock: &Clock,
         observer: impl FnMut(News<T>) + Send + 'static,
     ) -> io::Result<Self> {
-        let state = State {
+        let state = TapState {
             queue: VecDeque::new(),
             missing: 0,
             told: None,
@@ -107,7 +107,7 @@ impl<T: Send + 'static> Tap<T> {
             closed: false,
             gone: false,
         };
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(TapShared {
             clock: clock.clone(),
             bound: bound.max(1),
             state: Mutex::new(state),
@@ -116,7 +116,7 @@ impl<T: Send + 'static> Tap<T> {
         });
         let own = shared.clone();
         std::thread::Builder::new().name(name.to_owned()).spawn(move || own.live(observer))?;
-        Ok(Self { end: Arc::new(End(shared)) })
+        Ok(Self { end: Arc::new(TapEnd(shared)) })
     }
 }
 
@@ -188,13 +188,14 @@ impl<T> Tap<T> {
     }
 
     /// How many wait.
+    #[cfg(any(test, feature = "internals"))]
     pub fn waiting(&self) -> usize {
         lock(&self.end.0.state).queue.len()
     }
 }
 
-impl<T: From<Arc<Entry>> + Send> Hears for Tap<T> {
-    fn hear(&self, entry: &Arc<Entry>) {
+impl<T: From<Arc<LogEntry>> + Send> Hears for Tap<T> {
+    fn hear(&self, entry: &Arc<LogEntry>) {
         self.put(T::from(entry.clone()));
     }
 
@@ -203,14 +204,14 @@ impl<T: From<Arc<Entry>> + Send> Hears for Tap<T> {
     }
 }
 
-impl<T> State<T> {
+impl<T> TapState<T> {
     /// What the observer is not done with.
     fn left(&self) -> u64 {
         self.queue.len() as u64 + u64::from(self.busy) + self.missing
     }
 }
 
-impl<T> Shared<T> {
+impl<T> TapShared<T> {
     fn put(&self, what: T, own: usize) {
         let mut state = lock(&self.state);
         if state.closed || state.gone {
@@ -235,7 +236,7 @@ impl<T> Shared<T> {
     }
 
     /// How long it is until a hole may be told again. Simulated time does not go on for it.
-    fn until_told(&self, state: &State<T>) -> Duration {
+    fn until_told(&self, state: &TapState<T>) -> Duration {
         match state.told {
             Some(told) if !self.clock.is_simulated() => (told + limits::DROPS_TOLD).since(self.clock.now()),
             _ => Duration::ZERO,
@@ -245,16 +246,16 @@ impl<T> Shared<T> {
     /// Waits until the observer has done one more, or ends, at most for `patience`.
     fn wait_for_progress<'a>(
         &'a self,
-        state: MutexGuard<'a, State<T>>,
+        state: MutexGuard<'a, TapState<T>>,
         patience: Duration,
-    ) -> MutexGuard<'a, State<T>> {
+    ) -> MutexGuard<'a, TapState<T>> {
         let done = state.done;
-        let still = |state: &mut State<T>| state.done == done && !state.gone;
+        let still = |state: &mut TapState<T>| state.done == done && !state.gone;
         self.taken.wait_timeout_while(state, patience, still).unwrap_or_else(PoisonError::into_inner).0
     }
 
     fn live(&self, mut observer: impl FnMut(News<T>)) {
-        let _gone = Gone(self);
+        let _gone = TapGone(self);
         while let Some(news) = self.next() {
             observer(news);
             let mut state = lock(&self.state);
@@ -290,9 +291,9 @@ impl<T> Shared<T> {
 }
 
 /// However the observer ends, nobody waits for it any more, and nothing is kept for it.
-struct Gone<'a, T>(&'a Shared<T>);
+struct TapGone<'a, T>(&'a TapShared<T>);
 
-impl<T> Drop for Gone<'_, T> {
+impl<T> Drop for TapGone<'_, T> {
     fn drop(&mut self) {
         let mut state = lock(&self.0.state);
         state.gone = true;

@@ -5,13 +5,13 @@ use super::halt::StoppingView;
 use super::hub::Hub;
 use super::life::{Ended, UNSEEN, leftovers};
 use super::log::{FrameView, Happening, Phase, StatusView};
-use super::parts::{Part, between};
+use super::parts::{CoordinatorPart, between};
 use super::recovery::Difference;
 use super::routes::{Junction, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use super::steps::Steps;
 use crate::configurator::{
-    Batch, Conditions, Configurator, ConfiguratorHandle, Request, Requester, Setup as ConfiguratorSetup, View,
+    Batch, Conditions, Configurator, ConfiguratorHandle, ConfiguratorSetup, ConfiguratorView, Request, Requester,
 };
 use crate::coordinator::Dropped;
 use crate::functions::Opener;
@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// What a session is made of.
-pub struct Setup {
+pub struct SessionSetup {
     /// The deployment; it has been checked.
     pub deployment: Arc<Deployment>,
     /// Its coordinators, compiled, in the order of [`Deployment::coordinators`].
@@ -54,7 +54,7 @@ pub struct Session {
     clock: Clock,
     platform: Arc<dyn Platform>,
     hub: Arc<Hub>,
-    parts: Vec<Part>,
+    parts: Vec<CoordinatorPart>,
     configurator: ConfiguratorHandle,
     junction: Arc<Junction>,
     evaluator: Option<Arc<Evaluator>>,
@@ -70,8 +70,8 @@ pub struct Session {
 
 impl Session {
     /// Starts the threads of a deployment; nothing happens until it is brought up.
-    pub fn start(setup: Setup) -> Arc<Self> {
-        let Setup { deployment, charts, functions, catalogue, platform, clock } = setup;
+    pub fn start(setup: SessionSetup) -> Arc<Self> {
+        let SessionSetup { deployment, charts, functions, catalogue, platform, clock } = setup;
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
@@ -102,7 +102,7 @@ impl Session {
             conditions: evaluator.as_ref().map(|evaluator| evaluator.clone() as Arc<dyn Conditions>),
         });
         *lock(&junction.configurator) = Some(configurator.clone());
-        let parts = Part::start_all(&deployment, charts.into_iter().zip(functions), &clock, &hub, &junction);
+        let parts = CoordinatorPart::start_all(&deployment, charts.into_iter().zip(functions), &clock, &hub, &junction);
         {
             let (hub, junction) = (hub.clone(), junction.clone());
             platform.subscribe(Arc::new(move |event| on_platform(&hub, &junction, &event)));
@@ -178,7 +178,7 @@ impl Session {
 
     /// The states of its coordinators, by name.
     pub fn states(&self) -> BTreeSet<String> {
-        let of = |part: &Part| -> Vec<String> {
+        let of = |part: &CoordinatorPart| -> Vec<String> {
             let chart = &part.chart;
             chart.nodes().filter(|node| chart.is_state(*node)).map(|node| chart.name(node).to_string()).collect()
         };
@@ -252,7 +252,7 @@ impl Session {
         self.hub.changed.notify();
     }
 
-    pub(super) fn parts(&self) -> &[Part] {
+    pub(super) fn parts(&self) -> &[CoordinatorPart] {
         &self.parts
     }
 
@@ -284,7 +284,7 @@ impl Session {
     }
 
     /// How things stand; none once it is down: nothing is there, and nobody who would answer.
-    fn view(&self, system: bool) -> Result<Option<Arc<View>>, Unanswered> {
+    fn view(&self, system: bool) -> Result<Option<Arc<ConfiguratorView>>, Unanswered> {
         match self.configurator.view(system, self.clock.now() + limits::VIEW) {
             None if self.hub.phase() != Phase::Down => Err(Unanswered),
             view => Ok(view),
@@ -383,7 +383,7 @@ impl Session {
 
     /// Whether every coordinator is at rest in that state of its own and nothing asked is unanswered: what is seen between
     /// two equal epochs was so at one moment.
-    fn at_rest(&self, state: impl Fn(&Part) -> Option<NodeId>) -> bool {
+    fn at_rest(&self, state: impl Fn(&CoordinatorPart) -> Option<NodeId>) -> bool {
         let before = self.hub.epoch();
         let rest = self.hub.all_answered()
             && self.parts.iter().all(|part| {
@@ -403,7 +403,7 @@ impl Session {
     }
 
     pub(super) fn failed_state(&self) -> Option<&str> {
-        self.parts.iter().find_map(Part::failed_state)
+        self.parts.iter().find_map(CoordinatorPart::failed_state)
     }
 
     /// Why requests failed since the deployment began to come up, one line each.

@@ -14,7 +14,7 @@ pub const WAY_OUT: &str = "`davit undo ID` takes back what is left of that confi
                            asked for it), `davit recover --back` all that is; \
                            `davit recover --accept` takes what is there as the state; `davit drift` shows what differs";
 
-/// The answer to a request. Every request gets exactly one; a later [`Verdict::Reverted`] (or an undo verdict in its
+/// The answer to a request. Every request gets exactly one; a later `Verdict::Reverted` (or an undo verdict in its
 /// place, when the frame could not be popped) about a configuration whose confirmation did not come is a notice and
 /// carries the number of the request that had pushed it.
 #[derive(Debug, Clone)]

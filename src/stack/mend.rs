@@ -10,7 +10,7 @@ use super::{Broken, Frame, FrameId, HandOver, Seen, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{Item, Script, absolute};
-use crate::plan::{Context, PlannedStep, SavedValue, Stage, StepId};
+use crate::plan::{Context, PlanStage, PlannedStep, SavedValue, StepId};
 use crate::system::touch::{Access, touches};
 use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
@@ -252,7 +252,7 @@ impl World {
             step::apply(&planned.step, &mut end).ok()?;
         }
         let mends = mend.len();
-        let alone = |step| Item::bare(step, Stage::Changes, Origin::NONE);
+        let alone = |step| Item::bare(step, PlanStage::Changes, Origin::NONE);
         let items = mend.into_iter().map(alone).chain(undo.steps.iter().map(Item::of)).collect();
         let shorter = self.spared(items, mends, &wanted);
         if shorter.iter().filter(|item| (item.of as usize) < mends).count() == mends {

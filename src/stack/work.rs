@@ -29,7 +29,8 @@ pub enum Op<'a> {
     },
     /// Pop this frame, from wherever it lies.
     Undo(FrameId),
-    /// Pop the top.
+    /// Pop the top. Requests name their frame.
+    #[cfg(any(test, feature = "internals"))]
     UndoTop,
     /// Pop until so many frames are left.
     UndoTo(usize),
@@ -209,6 +210,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                 frame.clone_from(&edits.push);
             }
             Op::Undo(id) => frame = Some(self.undo(*id, &mut edits)?),
+            #[cfg(any(test, feature = "internals"))]
             Op::UndoTop => match self.frames.len().checked_sub(1) {
                 Some(top) => {
                     frame = Some(self.frames[top].clone());

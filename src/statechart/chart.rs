@@ -1,6 +1,6 @@
 //! The compiled chart: flat tables, indexed by small numbers.
 
-use super::reactions::Reactions;
+use super::reactions::ReactionTable;
 use super::wide::Wide;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
@@ -143,18 +143,18 @@ pub(super) struct EdgeRow {
 
 /// One thing done by an entry, exit or effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Op {
+pub(super) enum ActionOp {
     Raise(EventName),
     /// Of a state-scoped configuration of the state that is entered or left.
     RaiseScoped(EventName),
     Call(FunctionId),
 }
 
-impl Op {
+impl ActionOp {
     /// The state whose state-scoped configuration is asked for or taken back, at that place.
-    pub fn scope(self, place: super::Place) -> Option<NodeId> {
+    pub fn scope(self, place: super::ActionPlace) -> Option<NodeId> {
         match (self, place) {
-            (Self::RaiseScoped(_), super::Place::Entry(state) | super::Place::Exit(state)) => Some(state),
+            (Self::RaiseScoped(_), super::ActionPlace::Entry(state) | super::ActionPlace::Exit(state)) => Some(state),
             _ => None,
         }
     }
@@ -162,7 +162,7 @@ impl Op {
 
 /// A time event of a state.
 #[derive(Debug, Clone)]
-pub(super) struct Timer {
+pub(super) struct TimerRow {
     /// From the entry of the state, not from the clock's start.
     pub relative: bool,
     /// Fires when more nanoseconds than this have passed.
@@ -201,11 +201,11 @@ pub struct RaiseSite {
 pub struct Chart {
     pub(super) nodes: Vec<NodeRow>,
     pub(super) edges: Vec<EdgeRow>,
-    pub(super) ops: Vec<Op>,
+    pub(super) ops: Vec<ActionOp>,
     /// Event lists of all transitions, one after the other.
     pub(super) triggers: Vec<EventId>,
     pub(super) predicates: Vec<FunctionId>,
-    pub(super) timers: Vec<Timer>,
+    pub(super) timers: Vec<TimerRow>,
     pub(super) events: Vec<EventName>,
     pub(super) event_ids: FxHashMap<EventName, EventId>,
     pub(super) names: Vec<Ident>,
@@ -228,7 +228,7 @@ pub struct Chart {
     /// The event of the first entry.
     pub(super) init: EventId,
     /// What is known beforehand of what events do.
-    pub(super) reactions: Reactions,
+    pub(super) reactions: ReactionTable,
     /// The transitions of nodes that have many.
     pub(super) wide: Wide,
 }

@@ -3,7 +3,7 @@
 use super::chart::{Chart, EventId, Kind, NONE};
 use super::hook::Nobody;
 use super::{EdgeId, NodeId};
-use super::{Machine, Step};
+use super::{Machine, TurnResult};
 use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{Finding, Findings};
@@ -367,7 +367,7 @@ fn root_exit(chart: &Chart, findings: &mut Findings) {
 }
 
 fn not_entered(chart: &Chart, findings: &mut Findings) {
-    if Machine::new(chart).turn(chart, Time::default(), &mut Nobody) == Step::NotEntered {
+    if Machine::new(chart).turn(chart, Time::default(), &mut Nobody) == TurnResult::NotEntered {
         let initial = NodeId(chart.initial);
         findings.push(
             Finding::warning(codes::CHART_NOT_ENTERED, "no path leads from the initial connector without an event")
@@ -386,7 +386,7 @@ fn endless(chart: &Chart, reached: &[bool], findings: &mut Findings) {
     for leaf in chart.nodes().filter(|n| chart.kind(*n) == Kind::Leaf && goes_on(n)) {
         machine.place(chart, leaf, Time::default());
         machine.send(chart.completion(leaf));
-        if machine.turn(chart, Time::default(), &mut Nobody) == Step::Taken {
+        if machine.turn(chart, Time::default(), &mut Nobody) == TurnResult::Taken {
             next[leaf.index()] = machine.leaf().map_or(NONE, |leaf| leaf.0);
         }
     }

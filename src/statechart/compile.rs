@@ -5,9 +5,9 @@
 
 mod tables;
 
-use super::chart::{Chart, EventId, Kind, NONE, Op, RaiseSite};
-use super::reactions::Reactions;
-use super::resolve::Names;
+use super::chart::{ActionOp, Chart, EventId, Kind, NONE, RaiseSite};
+use super::reactions::ReactionTable;
+use super::resolve::ResolvedNames;
 use super::wide::Wide;
 use super::{Machine, checks};
 use crate::limits;
@@ -23,7 +23,7 @@ use rustc_hash::FxHashMap;
 /// There is a chart exactly when no finding is an error. What only a deployment can judge (that a raised name is a
 /// configuration's, that somebody sends the events) is not looked at here.
 pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
-    let mut builder = Builder::default();
+    let mut builder = ChartBuilder::default();
     builder.walk_root(&model.root);
     builder.resolve_all();
     if finding::has_errors(&builder.findings) {
@@ -38,13 +38,13 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
         chart.nodes.iter().filter(|node| node.kind == Kind::Connector).map(|node| node.out.len).sum();
     chart.wide = Wide::of(&chart);
     mark_settling(&mut chart);
-    chart.reactions = Reactions::of(&chart);
+    chart.reactions = ReactionTable::of(&chart);
     checks::doubts(&chart, &mut builder.findings);
     (Some(chart), builder.findings)
 }
 
 /// A resolved transition, not yet in its place.
-struct Edge<'m> {
+struct ChartEdge<'m> {
     written: &'m Transition,
     src: u32,
     tgt: u32,
@@ -52,7 +52,7 @@ struct Edge<'m> {
 }
 
 #[derive(Default)]
-struct Builder<'m> {
+struct ChartBuilder<'m> {
     findings: Findings,
     names: Vec<Ident>,
     parents: Vec<u32>,
@@ -63,12 +63,12 @@ struct Builder<'m> {
     children: FxHashMap<(u32, Ident), u32>,
     /// All transitions with their scopes and numbers there, in rFSM's order: a scope's own before those of the states in it.
     written: Vec<(u32, usize, &'m Transition)>,
-    edges: Vec<Edge<'m>>,
+    edges: Vec<ChartEdge<'m>>,
     events: Vec<EventName>,
     /// Where each was listed first.
     event_origins: Vec<Origin>,
     event_ids: FxHashMap<EventName, EventId>,
-    ops: Vec<Op>,
+    ops: Vec<ActionOp>,
     raises: Vec<RaiseSite>,
 }
 
@@ -76,7 +76,7 @@ struct Builder<'m> {
 const RESERVED: [&str; 3] = ["type", "new", "rfsm"];
 const RESERVED_IN_ROOT: [&str; 6] = ["err", "warn", "info", "dbg", "getevents", "idle_hook"];
 
-impl<'m> Builder<'m> {
+impl<'m> ChartBuilder<'m> {
     fn walk_root(&mut self, root: &'m State) {
         let node = self.add(Ident::new(ROOT).expect("`root` is a name"), NONE, 0, Kind::Composite, root.origin);
         self.walk(root, node, 0);
@@ -196,9 +196,9 @@ impl<'m> Builder<'m> {
         self.lookup().fqn(node)
     }
 
-    fn lookup(&self) -> Names<'_> {
+    fn lookup(&self) -> ResolvedNames<'_> {
         let suggests = self.findings.len() < limits::FINDINGS_SHOWN;
-        Names { children: &self.children, names: &self.names, parents: &self.parents, suggests }
+        ResolvedNames { children: &self.children, names: &self.names, parents: &self.parents, suggests }
     }
 
     fn resolve_all(&mut self) {
@@ -314,7 +314,7 @@ impl<'m> Builder<'m> {
                 );
             }
         }
-        self.edges.push(Edge { written: transition, src, tgt, pn: transition.pn });
+        self.edges.push(ChartEdge { written: transition, src, tgt, pn: transition.pn });
     }
 }
 

@@ -4,8 +4,8 @@
 //! or transition stands at the end of its table. The outgoing transitions of a node stand side by side, so with a new one
 //! all of them move to the end; the rows they leave are read by nobody who begins to look after that.
 
-use super::chart::{Chart, EdgeId, EdgeRow, EventId, Kind, NONE, NodeId, NodeRow, Op, Span};
-use super::reactions::Reactions;
+use super::chart::{ActionOp, Chart, EdgeId, EdgeRow, EventId, Kind, NONE, NodeId, NodeRow, Span};
+use super::reactions::ReactionTable;
 use super::wide::Wide;
 use crate::limits;
 use crate::model::finding::Origin;
@@ -234,7 +234,7 @@ impl Chart {
     /// What was worked out beforehand holds no more.
     fn forget(&mut self) {
         self.pure = false;
-        self.reactions = Reactions::default();
+        self.reactions = ReactionTable::default();
         self.wide = Wide::default();
         self.nodes.iter_mut().for_each(|row| row.settles = false);
     }
@@ -242,7 +242,8 @@ impl Chart {
     fn add_entry_and_exit(&mut self, state: Addition<'_, State>) -> (Span, Span) {
         let State { entry, exit, config, .. } = state.what;
         let mut entered = self.add_actions(entry, state.functions);
-        let named = |text: &str| Op::RaiseScoped(EventName::new(text).expect("a configuration's name is an event's"));
+        let named =
+            |text: &str| ActionOp::RaiseScoped(EventName::new(text).expect("a configuration's name is an event's"));
         self.ops.extend(config.iter().map(|(config, _)| named(config.as_str())));
         entered.len = length(&self.ops) - entered.start;
         let start = length(&self.ops);
@@ -254,8 +255,8 @@ impl Chart {
     fn add_actions(&mut self, actions: &[(Action, Origin)], functions: u32) -> Span {
         let start = length(&self.ops);
         self.ops.extend(actions.iter().map(|(action, _)| match action {
-            Action::Raise(name) => Op::Raise(*name),
-            Action::Function(function) => Op::Call(Addition { what: action, functions }.function(*function)),
+            Action::Raise(name) => ActionOp::Raise(*name),
+            Action::Function(function) => ActionOp::Call(Addition { what: action, functions }.function(*function)),
         }));
         Span { start, len: length(&self.ops) - start }
     }

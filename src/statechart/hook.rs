@@ -24,7 +24,7 @@ pub struct Raised {
 
 /// Where a function of a model is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum ActionPlace {
     /// On the entry of a state.
     Entry(NodeId),
     /// On the exit of a state, which is already inactive then.
@@ -37,8 +37,6 @@ pub enum Place {
 pub struct View<'a> {
     /// The chart.
     pub chart: &'a Chart,
-    /// The active states, from the root inwards.
-    pub active: &'a [NodeId],
     /// The active leaf; while a transition is under way as rFSM tells it: on exit still the old one, on entry none.
     pub leaf: Option<NodeId>,
     /// The events of this step.
@@ -186,7 +184,7 @@ pub trait Hook {
     }
 
     /// Runs an entry, exit or effect function.
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         let _ = (function, place, view);
     }
 
@@ -357,7 +355,7 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.predicate(function, event, view)
     }
 
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
         self.functions.action(function, place, view);
     }
 

@@ -1,12 +1,12 @@
 //! One run of a chart: rFSM's `step` and `run` (`docs/rfsm.md` §5, §6, §7, §9).
 
 use super::EdgeId;
-use super::chart::{Chart, EventId, Kind, NONE, NodeId, Op, Span};
-use super::hook::{Doo, Hook, Nobody, Place, Raised, View};
-use super::outcome::{Ended, Mode, Step, Stepped};
+use super::chart::{ActionOp, Chart, EventId, Kind, NONE, NodeId, Span};
+use super::hook::{ActionPlace, Doo, Hook, Nobody, Raised, View};
+use super::outcome::{Mode, RunEnd, Stepped, TurnResult};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
-use super::{timers::Armed, trace::Trace};
+use super::{timers::ArmedTimer, trace::Trace};
 use crate::limits;
 use crate::time::Time;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub struct Machine {
     /// By node: how often it was entered.
     pub(super) visits: Vec<u32>,
     /// By time event.
-    pub(super) timers: Vec<Armed>,
+    pub(super) timers: Vec<ArmedTimer>,
     pub(super) search: Search,
     chain: Vec<NodeId>,
     /// The chart, once the model has added to the one that is given.
@@ -45,7 +45,7 @@ impl Machine {
             events: Vec::with_capacity(limits::CHART_QUEUE),
             changed: Vec::new(),
             visits: vec![0; chart.nodes.len()],
-            timers: chart.timers.iter().map(Armed::at_start).collect(),
+            timers: chart.timers.iter().map(ArmedTimer::at_start).collect(),
             search: Search::new(chart),
             chain: Vec::with_capacity(depth),
             grown: None,
@@ -184,25 +184,25 @@ impl Machine {
             let turn = self.turn(chart, now, hook);
             let mut idle = false;
             match turn {
-                Step::NotEntered => return Stepped { idle: false, transition, ended: Ended::NotEntered },
-                Step::Entered | Step::Taken => {
+                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                TurnResult::Entered | TurnResult::Taken => {
                     transition = true;
                     left = left.saturating_sub(1);
                 }
-                Step::Unmatched => (),
-                Step::Quiet { idle: quiet } => {
+                TurnResult::Unmatched => (),
+                TurnResult::Quiet { idle: quiet } => {
                     idle = quiet;
                     left = left.saturating_sub(1);
                 }
             }
             if left < 1 {
-                return Stepped { idle, transition, ended: if idle { Ended::Idle } else { Ended::Steps } };
+                return Stepped { idle, transition, ended: if idle { RunEnd::Idle } else { RunEnd::Steps } };
             }
             if idle && !hook.go_on() {
-                return Stepped { idle, transition, ended: Ended::Idle };
+                return Stepped { idle, transition, ended: RunEnd::Idle };
             }
         }
-        Stepped { idle: false, transition, ended: Ended::Endless }
+        Stepped { idle: false, transition, ended: RunEnd::Endless }
     }
 
     /// What rFSM's `run(fsm)` does: turns until nothing is left to do, but no more than [`limits::CHART_RUN`].
@@ -210,24 +210,24 @@ impl Machine {
         let mut transition = false;
         for _ in 0..limits::CHART_RUN {
             match self.turn(chart, now, hook) {
-                Step::NotEntered => return Stepped { idle: false, transition, ended: Ended::NotEntered },
-                Step::Entered | Step::Taken => {
+                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                TurnResult::Entered | TurnResult::Taken => {
                     transition = true;
                     if self.rest::<H>(chart) {
-                        return Stepped { idle: true, transition, ended: Ended::Idle };
+                        return Stepped { idle: true, transition, ended: RunEnd::Idle };
                     }
                 }
-                Step::Quiet { idle: true } if !hook.go_on() => {
-                    return Stepped { idle: true, transition, ended: Ended::Idle };
+                TurnResult::Quiet { idle: true } if !hook.go_on() => {
+                    return Stepped { idle: true, transition, ended: RunEnd::Idle };
                 }
-                Step::Unmatched | Step::Quiet { .. } => (),
+                TurnResult::Unmatched | TurnResult::Quiet { .. } => (),
             }
         }
-        Stepped { idle: false, transition, ended: Ended::Endless }
+        Stepped { idle: false, transition, ended: RunEnd::Endless }
     }
 
     /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
-    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
+    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
         if !H::TURNS {
             return self.turn_in(chart, now, hook);
         }
@@ -250,9 +250,9 @@ impl Machine {
         }
     }
 
-    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Step {
+    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
         if !hook.poll(&mut self.queue) {
-            return Step::Unmatched;
+            return TurnResult::Unmatched;
         }
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);
@@ -260,7 +260,7 @@ impl Machine {
             let mut changed = std::mem::take(&mut self.changed);
             changed.clone_from(&self.events);
             if !hook.before_step(&mut self.view(chart), &mut changed) {
-                return Step::Unmatched;
+                return TurnResult::Unmatched;
             }
             self.changed = std::mem::replace(&mut self.events, changed);
         }
@@ -272,7 +272,7 @@ impl Machine {
         } else {
             self.transit(chart, now, hook)
         };
-        if step != Step::NotEntered {
+        if step != TurnResult::NotEntered {
             self.check_timers(chart, now, hook);
             hook.after_step(&mut self.view(chart));
         }
@@ -292,30 +292,30 @@ impl Machine {
     }
 
     pub(super) fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
-        View { chart, active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
+        View { chart, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
     }
 
     fn find(&mut self, chart: &Chart, node: u32, hook: &mut impl Hook) -> u32 {
-        let mut around = Around { active: &self.path, leaf: self.leaf, events: &self.events, queue: &mut self.queue };
+        let mut around = Around { leaf: self.leaf, events: &self.events, queue: &mut self.queue };
         self.search.from(chart, node, &mut around, hook)
     }
 
-    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
         self.search.begin();
         let way = self.find(chart, chart.initial, hook);
         if way == NONE {
             hook.not_entered(chart);
-            return Step::NotEntered;
+            return TurnResult::NotEntered;
         }
         self.enter(chart, NodeId::ROOT, now, hook);
         self.trace_path(chart, way, hook);
         self.report(chart, chart.initial, way, hook);
         self.execute(chart, way, now, hook);
-        Step::Entered
+        TurnResult::Entered
     }
 
     /// The outermost active state with a complete path wins, whatever the priorities further in.
-    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> Step {
+    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
         self.search.begin();
         self.trace(chart, Trace::Searching, hook);
         for i in 0..self.path.len() {
@@ -333,7 +333,7 @@ impl Machine {
                         hook.taking(chart, EdgeId(edge));
                         let row = &chart.edges[edge as usize];
                         self.segment(chart, edge, NodeId(row.lca), now, hook);
-                        return Step::Taken;
+                        return TurnResult::Taken;
                     }
                     Straight::Unclear => (),
                 }
@@ -342,14 +342,14 @@ impl Machine {
             if way != NONE {
                 self.trace_path(chart, way, hook);
                 self.execute(chart, way, now, hook);
-                return Step::Taken;
+                return TurnResult::Taken;
             }
         }
         self.trace(chart, Trace::NotFound, hook);
-        Step::Unmatched
+        TurnResult::Unmatched
     }
 
-    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> Step {
+    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> TurnResult {
         let mut idle = true;
         if let Some(leaf) = self.leaf
             && self.mode == Mode::Active
@@ -369,7 +369,7 @@ impl Machine {
         if idle {
             idle = hook.poll(&mut self.queue) && self.queue.events.is_empty();
         }
-        Step::Quiet { idle }
+        TurnResult::Quiet { idle }
     }
 
     /// Takes the path that begins with `way`, segment by segment, to a leaf.
@@ -410,7 +410,7 @@ impl Machine {
         }
         self.trace(chart, Trace::Effect(EdgeId(edge)), hook);
         if row.effect.len > 0 {
-            self.act(chart, row.effect, Place::Effect(EdgeId(edge)), owner, hook);
+            self.act(chart, row.effect, ActionPlace::Effect(EdgeId(edge)), owner, hook);
         }
         self.trace(chart, Trace::Entering(EdgeId(edge)), hook);
         let target = &chart.nodes[row.tgt as usize];
@@ -444,7 +444,7 @@ impl Machine {
         let Some(state) = self.path.pop() else { return };
         hook.exited(chart, state);
         let row = &chart.nodes[state.index()];
-        self.act(chart, row.exit, Place::Exit(state), owner, hook);
+        self.act(chart, row.exit, ActionPlace::Exit(state), owner, hook);
         if row.kind == Kind::Leaf {
             self.leaf = None;
         }
@@ -471,7 +471,7 @@ impl Machine {
         self.restart_timer(chart, state, now, hook);
         hook.entered(chart, state);
         let row = &chart.nodes[state.index()];
-        self.act(chart, row.entry, Place::Entry(state), state, hook);
+        self.act(chart, row.entry, ActionPlace::Entry(state), state, hook);
         if row.kind == Kind::Leaf {
             self.leaf = Some(state);
             if row.doo.is_some() {
@@ -486,14 +486,14 @@ impl Machine {
         self.trace(chart, Trace::Entered(state), hook);
     }
 
-    fn act(&mut self, chart: &Chart, ops: Span, place: Place, owner: NodeId, hook: &mut impl Hook) {
+    fn act(&mut self, chart: &Chart, ops: Span, place: ActionPlace, owner: NodeId, hook: &mut impl Hook) {
         for op in ops.of(&chart.ops) {
             match *op {
-                Op::Raise(name) | Op::RaiseScoped(name) => {
+                ActionOp::Raise(name) | ActionOp::RaiseScoped(name) => {
                     let (visit, scope) = (self.visits[owner.index()], op.scope(place));
                     hook.raised(chart, Raised { name, owner, visit, scope });
                 }
-                Op::Call(function) => hook.action(function, place, &mut self.view(chart)),
+                ActionOp::Call(function) => hook.action(function, place, &mut self.view(chart)),
             }
         }
     }

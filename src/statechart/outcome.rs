@@ -12,7 +12,7 @@ pub enum Mode {
 
 /// What one turn of the step loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Step {
+pub enum TurnResult {
     /// The chart was entered.
     Entered,
     /// The chart could not be entered; the events are lost.
@@ -36,12 +36,12 @@ pub struct Stepped {
     /// At least one transition was taken, the first entry counted.
     pub transition: bool,
     /// Why it ended.
-    pub ended: Ended,
+    pub ended: RunEnd,
 }
 
 /// Why stepping ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ended {
+pub enum RunEnd {
     /// Nothing left to do.
     Idle,
     /// As many steps as asked for.

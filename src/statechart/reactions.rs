@@ -10,14 +10,14 @@ use super::EdgeId;
 use super::chart::{Chart, EventId, Kind, NodeId, Span};
 use super::hook::{Hook, Nobody, Raised};
 use super::machine::Machine;
-use super::outcome::{Ended, Mode, Step, Stepped};
+use super::outcome::{Mode, TurnResult};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::time::Time;
 
 /// What one event does to one leaf at rest.
 #[derive(Debug, Clone, Copy)]
-struct Reaction {
+struct ReactionRow {
     event: EventId,
     /// The leaf it ends in.
     leaf: NodeId,
@@ -38,17 +38,17 @@ struct Reaction {
 /// What is known of one node. Its first row stands here itself: most leaves have only one or two, and to find the leaf, then
 /// its rows, then the row would be three looks into memory that wait for each other.
 #[derive(Debug, Clone, Copy)]
-struct Known {
-    first: Reaction,
+struct KnownReactions {
+    first: ReactionRow,
     /// The other rows, sorted by event.
     more: Span,
 }
 
-impl Known {
+impl KnownReactions {
     /// Nothing is known.
     const NONE: Self = {
         let none = Span { start: 0, len: 0 };
-        let first = Reaction {
+        let first = ReactionRow {
             event: EventId::NEVER,
             leaf: NodeId::ROOT,
             keep: 0,
@@ -64,10 +64,10 @@ impl Known {
 
 /// The reactions of a chart.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Reactions {
+pub(super) struct ReactionTable {
     /// By node; nothing is known but of leaves.
-    of: Vec<Known>,
-    rows: Vec<Reaction>,
+    of: Vec<KnownReactions>,
+    rows: Vec<ReactionRow>,
     around: Vec<NodeId>,
     raised: Vec<(EventName, NodeId, Option<NodeId>)>,
 }
@@ -127,7 +127,7 @@ impl Machine {
 
     /// What a row says, step by step.
     #[inline(never)]
-    fn play<H: Hook>(&mut self, chart: &Chart, row: Reaction, now: Time, hook: &mut H) -> AtOnce {
+    fn play<H: Hook>(&mut self, chart: &Chart, row: ReactionRow, now: Time, hook: &mut H) -> AtOnce {
         let all = &chart.reactions;
         self.path.truncate(row.keep as usize);
         for state in row.around.of(&all.around) {
@@ -152,7 +152,7 @@ impl Machine {
 
     /// Time events after a reaction: those of the entered states begin anew, and those that are due are raised.
     #[cold]
-    fn time_after(&mut self, chart: &Chart, row: Reaction, now: Time) -> AtOnce {
+    fn time_after(&mut self, chart: &Chart, row: ReactionRow, now: Time) -> AtOnce {
         for state in row.around.of(&chart.reactions.around).iter().chain([&row.leaf]) {
             self.restart_timer(chart, *state, now, &mut Nobody);
         }
@@ -165,32 +165,12 @@ impl Machine {
             AtOnce::Goes
         }
     }
-
-    /// One event, then to rest: [`send`](Self::send) and [`run`](Self::run) in one, and faster where the reaction is known.
-    /// An event for which the queue has no room is dropped and counted.
-    #[inline]
-    pub fn react<H: Hook>(&mut self, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
-        match self.at_once(chart, event, now, hook) {
-            AtOnce::Rests => Stepped { idle: true, transition: true, ended: Ended::Idle },
-            begun => self.react_on(begun, chart, event, now, hook),
-        }
-    }
-
-    /// The rest of a reaction that does not rest at once. Apart, so that the short way needs no registers for it.
-    #[inline(never)]
-    fn react_on<H: Hook>(&mut self, begun: AtOnce, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> Stepped {
-        if begun == AtOnce::Goes {
-            return Stepped { transition: true, ..self.run(chart, now, hook) };
-        }
-        self.send(event);
-        self.run(chart, now, hook)
-    }
 }
 
-impl Reactions {
+impl ReactionTable {
     /// Asks the engine what each event that a leaf or a state around it lists does to that leaf.
     pub(super) fn of(chart: &Chart) -> Self {
-        let mut reactions = Self { of: vec![Known::NONE; chart.nodes.len()], ..Self::default() };
+        let mut reactions = Self { of: vec![KnownReactions::NONE; chart.nodes.len()], ..Self::default() };
         if !chart.pure {
             return Self::default();
         }
@@ -224,7 +204,7 @@ impl Reactions {
                 notes.clear();
                 machine.send(*event);
                 let step = machine.turn(chart, Time::default(), &mut notes);
-                if step == Step::Taken && notes.plain && machine.rest::<Notes>(chart) {
+                if step == TurnResult::Taken && notes.plain && machine.rest::<Notes>(chart) {
                     let row = reactions.row(chart, leaf, *event, &machine, &notes);
                     if let Some(row) = row
                         && first.is_some()
@@ -235,7 +215,7 @@ impl Reactions {
                 }
             }
             if let Some(first) = first {
-                reactions.of[leaf.index()] = Known { first, more: span(start, reactions.rows.len()) };
+                reactions.of[leaf.index()] = KnownReactions { first, more: span(start, reactions.rows.len()) };
             }
             firsts += usize::from(first.is_some());
             let size = firsts + reactions.rows.len() + reactions.around.len() + reactions.raised.len();
@@ -254,7 +234,7 @@ impl Reactions {
         event: EventId,
         machine: &Machine,
         notes: &Notes,
-    ) -> Option<Reaction> {
+    ) -> Option<ReactionRow> {
         let leaf = machine.leaf?;
         let (entered, around) = notes.entered.split_last()?;
         debug_assert_eq!(*entered, leaf, "a transition ends in the leaf it enters last");
@@ -270,7 +250,7 @@ impl Reactions {
             _ => None,
         };
         let simple = around.is_empty() && chart.depth(from) == keep && name.is_some() && chart.timers.is_empty();
-        Some(Reaction {
+        Some(ReactionRow {
             event,
             leaf,
             keep: u32::try_from(keep).expect("less deep than ids are many"),

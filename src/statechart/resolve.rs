@@ -11,7 +11,7 @@ use crate::model::statechart::{INITIAL, ROOT};
 use rustc_hash::FxHashMap;
 
 /// The names of a chart, as far as references need them.
-pub(super) struct Names<'a> {
+pub(super) struct ResolvedNames<'a> {
     /// Child of a state by name.
     pub children: &'a FxHashMap<(u32, Ident), u32>,
     pub names: &'a [Ident],
@@ -26,7 +26,7 @@ pub(super) struct Unresolved {
     pub help: String,
 }
 
-impl Names<'_> {
+impl ResolvedNames<'_> {
     pub fn child(&self, state: u32, name: &str) -> Option<u32> {
         self.children.get(&(state, Ident::new(name).ok()?)).copied()
     }

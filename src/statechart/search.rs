@@ -23,7 +23,7 @@ use crate::limits;
 
 /// One way on from a node: a transition and, if it ends at a connector, the ways on from there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct SearchWay {
     pub edge: u32,
     /// First way on from the connector it ends at; [`NONE`] at a leaf.
     pub then: u32,
@@ -34,7 +34,7 @@ pub(super) struct Way {
 /// What a search works with, kept from step to step so that none allocates.
 #[derive(Debug, Clone)]
 pub(super) struct Search {
-    pub ways: Vec<Way>,
+    pub ways: Vec<SearchWay>,
     /// By node: the step in which it was last searched, and what was found.
     memo: Vec<(u32, u32)>,
     step: u32,
@@ -48,7 +48,6 @@ const OPEN: u32 = NONE - 1;
 
 /// What the functions called by a search may see.
 pub(super) struct Around<'a> {
-    pub active: &'a [NodeId],
     pub leaf: Option<NodeId>,
     pub events: &'a [EventId],
     pub queue: &'a mut Queue,
@@ -56,7 +55,7 @@ pub(super) struct Around<'a> {
 
 impl Around<'_> {
     fn view<'v>(&'v mut self, chart: &'v Chart) -> View<'v> {
-        View { chart, active: self.active, leaf: self.leaf, events: self.events, queue: self.queue }
+        View { chart, leaf: self.leaf, events: self.events, queue: self.queue }
     }
 }
 
@@ -164,7 +163,7 @@ impl Search {
                 }
             };
             let way = u32::try_from(self.ways.len()).expect("fewer ways than ids");
-            self.ways.push(Way { edge, then, other: NONE });
+            self.ways.push(SearchWay { edge, then, other: NONE });
             if first == NONE {
                 first = way;
             } else {

@@ -3,7 +3,7 @@
 use super::Machine;
 use super::chart::{Chart, NodeId};
 use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
-use super::outcome::{Ended, Mode, Stepped};
+use super::outcome::{Mode, RunEnd, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
 use crate::model::finding::{count, nearest};
@@ -96,7 +96,7 @@ impl<'c, F: Hook> Sim<'c, F> {
     /// [`SimError`] for a line that says none of these; the machine is as before.
     pub fn line(&mut self, line: &str) -> Result<Observation, SimError> {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let mut trace = Trace::default();
+        let mut trace = SimTrace::default();
         let mut lost = 0;
         let stepped = match words[..] {
             ["run"] => {
@@ -136,7 +136,7 @@ impl<'c, F: Hook> Sim<'c, F> {
     }
 
     /// An event that is spelt wrongly does as little as one that is only not enabled.
-    fn remark_unknown(&mut self, names: &[EventName], trace: &mut Trace) {
+    fn remark_unknown(&mut self, names: &[EventName], trace: &mut SimTrace) {
         let mut said = Vec::new();
         self.functions.said(&mut said);
         trace.heard(&mut said);
@@ -155,7 +155,7 @@ impl<'c, F: Hook> Sim<'c, F> {
         trace.note(format!("no transition lists `{}`{more}{near}", unknown.join("`, `")));
     }
 
-    fn observe(&mut self, stepped: Stepped, mut trace: Trace) -> Observation {
+    fn observe(&mut self, stepped: Stepped, mut trace: SimTrace) -> Observation {
         let mut said = Vec::new();
         self.functions.said(&mut said);
         trace.heard(&mut said);
@@ -167,7 +167,7 @@ impl<'c, F: Hook> Sim<'c, F> {
         if trace.left_out > 0 {
             end(format!("left out: {}", count(trace.left_out, "more note")));
         }
-        if stepped.ended == Ended::Endless {
+        if stepped.ended == RunEnd::Endless {
             end(format!("stopped after {} turns: the machine does not come to rest", limits::CHART_RUN));
         }
         Observation {
@@ -227,7 +227,7 @@ impl fmt::Display for Observation {
 
 /// Writes down what happens.
 #[derive(Debug, Default)]
-struct Trace {
+struct SimTrace {
     actions: Vec<String>,
     notes: Vec<String>,
     notes_after: Vec<usize>,
@@ -235,7 +235,7 @@ struct Trace {
     left_out: usize,
 }
 
-impl Trace {
+impl SimTrace {
     fn note(&mut self, text: String) {
         if self.notes.len() >= limits::SIM_NOTES {
             self.left_out += 1;
@@ -246,7 +246,7 @@ impl Trace {
     }
 }
 
-impl Hook for Trace {
+impl Hook for SimTrace {
     const TURNS: bool = false;
     const HEARS: bool = true;
 

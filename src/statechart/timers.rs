@@ -1,6 +1,6 @@
 //! Time events of a run (`docs/rfsm.md` §9): begun on entry, looked at after every turn.
 
-use super::chart::{Chart, NodeId, Timer};
+use super::chart::{Chart, NodeId, TimerRow};
 use super::hook::Hook;
 use super::machine::Machine;
 use super::trace::Trace;
@@ -8,7 +8,7 @@ use crate::time::Time;
 
 /// A time event of one visit.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Armed {
+pub(super) struct ArmedTimer {
     /// When its state was entered.
     entered: Time,
     /// Fires when more nanoseconds than this have passed.
@@ -17,9 +17,9 @@ pub(super) struct Armed {
     raised: bool,
 }
 
-impl Armed {
+impl ArmedTimer {
     /// Before its state was entered.
-    pub(super) fn at_start(timer: &Timer) -> Self {
+    pub(super) fn at_start(timer: &TimerRow) -> Self {
         Self { entered: Time::default(), nanos: timer.nanos, raised: false }
     }
 }
@@ -44,7 +44,7 @@ impl Machine {
     pub(super) fn restart_timer(&mut self, chart: &Chart, state: NodeId, now: Time, hook: &mut impl Hook) {
         let index = chart.nodes[state.index()].timer as usize;
         let Some(timer) = chart.timers.get(index) else { return };
-        let mut armed = Armed { entered: now, nanos: timer.nanos, raised: false };
+        let mut armed = ArmedTimer { entered: now, nanos: timer.nanos, raised: false };
         if let Some(function) = timer.by {
             let seconds = hook.seconds(function, state, &mut self.view(chart)).filter(|s| !s.is_nan());
             armed.raised = seconds.is_none();

@@ -42,12 +42,8 @@ impl<'a> Overlay<'a> {
         self.driven.reserve(links);
     }
 
-    /// The system underneath.
-    pub fn base(&self) -> &'a System {
-        self.base
-    }
-
     /// The system with the changes, as it is observed.
+    #[cfg(any(test, feature = "internals"))]
     pub fn snapshot(&self) -> Snapshot {
         snapshot_of(self)
     }

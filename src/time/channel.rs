@@ -2,31 +2,31 @@
 //!
 //! On the real clock they are crossbeam's; on a simulated one a receiver that waits gives the token away.
 
-use super::clock::{Clock, Kind};
-use super::simulated::{Scheduler, Wait};
+use super::clock::{Clock, TimeKind};
+use super::simulated::{Scheduler, WaitUntil};
 use super::{Time, lock};
 use crossbeam_channel as real;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
 /// The end values go in at. Cloning makes another sender.
-pub struct Sender<T>(End<real::Sender<T>, T>);
+pub struct Sender<T>(ChannelEnd<real::Sender<T>, T>);
 
 /// The end values come out at, each once. Cloning makes another receiver of the same queue.
-pub struct Receiver<T>(End<real::Receiver<T>, T>);
+pub struct Receiver<T>(ChannelEnd<real::Receiver<T>, T>);
 
-enum End<R, T> {
+enum ChannelEnd<R, T> {
     Real(Clock, R),
-    Simulated(Clock, Arc<Mutex<Queue<T>>>),
+    Simulated(Clock, Arc<Mutex<ChannelQueue<T>>>),
 }
 
-struct Queue<T> {
+struct ChannelQueue<T> {
     values: VecDeque<T>,
     bound: usize,
     senders: usize,
     receivers: usize,
-    want_value: VecDeque<Wait>,
-    want_room: VecDeque<Wait>,
+    want_value: VecDeque<WaitUntil>,
+    want_room: VecDeque<WaitUntil>,
 }
 
 /// Why a value was not queued; it is given back.
@@ -75,7 +75,7 @@ pub enum TryRecvError {
 
 pub(super) fn new<T>(clock: &Clock, bound: usize) -> (Sender<T>, Receiver<T>) {
     if clock.is_simulated() {
-        let queue = Arc::new(Mutex::new(Queue {
+        let queue = Arc::new(Mutex::new(ChannelQueue {
             values: VecDeque::new(),
             bound,
             senders: 1,
@@ -83,22 +83,25 @@ pub(super) fn new<T>(clock: &Clock, bound: usize) -> (Sender<T>, Receiver<T>) {
             want_value: VecDeque::new(),
             want_room: VecDeque::new(),
         }));
-        (Sender(End::Simulated(clock.clone(), queue.clone())), Receiver(End::Simulated(clock.clone(), queue)))
+        (
+            Sender(ChannelEnd::Simulated(clock.clone(), queue.clone())),
+            Receiver(ChannelEnd::Simulated(clock.clone(), queue)),
+        )
     } else {
         let (sender, receiver) = real::bounded(bound);
-        (Sender(End::Real(clock.clone(), sender)), Receiver(End::Real(clock.clone(), receiver)))
+        (Sender(ChannelEnd::Real(clock.clone(), sender)), Receiver(ChannelEnd::Real(clock.clone(), receiver)))
     }
 }
 
 fn scheduler(clock: &Clock) -> &Scheduler {
     match &*clock.0 {
-        Kind::Simulated(scheduler) => scheduler,
-        Kind::Real(_) => unreachable!("a simulated channel belongs to a simulated clock"),
+        TimeKind::Simulated(scheduler) => scheduler,
+        TimeKind::Real(_) => unreachable!("a simulated channel belongs to a simulated clock"),
     }
 }
 
 /// Wakes the first of those who wait that still does. The queue's lock is held: its owner and those who wait agree.
-fn wake_first(clock: &Clock, waiting: &mut VecDeque<Wait>) {
+fn wake_first(clock: &Clock, waiting: &mut VecDeque<WaitUntil>) {
     while let Some(wait) = waiting.pop_front() {
         if scheduler(clock).wake(wait) {
             return;
@@ -113,11 +116,11 @@ impl<T> Sender<T> {
     /// [`TrySendError`] with the value, when the queue is full or nobody receives any more.
     pub fn try_send(&self, value: T) -> Result<(), TrySendError<T>> {
         match &self.0 {
-            End::Real(_, sender) => sender.try_send(value).map_err(|error| match error {
+            ChannelEnd::Real(_, sender) => sender.try_send(value).map_err(|error| match error {
                 real::TrySendError::Full(value) => TrySendError::Full(value),
                 real::TrySendError::Disconnected(value) => TrySendError::Closed(value),
             }),
-            End::Simulated(clock, queue) => {
+            ChannelEnd::Simulated(clock, queue) => {
                 let mut queue = lock(queue);
                 if queue.receivers == 0 {
                     return Err(TrySendError::Closed(value));
@@ -138,14 +141,14 @@ impl<T> Sender<T> {
     /// [`SendError`] with the value, when the queue stayed full or nobody receives any more.
     pub fn send_deadline(&self, value: T, deadline: Time) -> Result<(), SendError<T>> {
         match &self.0 {
-            End::Real(clock, sender) => match real_instant(clock, deadline) {
+            ChannelEnd::Real(clock, sender) => match real_instant(clock, deadline) {
                 Some(instant) => sender.send_deadline(value, instant).map_err(|error| match error {
                     real::SendTimeoutError::Timeout(value) => SendError::Timeout(value),
                     real::SendTimeoutError::Disconnected(value) => SendError::Closed(value),
                 }),
                 None => sender.send(value).map_err(|error| SendError::Closed(error.0)),
             },
-            End::Simulated(clock, queue) => scheduler(clock).as_participant(|me| {
+            ChannelEnd::Simulated(clock, queue) => scheduler(clock).as_participant(|me| {
                 let mut value = value;
                 loop {
                     value = match self.try_send(value) {
@@ -170,8 +173,8 @@ impl<T> Sender<T> {
     /// Values queued and not yet received.
     pub fn len(&self) -> usize {
         match &self.0 {
-            End::Real(_, sender) => sender.len(),
-            End::Simulated(_, queue) => lock(queue).values.len(),
+            ChannelEnd::Real(_, sender) => sender.len(),
+            ChannelEnd::Simulated(_, queue) => lock(queue).values.len(),
         }
     }
 
@@ -188,11 +191,11 @@ impl<T> Receiver<T> {
     /// [`TryRecvError`]: empty, or empty for ever.
     pub fn try_recv(&self) -> Result<T, TryRecvError> {
         match &self.0 {
-            End::Real(_, receiver) => receiver.try_recv().map_err(|error| match error {
+            ChannelEnd::Real(_, receiver) => receiver.try_recv().map_err(|error| match error {
                 real::TryRecvError::Empty => TryRecvError::Empty,
                 real::TryRecvError::Disconnected => TryRecvError::Closed,
             }),
-            End::Simulated(clock, queue) => {
+            ChannelEnd::Simulated(clock, queue) => {
                 let mut queue = lock(queue);
                 match queue.values.pop_front() {
                     Some(value) => {
@@ -221,14 +224,14 @@ impl<T> Receiver<T> {
     /// [`RecvError`]: nothing came, or nothing will come.
     pub fn recv_or_idle(&self, deadline: Time, idle: Time) -> Result<T, RecvError> {
         match &self.0 {
-            End::Real(clock, receiver) => match real_instant(clock, deadline.min(idle)) {
+            ChannelEnd::Real(clock, receiver) => match real_instant(clock, deadline.min(idle)) {
                 Some(instant) => receiver.recv_deadline(instant).map_err(|error| match error {
                     real::RecvTimeoutError::Timeout => RecvError::Timeout,
                     real::RecvTimeoutError::Disconnected => RecvError::Closed,
                 }),
                 None => receiver.recv().map_err(|_| RecvError::Closed),
             },
-            End::Simulated(clock, queue) => scheduler(clock).as_participant(|me| {
+            ChannelEnd::Simulated(clock, queue) => scheduler(clock).as_participant(|me| {
                 loop {
                     match self.try_recv() {
                         Ok(value) => return Ok(value),
@@ -261,8 +264,8 @@ impl<T> Receiver<T> {
     /// Values queued and not yet received.
     pub fn len(&self) -> usize {
         match &self.0 {
-            End::Real(_, receiver) => receiver.len(),
-            End::Simulated(_, queue) => lock(queue).values.len(),
+            ChannelEnd::Real(_, receiver) => receiver.len(),
+            ChannelEnd::Simulated(_, queue) => lock(queue).values.len(),
         }
     }
 
@@ -274,18 +277,18 @@ impl<T> Receiver<T> {
 
 fn real_instant(clock: &Clock, time: Time) -> Option<std::time::Instant> {
     match &*clock.0 {
-        Kind::Real(real) => real.instant(time),
-        Kind::Simulated(_) => None,
+        TimeKind::Real(real) => real.instant(time),
+        TimeKind::Simulated(_) => None,
     }
 }
 
 impl<T> Clone for Sender<T> {
     fn clone(&self) -> Self {
         Self(match &self.0 {
-            End::Real(clock, sender) => End::Real(clock.clone(), sender.clone()),
-            End::Simulated(clock, queue) => {
+            ChannelEnd::Real(clock, sender) => ChannelEnd::Real(clock.clone(), sender.clone()),
+            ChannelEnd::Simulated(clock, queue) => {
                 lock(queue).senders += 1;
-                End::Simulated(clock.clone(), queue.clone())
+                ChannelEnd::Simulated(clock.clone(), queue.clone())
             }
         })
     }
@@ -294,10 +297,10 @@ impl<T> Clone for Sender<T> {
 impl<T> Clone for Receiver<T> {
     fn clone(&self) -> Self {
         Self(match &self.0 {
-            End::Real(clock, receiver) => End::Real(clock.clone(), receiver.clone()),
-            End::Simulated(clock, queue) => {
+            ChannelEnd::Real(clock, receiver) => ChannelEnd::Real(clock.clone(), receiver.clone()),
+            ChannelEnd::Simulated(clock, queue) => {
                 lock(queue).receivers += 1;
-                End::Simulated(clock.clone(), queue.clone())
+                ChannelEnd::Simulated(clock.clone(), queue.clone())
             }
         })
     }
@@ -305,7 +308,7 @@ impl<T> Clone for Receiver<T> {
 
 impl<T> Drop for Sender<T> {
     fn drop(&mut self) {
-        if let End::Simulated(clock, queue) = &self.0 {
+        if let ChannelEnd::Simulated(clock, queue) = &self.0 {
             let mut queue = lock(queue);
             queue.senders -= 1;
             if queue.senders == 0 {
@@ -319,7 +322,7 @@ impl<T> Drop for Sender<T> {
 
 impl<T> Drop for Receiver<T> {
     fn drop(&mut self) {
-        if let End::Simulated(clock, queue) = &self.0 {
+        if let ChannelEnd::Simulated(clock, queue) = &self.0 {
             let mut locked = lock(queue);
             locked.receivers -= 1;
             if locked.receivers == 0 {

@@ -30,10 +30,10 @@ use std::time::{Duration, Instant};
 /// A thread that is no participant (one that reads a socket) may call everything. `now`, `try_send`, `try_recv` and
 /// `notify` do not wait; a call that waits makes it a participant for as long as the call takes.
 #[derive(Clone)]
-pub struct Clock(pub(super) Arc<Kind>);
+pub struct Clock(pub(super) Arc<TimeKind>);
 
 #[allow(clippy::large_enum_variant)] // one of them in a process, behind an `Arc`
-pub(super) enum Kind {
+pub(super) enum TimeKind {
     Real(Real),
     Simulated(Scheduler),
 }
@@ -69,7 +69,7 @@ pub struct Released;
 impl Clock {
     /// Real time, counted from now.
     pub fn real() -> Self {
-        Self(Arc::new(Kind::Real(Real {
+        Self(Arc::new(TimeKind::Real(Real {
             start: Instant::now(),
             shut: Mutex::new(false),
             shut_changed: Condvar::new(),
@@ -78,7 +78,7 @@ impl Clock {
 
     /// Simulated time, as fast as the machine.
     pub fn simulated() -> Self {
-        Self(Arc::new(Kind::Simulated(Scheduler::new(None))))
+        Self(Arc::new(TimeKind::Simulated(Scheduler::new(None))))
     }
 
     /// Simulated time that runs at most `factor` times as fast as real time (1: as fast; a factor that is not a positive
@@ -87,19 +87,19 @@ impl Clock {
     /// that depends on when it came.
     pub fn simulated_paced(factor: f64) -> Self {
         let factor = if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
-        Self(Arc::new(Kind::Simulated(Scheduler::new(Some(factor)))))
+        Self(Arc::new(TimeKind::Simulated(Scheduler::new(Some(factor)))))
     }
 
     /// Whether time is simulated.
     pub fn is_simulated(&self) -> bool {
-        matches!(*self.0, Kind::Simulated(_))
+        matches!(*self.0, TimeKind::Simulated(_))
     }
 
     /// The present moment. Never waits.
     pub fn now(&self) -> Time {
         match &*self.0 {
-            Kind::Real(real) => real.now(),
-            Kind::Simulated(scheduler) => scheduler.now(),
+            TimeKind::Real(real) => real.now(),
+            TimeKind::Simulated(scheduler) => scheduler.now(),
         }
     }
 
@@ -109,7 +109,7 @@ impl Clock {
             self.hang();
         }
         match &*self.0 {
-            Kind::Real(real) => {
+            TimeKind::Real(real) => {
                 if let Some(end) = real.instant(time) {
                     loop {
                         let left = end.saturating_duration_since(Instant::now());
@@ -120,7 +120,7 @@ impl Clock {
                     }
                 }
             }
-            Kind::Simulated(scheduler) => scheduler.sleep_until(time),
+            TimeKind::Simulated(scheduler) => scheduler.sleep_until(time),
         }
     }
 
@@ -130,16 +130,16 @@ impl Clock {
     }
 
     /// Blocks for ever: what a component that hangs does in a test. When the clock is [shut down](Clock::shutdown) the
-    /// call unwinds (with [`Released`] as its payload and without a word on stderr), so that no thread is left behind.
+    /// call unwinds (with `Released` as its payload and without a word on stderr), so that no thread is left behind.
     pub fn hang(&self) -> ! {
         match &*self.0 {
-            Kind::Real(real) => {
+            TimeKind::Real(real) => {
                 let mut shut = lock(&real.shut);
                 while !*shut {
                     shut = real.shut_changed.wait(shut).unwrap_or_else(PoisonError::into_inner);
                 }
             }
-            Kind::Simulated(scheduler) => scheduler.hang(),
+            TimeKind::Simulated(scheduler) => scheduler.hang(),
         }
         resume_unwind(Box::new(Released))
     }
@@ -148,11 +148,11 @@ impl Clock {
     /// everybody else ends in order.
     pub fn shutdown(&self) {
         match &*self.0 {
-            Kind::Real(real) => {
+            TimeKind::Real(real) => {
                 *lock(&real.shut) = true;
                 real.shut_changed.notify_all();
             }
-            Kind::Simulated(scheduler) => scheduler.shutdown(),
+            TimeKind::Simulated(scheduler) => scheduler.shutdown(),
         }
     }
 
@@ -161,8 +161,8 @@ impl Clock {
     #[must_use = "the thread is a participant while the guard lives"]
     pub fn enter(&self) -> Guard {
         let entered = match &*self.0 {
-            Kind::Real(_) => false,
-            Kind::Simulated(scheduler) => scheduler.enter(),
+            TimeKind::Real(_) => false,
+            TimeKind::Simulated(scheduler) => scheduler.enter(),
         };
         Guard { clock: entered.then(|| self.clone()), not_send: PhantomData }
     }
@@ -183,12 +183,12 @@ impl Clock {
         let (done, ended) = self.channel(1);
         // The order of participants is the order in which they were spawned, not the one in which threads come up.
         let id = match &*self.0 {
-            Kind::Real(_) => None,
-            Kind::Simulated(scheduler) => Some(scheduler.register()),
+            TimeKind::Real(_) => None,
+            TimeKind::Simulated(scheduler) => Some(scheduler.register()),
         };
         let clock = self.clone();
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            if let (Kind::Simulated(scheduler), Some(id)) = (&*clock.0, id) {
+            if let (TimeKind::Simulated(scheduler), Some(id)) = (&*clock.0, id) {
                 scheduler.begin(id);
             }
             let _participant = Guard { clock: id.map(|_| clock.clone()), not_send: PhantomData };
@@ -200,7 +200,7 @@ impl Clock {
         match thread {
             Ok(thread) => Ok(Join { ended, thread }),
             Err(error) => {
-                if let (Kind::Simulated(scheduler), Some(id)) = (&*self.0, id) {
+                if let (TimeKind::Simulated(scheduler), Some(id)) = (&*self.0, id) {
                     scheduler.withdraw(id);
                 }
                 Err(error)
@@ -221,8 +221,8 @@ impl Clock {
     /// How often the token of a simulated clock has been given to a participant; 0 on the real clock.
     pub fn hand_overs(&self) -> u64 {
         match &*self.0 {
-            Kind::Real(_) => 0,
-            Kind::Simulated(scheduler) => scheduler.hand_overs(),
+            TimeKind::Real(_) => 0,
+            TimeKind::Simulated(scheduler) => scheduler.hand_overs(),
         }
     }
 
@@ -242,7 +242,7 @@ pub struct Guard {
 impl Drop for Guard {
     fn drop(&mut self) {
         if let Some(clock) = &self.clock
-            && let Kind::Simulated(scheduler) = &*clock.0
+            && let TimeKind::Simulated(scheduler) = &*clock.0
         {
             scheduler.leave();
         }

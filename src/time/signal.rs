@@ -3,8 +3,8 @@
 //! Notifying takes no lock on the real clock and allocates nothing, so that it may be done by a control activity and to
 //! one: the waiting thread is parked, and un-parking it is one atomic exchange (and a system call when it sleeps).
 
-use super::clock::{Clock, Kind};
-use super::simulated::Wait;
+use super::clock::{Clock, TimeKind};
+use super::simulated::WaitUntil;
 use super::{Time, lock};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -15,34 +15,34 @@ use std::time::Instant;
 #[derive(Clone)]
 pub struct Signal {
     clock: Clock,
-    inner: Arc<Inner>,
+    inner: Arc<SignalInner>,
 }
 
-struct Inner {
+struct SignalInner {
     set: AtomicBool,
     /// On the real clock.
     waiter: OnceLock<Thread>,
     /// On a simulated clock.
-    wait: Mutex<Option<Wait>>,
+    wait: Mutex<Option<WaitUntil>>,
 }
 
 impl Signal {
     pub(super) fn new(clock: &Clock) -> Self {
-        let inner = Inner { set: AtomicBool::new(false), waiter: OnceLock::new(), wait: Mutex::new(None) };
+        let inner = SignalInner { set: AtomicBool::new(false), waiter: OnceLock::new(), wait: Mutex::new(None) };
         Self { clock: clock.clone(), inner: Arc::new(inner) }
     }
 
     /// Sets the flag and wakes the thread that waits for it. Never waits.
     pub fn notify(&self) {
         match &*self.clock.0 {
-            Kind::Real(_) => {
+            TimeKind::Real(_) => {
                 if !self.inner.set.swap(true, Ordering::SeqCst)
                     && let Some(thread) = self.inner.waiter.get()
                 {
                     thread.unpark();
                 }
             }
-            Kind::Simulated(scheduler) => {
+            TimeKind::Simulated(scheduler) => {
                 let mut wait = lock(&self.inner.wait);
                 self.inner.set.store(true, Ordering::SeqCst);
                 if let Some(wait) = wait.take() {
@@ -58,7 +58,7 @@ impl Signal {
     /// On the real clock, when a second thread waits.
     pub fn wait(&self, deadline: Time) -> bool {
         match &*self.clock.0 {
-            Kind::Real(real) => {
+            TimeKind::Real(real) => {
                 let me = self.inner.waiter.get_or_init(std::thread::current);
                 assert!(me.id() == std::thread::current().id(), "a signal is waited for by one thread only");
                 let end = real.instant(deadline);
@@ -73,7 +73,7 @@ impl Signal {
                     }
                 }
             }
-            Kind::Simulated(scheduler) => scheduler.as_participant(|me| {
+            TimeKind::Simulated(scheduler) => scheduler.as_participant(|me| {
                 loop {
                     let mut wait = lock(&self.inner.wait);
                     if self.inner.set.swap(false, Ordering::SeqCst) {

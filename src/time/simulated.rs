@@ -17,12 +17,12 @@ type Id = u64;
 
 /// One wait of one participant; a later wait of the same participant has another number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Wait {
+pub(super) struct WaitUntil {
     id: Id,
     number: u64,
 }
 
-impl Wait {
+impl WaitUntil {
     pub(super) fn is_of(self, id: u64) -> bool {
         self.id == id
     }
@@ -34,7 +34,7 @@ pub(super) struct Scheduler {
     clock: u64,
     pace: Option<Pace>,
     now: AtomicU64,
-    state: Mutex<State>,
+    state: Mutex<SchedulerState>,
 }
 
 struct Pace {
@@ -43,7 +43,7 @@ struct Pace {
 }
 
 #[derive(Default)]
-struct State {
+struct SchedulerState {
     next_id: Id,
     next_wait: u64,
     participants: FxHashMap<Id, Participant>,
@@ -54,7 +54,7 @@ struct State {
     timers: BinaryHeap<Reverse<(Time, Id, u64)>>,
     /// Moments for which alone time does not move on; at most one of each participant, and of few.
     idle: Vec<(Time, Id, u64)>,
-    hung: Vec<Wait>,
+    hung: Vec<WaitUntil>,
     shut: bool,
     /// Who watches real time, when paced.
     pacer: Option<Id>,
@@ -80,7 +80,7 @@ impl Scheduler {
             clock: CLOCKS.fetch_add(1, Ordering::Relaxed),
             pace: factor.map(|factor| Pace { factor, start: Instant::now() }),
             now: AtomicU64::new(0),
-            state: Mutex::new(State::default()),
+            state: Mutex::new(SchedulerState::default()),
         }
     }
 
@@ -205,7 +205,7 @@ impl Scheduler {
 
     /// Says that the participant waits from now on; it may be made ready by [`Scheduler::wake`] from here, and must
     /// call [`Scheduler::wait`] with the same lock or after it.
-    fn begin_wait(&self, state: &mut State, me: Id, deadline: Time) -> Wait {
+    fn begin_wait(&self, state: &mut SchedulerState, me: Id, deadline: Time) -> WaitUntil {
         let number = state.next_wait;
         state.next_wait += 1;
         if let Some(participant) = state.participants.get_mut(&me) {
@@ -214,17 +214,17 @@ impl Scheduler {
         if deadline != Time::NEVER {
             state.timers.push(Reverse((deadline, me, number)));
         }
-        Wait { id: me, number }
+        WaitUntil { id: me, number }
     }
 
     /// Waits until woken or until `deadline`. `register` gets the wait before the token is given away (and before any
     /// other lock that the caller holds is released), so that no wake-up is lost.
-    pub(super) fn wait(&self, me: Id, deadline: Time, register: impl FnOnce(Wait)) {
+    pub(super) fn wait(&self, me: Id, deadline: Time, register: impl FnOnce(WaitUntil)) {
         self.wait_or_idle(me, deadline, Time::NEVER, register);
     }
 
     /// [`Self::wait`], which also ends at `idle`, when time comes that far because of what others wait for.
-    pub(super) fn wait_or_idle(&self, me: Id, deadline: Time, idle: Time, register: impl FnOnce(Wait)) {
+    pub(super) fn wait_or_idle(&self, me: Id, deadline: Time, idle: Time, register: impl FnOnce(WaitUntil)) {
         let mut state = lock(&self.state);
         let wait = self.begin_wait(&mut state, me, deadline);
         if idle < deadline {
@@ -236,7 +236,7 @@ impl Scheduler {
     }
 
     /// Ends a wait; false when it has ended already.
-    pub(super) fn wake(&self, wait: Wait) -> bool {
+    pub(super) fn wake(&self, wait: WaitUntil) -> bool {
         let mut state = lock(&self.state);
         self.catch_up(&state);
         let woken = state.make_ready(wait);
@@ -245,13 +245,17 @@ impl Scheduler {
     }
 
     /// Gives the token away and waits for the next turn.
-    fn block(&self, mut state: MutexGuard<'_, State>, me: Id) {
+    fn block(&self, mut state: MutexGuard<'_, SchedulerState>, me: Id) {
         state.running = None;
         self.dispatch(&mut state, Some(me));
         drop(self.wait_for_turn(state, me));
     }
 
-    fn wait_for_turn<'a>(&'a self, mut state: MutexGuard<'a, State>, me: Id) -> MutexGuard<'a, State> {
+    fn wait_for_turn<'a>(
+        &'a self,
+        mut state: MutexGuard<'a, SchedulerState>,
+        me: Id,
+    ) -> MutexGuard<'a, SchedulerState> {
         let Some(turn) = state.participants.get(&me).map(|p| p.turn.clone()) else { return state };
         while state.running != Some(me) {
             let pacing = state.pacer == Some(me) && state.running.is_none();
@@ -270,7 +274,7 @@ impl Scheduler {
     }
 
     /// Gives the token, if nobody has it, to whoever is next. `blocked`: the caller, if it waits from now on.
-    fn dispatch(&self, state: &mut State, blocked: Option<Id>) {
+    fn dispatch(&self, state: &mut SchedulerState, blocked: Option<Id>) {
         while state.running.is_none() {
             if let Some(id) = state.ready.pop_front() {
                 if let Some(participant) = state.participants.get(&id) {
@@ -310,7 +314,7 @@ impl Scheduler {
 
     /// When paced and everybody waits, lets simulated time follow real time up to the next moment somebody waits for:
     /// something from outside is about to happen. While a participant runs, time stands still.
-    fn catch_up(&self, state: &State) {
+    fn catch_up(&self, state: &SchedulerState) {
         if let Some(pace) = &self.pace
             && state.running.is_none()
             && !state.participants.is_empty()
@@ -336,7 +340,7 @@ impl Pace {
     }
 }
 
-impl State {
+impl SchedulerState {
     fn add(&mut self) -> Id {
         let id = self.next_id;
         self.next_id += 1;
@@ -344,7 +348,7 @@ impl State {
         id
     }
 
-    fn make_ready(&mut self, wait: Wait) -> bool {
+    fn make_ready(&mut self, wait: WaitUntil) -> bool {
         match self.participants.get_mut(&wait.id) {
             Some(participant) if participant.wait == Some(wait.number) => {
                 participant.wait = None;
@@ -362,7 +366,7 @@ impl State {
     }
 
     /// Takes it.
-    fn pop_timer(&mut self) -> Option<Wait> {
+    fn pop_timer(&mut self) -> Option<WaitUntil> {
         let (eager, idle) = (self.next_eager(), self.next_idle());
         let first = eager.into_iter().chain(idle).min()?;
         if idle == Some(first) {
@@ -370,7 +374,7 @@ impl State {
         } else {
             self.timers.pop();
         }
-        Some(Wait { id: first.1, number: first.2 })
+        Some(WaitUntil { id: first.1, number: first.2 })
     }
 
     /// Whether nobody waits for a moment for which time moves on.

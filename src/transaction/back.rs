@@ -3,11 +3,11 @@
 
 use super::Transaction;
 use super::heed::Heed;
-use super::run::Run;
+use super::run::StepsRun;
 use super::touched::Touched;
 use crate::model::{Cause, OnFailure, Origin, RunState, Step};
 use crate::plan::backwards::Backwards;
-use crate::plan::{PlannedStep, Stage, StepId};
+use crate::plan::{PlanStage, PlannedStep, StepId};
 use crate::stack::Reason;
 use crate::system::touch::components;
 use crate::system::{Overlay, Reversibility, System, Undo, View, diff, step};
@@ -18,7 +18,7 @@ use smallvec::SmallVec;
 fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> PlannedStep {
     PlannedStep {
         id,
-        stage: Stage::Changes,
+        stage: PlanStage::Changes,
         wave,
         after,
         step,
@@ -316,7 +316,7 @@ impl Transaction {
     }
 
     /// Books what a way back has done. Answers whether something of it is left to be tried again.
-    pub(super) fn took_back(&mut self, run: &Run, way: &WayBack) -> bool {
+    pub(super) fn took_back(&mut self, run: &StepsRun, way: &WayBack) -> bool {
         for i in &run.done {
             if let Some(Some(taken)) = way.takes_back.get(*i as usize) {
                 *self.partly.entry(*taken).or_default() += 1;
@@ -494,6 +494,6 @@ impl Transaction {
 }
 
 /// Whether every step before and of a list was done.
-pub(super) fn whole(run: &Run) -> bool {
+pub(super) fn whole(run: &StepsRun) -> bool {
     run.done.len() == run.list.len()
 }

@@ -1,7 +1,7 @@
 //! How a transaction ends: what was done is compared with what is there, and what is left is named.
 
 use super::heed::Heed;
-use super::{Can, Phase, Transaction};
+use super::{Can, Transaction, TransactionPhase};
 use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::Item;
@@ -95,7 +95,7 @@ impl Transaction {
 
     fn over(&mut self, parts: Vec<PartEnd>) {
         self.end = Some(super::End { parts });
-        self.phase = Phase::Over;
+        self.phase = TransactionPhase::Over;
     }
 
     /// The components it is about: also those of what takes its steps back, which may be a call of another, and of what was

@@ -1,7 +1,7 @@
 //! Immediate steps, carried out one after the other in the list's own order: of many small steps most are, and the way from
 //! one to the next is a good part of what they cost.
 
-use super::{Phase, Transaction};
+use super::{Transaction, TransactionPhase};
 use crate::model::{Execution, Outcome, Step};
 use crate::system::System;
 use crate::time::Time;
@@ -44,7 +44,8 @@ impl Transaction {
         goes_on: impl Fn() -> bool,
         mut execute: impl FnMut(Doing<'_>, &mut Time) -> Outcome,
     ) -> usize {
-        let carries_out = matches!(self.phase, Phase::Forward | Phase::Back | Phase::Mending);
+        let carries_out =
+            matches!(self.phase, TransactionPhase::Forward | TransactionPhase::Back | TransactionPhase::Mending);
         if !carries_out || !self.cancels.is_empty() || self.is_stopped() {
             return 0;
         }

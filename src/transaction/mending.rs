@@ -1,9 +1,9 @@
 //! What is found different from what should be is mended, once; what becomes of that where a safe configuration comes.
 
 use super::back::{WayBack, chain};
-use super::run::Run;
+use super::run::StepsRun;
 use super::touched::Touched;
-use super::{Can, Phase, Transaction};
+use super::{Can, Transaction, TransactionPhase};
 use crate::model::{OnFailure, RunState, Snapshot, Step};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, View as _, moves_any, step};
@@ -72,7 +72,7 @@ impl Transaction {
         let known = live.clone();
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
         let observed = adopted == Some(true);
-        if observed && self.phase == Phase::Looking && self.mends(part) {
+        if observed && self.phase == TransactionPhase::Looking && self.mends(part) {
             let asked =
                 self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
             let steps = self.own_difference(live, &wanted);
@@ -97,7 +97,7 @@ impl Transaction {
     fn mend(&mut self, steps: Vec<Step>, target: (System, bool)) {
         self.mending.target = Some(Box::new(target));
         let list = chain(steps);
-        self.back = Some((Run::untimed(Arc::new(list)), WayBack::default()));
-        self.phase = Phase::Mending;
+        self.back = Some((StepsRun::untimed(Arc::new(list)), WayBack::default()));
+        self.phase = TransactionPhase::Mending;
     }
 }

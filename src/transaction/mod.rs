@@ -43,20 +43,20 @@ use crate::system::System;
 use crate::time::Time;
 use back::WayBack;
 use mending::Mending;
-use run::Run;
+use run::StepsRun;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// A question that is out, and its answer once that has come.
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct OpenQuestion {
     question: Question,
     told: Option<Option<bool>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
+enum TransactionPhase {
     Forward,
     /// Of a safe configuration something failed: is it as wanted all the same?
     Reviewing,
@@ -78,10 +78,10 @@ enum Phase {
 pub struct Transaction {
     planned: Planned,
     spec: Spec,
-    phase: Phase,
-    forward: Run,
+    phase: TransactionPhase,
+    forward: StepsRun,
     /// The way back in hand, or what is mended.
-    back: Option<(Run, WayBack)>,
+    back: Option<(StepsRun, WayBack)>,
     /// How often the way back was begun.
     attempts: u32,
     /// Steps of the forward list that were taken back, and of those with several steps back how many are done.
@@ -117,7 +117,7 @@ pub struct Transaction {
     reading: bool,
     seen: Option<Option<Snapshot>>,
     /// What was asked and not used yet, with the answers that came.
-    asked: Vec<Asked>,
+    asked: Vec<OpenQuestion>,
     /// The first part that does not stand for what it should.
     fallen: Option<usize>,
     cancels: Vec<u32>,
@@ -132,14 +132,14 @@ impl Transaction {
     pub fn new(mut planned: Planned, spec: Spec) -> Self {
         let list = std::mem::take(&mut planned.steps);
         let limits = spec.limits_of(&planned, list.len());
-        let mut forward = Run::new(list, limits);
+        let mut forward = StepsRun::new(list, limits);
         forward.tries_all = spec.best_effort;
         forward.notes = spec.best_effort;
         Self {
             planned,
             asked_back: spec.asked_back,
             spec,
-            phase: Phase::Forward,
+            phase: TransactionPhase::Forward,
             forward,
             back: None,
             attempts: 0,
@@ -197,11 +197,11 @@ impl Transaction {
         if self.planned.whole.is_empty() { &self.forward.list } else { &self.planned.whole }
     }
 
-    fn in_hand(&self) -> &Run {
+    fn in_hand(&self) -> &StepsRun {
         self.back.as_ref().map_or(&self.forward, |(run, _)| run)
     }
 
-    fn in_hand_mut(&mut self) -> &mut Run {
+    fn in_hand_mut(&mut self) -> &mut StepsRun {
         match &mut self.back {
             Some((run, _)) => run,
             None => &mut self.forward,
@@ -270,7 +270,7 @@ impl Transaction {
             }
             Input::GiveUp { part } => {
                 // Once it is on its way back, that goes on.
-                if matches!(self.phase, Phase::Forward | Phase::Standing) {
+                if matches!(self.phase, TransactionPhase::Forward | TransactionPhase::Standing) {
                     self.stopped_by.get_or_insert(Reason::GivenUp);
                     self.given_up.push(part);
                     // What a safe configuration has interrupted moves for no undo of the same request.
@@ -286,15 +286,18 @@ impl Transaction {
                 self.cancel();
                 self.in_hand_mut().late_from_now = true;
                 // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
-                let looks = matches!(self.phase, Phase::Looking | Phase::Mending | Phase::LookingAgain);
+                let looks = matches!(
+                    self.phase,
+                    TransactionPhase::Looking | TransactionPhase::Mending | TransactionPhase::LookingAgain
+                );
                 if self.between.take().is_some() || looks {
                     self.mending.interrupt();
-                    self.phase = Phase::Stopping;
+                    self.phase = TransactionPhase::Stopping;
                 }
             }
             Input::Release(touched) => self.release(touched),
             Input::Stop => {
-                if matches!(self.phase, Phase::Forward | Phase::Standing) {
+                if matches!(self.phase, TransactionPhase::Forward | TransactionPhase::Standing) {
                     self.stopped_by.get_or_insert(Reason::TakenDown);
                     self.cancel();
                 }
@@ -329,7 +332,7 @@ impl Transaction {
                 return poll;
             }
             match self.phase {
-                Phase::Forward | Phase::Back | Phase::Mending => {
+                TransactionPhase::Forward | TransactionPhase::Back | TransactionPhase::Mending => {
                     let stopped = self.is_stopped();
                     let run = self.in_hand_mut();
                     if !stopped && !run.stops() {
@@ -343,12 +346,12 @@ impl Transaction {
                     }
                     self.carried_out();
                 }
-                Phase::Standing => {
+                TransactionPhase::Standing => {
                     if let Some(poll) = self.stand(live, can) {
                         return poll;
                     }
                 }
-                Phase::Reviewing => {
+                TransactionPhase::Reviewing => {
                     if !std::mem::replace(&mut self.reading, true) {
                         self.seen = None;
                         return Poll::Read(self.failed_ones());
@@ -356,9 +359,9 @@ impl Transaction {
                     let Some(seen) = self.seen.take() else { return Poll::Wait };
                     self.reading = false;
                     self.review(seen.as_ref(), live);
-                    self.phase = Phase::Standing;
+                    self.phase = TransactionPhase::Standing;
                 }
-                Phase::Stopping => {
+                TransactionPhase::Stopping => {
                     let run = self.in_hand();
                     if self.held || run.out > 0 {
                         return Poll::Wait;
@@ -370,7 +373,7 @@ impl Transaction {
                     }
                     self.turn_back(live);
                 }
-                Phase::Looking | Phase::LookingAgain => {
+                TransactionPhase::Looking | TransactionPhase::LookingAgain => {
                     if self.held {
                         return Poll::Wait;
                     }
@@ -383,7 +386,7 @@ impl Transaction {
                     self.reading = false;
                     self.compare(seen, live, can);
                 }
-                Phase::Over => return Poll::Over,
+                TransactionPhase::Over => return Poll::Over,
             }
         }
     }
@@ -391,7 +394,9 @@ impl Transaction {
     /// Whether nothing further of the list in hand is to begin.
     fn is_stopped(&self) -> bool {
         match self.phase {
-            Phase::Forward | Phase::Reviewing | Phase::Standing => self.stopped_by.is_some(),
+            TransactionPhase::Forward | TransactionPhase::Reviewing | TransactionPhase::Standing => {
+                self.stopped_by.is_some()
+            }
             _ => self.held || self.taken_down,
         }
     }
@@ -399,28 +404,28 @@ impl Transaction {
     /// The list in hand is over, or stops.
     fn carried_out(&mut self) {
         match self.phase {
-            Phase::Forward => {
+            TransactionPhase::Forward => {
                 let forward = &self.forward;
                 let safe = self.spec.best_effort && self.planned.parts.iter().any(|part| part.pushes.is_some());
                 if forward.is_over() && safe && !forward.failures.is_empty() && !self.taken_down {
-                    self.phase = Phase::Reviewing;
+                    self.phase = TransactionPhase::Reviewing;
                 } else if forward.is_over() && (self.spec.best_effort || !forward.stops() && back::whole(forward)) {
-                    self.phase = Phase::Standing;
+                    self.phase = TransactionPhase::Standing;
                 } else {
-                    self.phase = Phase::Stopping;
+                    self.phase = TransactionPhase::Stopping;
                 }
             }
-            Phase::Back => {
+            TransactionPhase::Back => {
                 // What is out comes in first.
-                self.phase = Phase::Stopping;
+                self.phase = TransactionPhase::Stopping;
             }
-            Phase::Mending => {
+            TransactionPhase::Mending => {
                 if self.in_hand().out > 0 {
-                    self.phase = Phase::Stopping;
+                    self.phase = TransactionPhase::Stopping;
                     return;
                 }
                 self.back = None;
-                self.phase = Phase::LookingAgain;
+                self.phase = TransactionPhase::LookingAgain;
             }
             _ => {}
         }
@@ -430,7 +435,7 @@ impl Transaction {
     fn turn_back(&mut self, live: &mut System) {
         if self.mending.target.is_some() {
             self.back = None;
-            self.phase = Phase::LookingAgain;
+            self.phase = TransactionPhase::LookingAgain;
             return;
         }
         let (mut failed, mut whole) = (self.back.is_none(), false);
@@ -464,15 +469,15 @@ impl Transaction {
             if self.taken_down {
                 self.compare_blind(live);
             } else {
-                self.phase = Phase::Looking;
+                self.phase = TransactionPhase::Looking;
             }
             return;
         }
         self.attempts += 1;
-        let mut run = Run::untimed(Arc::new(way.list.clone()));
+        let mut run = StepsRun::untimed(Arc::new(way.list.clone()));
         run.late_from_now = false;
         self.back = Some((run, way));
-        self.phase = Phase::Back;
+        self.phase = TransactionPhase::Back;
     }
 
     /// The part from which on everything is taken back.

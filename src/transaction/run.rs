@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// How a step stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum StepState {
     Waiting,
     /// Begun at this revision of the model.
     Out(u64),
@@ -25,9 +25,9 @@ enum State {
 
 /// A list of steps and how far it is.
 #[derive(Debug)]
-pub(super) struct Run {
+pub(super) struct StepsRun {
     pub list: Arc<Vec<PlannedStep>>,
-    state: Vec<State>,
+    state: Vec<StepState>,
     /// As long as no step is blocking the list's own order serves, from here on.
     at: usize,
     order: Option<Order>,
@@ -47,7 +47,7 @@ pub(super) struct Run {
     /// How long each step may take, or all of them.
     limits: SmallVec<[Limit; 1]>,
     /// Steps that came in after a safe configuration had begun.
-    pub late: Vec<Late>,
+    pub late: Vec<LateStep>,
     pub late_from_now: bool,
     /// Whether it is noted when steps were done, and those, with the revision of the model that they led to.
     pub notes: bool,
@@ -56,7 +56,7 @@ pub(super) struct Run {
 
 /// A step that came in after a safe configuration had begun.
 #[derive(Debug)]
-pub(super) struct Late {
+pub(super) struct LateStep {
     pub step: u32,
     /// What takes it back to what was there when it came in.
     pub undo: Undo,
@@ -64,11 +64,11 @@ pub(super) struct Late {
     pub revision: u64,
 }
 
-impl Run {
+impl StepsRun {
     /// With one limit for all steps, or one for each.
     pub fn new(list: Arc<Vec<PlannedStep>>, limits: SmallVec<[Limit; 1]>) -> Self {
         Self {
-            state: vec![State::Waiting; list.len()],
+            state: vec![StepState::Waiting; list.len()],
             done: Vec::with_capacity(list.len()),
             list,
             at: 0,
@@ -111,12 +111,12 @@ impl Run {
 
     /// The steps that are not over.
     pub fn open(&self) -> impl Iterator<Item = &PlannedStep> {
-        self.list.iter().zip(&self.state).filter(|(_, state)| **state != State::Over).map(|(step, _)| step)
+        self.list.iter().zip(&self.state).filter(|(_, state)| **state != StepState::Over).map(|(step, _)| step)
     }
 
     /// Leaves out what has not begun and `out` says so of. Answers whether there was such.
     pub fn leave_out(&mut self, out: impl Fn(&Step) -> bool) -> bool {
-        let waiting = (0..).zip(&self.state).filter(|(_, state)| **state == State::Waiting).map(|(i, _)| i);
+        let waiting = (0..).zip(&self.state).filter(|(_, state)| **state == StepState::Waiting).map(|(i, _)| i);
         let gone: Vec<u32> = waiting.filter(|i: &u32| out(&self.list[*i as usize].step)).collect();
         gone.iter().for_each(|i| self.finish(*i));
         !gone.is_empty()
@@ -124,12 +124,12 @@ impl Run {
 
     /// The steps that are out.
     pub fn outstanding(&self) -> impl Iterator<Item = u32> + '_ {
-        (0..).zip(&self.state).filter(|(_, state)| matches!(state, State::Out(_))).map(|(i, _)| i)
+        (0..).zip(&self.state).filter(|(_, state)| matches!(state, StepState::Out(_))).map(|(i, _)| i)
     }
 
     #[inline]
     fn finish(&mut self, i: u32) {
-        self.state[i as usize] = State::Over;
+        self.state[i as usize] = StepState::Over;
         if let Some(order) = &mut self.order {
             order.ended(i);
         }
@@ -145,9 +145,9 @@ impl Run {
                 return smallvec![];
             }
             let at = self.at;
-            if self.state[at] != State::Waiting {
+            if self.state[at] != StepState::Waiting {
                 // Brief ones that are out, or over.
-                if matches!(self.state[at], State::Out(_)) {
+                if matches!(self.state[at], StepState::Out(_)) {
                     return smallvec![];
                 }
                 self.at += 1;
@@ -159,7 +159,7 @@ impl Run {
             match kind(&self.list[at]) {
                 Execution::Blocking => {
                     let state = &self.state;
-                    self.order = Some(Order::new(&self.list, &|i| state[i] == State::Over, &kind));
+                    self.order = Some(Order::new(&self.list, &|i| state[i] == StepState::Over, &kind));
                 }
                 Execution::Immediate => {
                     if self.out > 0 {
@@ -190,7 +190,7 @@ impl Run {
         if !self.gate(i, live, now) {
             return None;
         }
-        self.state[self.at] = State::Out(live.revision());
+        self.state[self.at] = StepState::Out(live.revision());
         self.out += 1;
         Some(i)
     }
@@ -203,7 +203,7 @@ impl Run {
         if !plain || self.stops() {
             return None;
         }
-        while *self.state.get(self.at)? == State::Over {
+        while *self.state.get(self.at)? == StepState::Over {
             self.at += 1;
         }
         let immediate = execution(&self.list[self.at].step) == Execution::Immediate;
@@ -230,7 +230,7 @@ impl Run {
         let mut items: SmallVec<[u32; 1]> = SmallVec::new();
         let mut about = FxHashSet::<ComponentName>::default();
         for at in self.at..self.list.len() {
-            if self.state[at] != State::Waiting {
+            if self.state[at] != StepState::Waiting {
                 continue;
             }
             let step = &self.list[at].step;
@@ -255,7 +255,7 @@ impl Run {
             items.push(at as u32);
         }
         for i in &items {
-            self.state[*i as usize] = State::Out(live.revision());
+            self.state[*i as usize] = StepState::Out(live.revision());
         }
         self.out += items.len();
         items
@@ -298,7 +298,7 @@ impl Run {
                 return ready;
             }
             // Left out meanwhile.
-            ready.retain(|i| self.state[*i as usize] == State::Waiting);
+            ready.retain(|i| self.state[*i as usize] == StepState::Waiting);
             if !can.busy.is_empty() {
                 let (busy, free): (SmallVec<_>, SmallVec<_>) =
                     ready.into_iter().partition(|i| is_busy(&self.list[*i as usize].step, can));
@@ -308,7 +308,7 @@ impl Run {
             ready.retain(|i| self.gate(*i, live, now));
             if !ready.is_empty() {
                 for i in &ready {
-                    self.state[*i as usize] = State::Out(live.revision());
+                    self.state[*i as usize] = StepState::Out(live.revision());
                 }
                 self.out += ready.len();
                 return ready;
@@ -361,21 +361,21 @@ impl Run {
 
     /// A step was done before this took over; the model has it.
     pub fn was_done(&mut self, i: u32) {
-        self.state[i as usize] = State::Over;
+        self.state[i as usize] = StepState::Over;
         self.done.push(i);
         self.at = i as usize + 1;
     }
 
     /// A step is out that was begun before this took over.
     pub fn is_out(&mut self, i: u32, live: &System) {
-        self.state[i as usize] = State::Out(live.revision());
+        self.state[i as usize] = StepState::Out(live.revision());
         self.out += 1;
     }
 
     /// A step that was taken did not begin.
     pub fn not_begun(&mut self, i: u32) {
         self.out -= 1;
-        self.state[i as usize] = State::Waiting;
+        self.state[i as usize] = StepState::Waiting;
         if let Some(order) = &mut self.order {
             order.again(i);
         }
@@ -383,7 +383,7 @@ impl Run {
 
     /// A step that was out is back.
     pub fn ended(&mut self, i: u32, outcome: Outcome, live: &mut System) {
-        let State::Out(revision) = self.state[i as usize] else { return };
+        let StepState::Out(revision) = self.state[i as usize] else { return };
         self.out -= 1;
         match outcome {
             Outcome::Done(_) => self.happened(i, live, live.revision() == revision),
@@ -426,7 +426,7 @@ impl Run {
             _ => None,
         };
         let undo = step::inverse(&planned.step, call.as_ref(), live);
-        self.late.push(Late { step: i, undo, revision: live.revision() });
+        self.late.push(LateStep { step: i, undo, revision: live.revision() });
     }
 
     pub fn did_not_happen(&mut self, i: u32, cause: Cause, live: &mut System) {

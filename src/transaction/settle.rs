@@ -1,14 +1,14 @@
 //! Unknown outcomes, settled by what was read back; what cannot be settled is named.
 
 use super::messages::{Poll, Question};
-use super::run::Run;
-use super::{Asked, Phase, Transaction};
+use super::run::StepsRun;
+use super::{OpenQuestion, Transaction, TransactionPhase};
 use crate::model::{ComponentName, Effect, RunState, Snapshot, Step};
 use crate::system::touch::components;
 use crate::system::{System, View as _};
 
 /// Whether a step happened.
-enum Settled {
+enum SettledAs {
     Happened,
     DidNot,
     Nobody,
@@ -24,7 +24,8 @@ fn is_asked(step: &Step, live: &System) -> bool {
 impl Transaction {
     /// Settles unknown outcomes of the list in hand; what is to be done for it first, if anything is.
     pub(super) fn settle(&mut self, live: &mut System) -> Option<Poll> {
-        if self.in_hand().unread.is_empty() || matches!(self.phase, Phase::Looking | Phase::LookingAgain | Phase::Over)
+        if self.in_hand().unread.is_empty()
+            || matches!(self.phase, TransactionPhase::Looking | TransactionPhase::LookingAgain | TransactionPhase::Over)
         {
             return None;
         }
@@ -84,7 +85,7 @@ impl Transaction {
                 _ if self.taken_down => Some(None),
                 Some(asked) => asked.told,
                 None => {
-                    self.asked.push(Asked { question, told: None });
+                    self.asked.push(OpenQuestion { question, told: None });
                     return Some(Poll::Ask(question));
                 }
             };
@@ -95,9 +96,9 @@ impl Transaction {
             };
             self.asked.retain(|asked| asked.question != question);
             let settled = match is {
-                Some(true) => Settled::Happened,
-                Some(false) => Settled::DidNot,
-                None => unread(&self.step(step).step, live).unwrap_or(Settled::Nobody),
+                Some(true) => SettledAs::Happened,
+                Some(false) => SettledAs::DidNot,
+                None => unread(&self.step(step).step, live).unwrap_or(SettledAs::Nobody),
             };
             self.in_hand_mut().settle(at, settled, live);
         }
@@ -106,16 +107,16 @@ impl Transaction {
 }
 
 /// What is known of a step of unknown outcome without reading anything; none: it must be read.
-fn unread(step: &Step, live: &System) -> Option<Settled> {
+fn unread(step: &Step, live: &System) -> Option<SettledAs> {
     let Step::Operation(call) = step else { return None };
     // Nothing that can be observed tells whether it was called; what leaves nothing behind need not be known. What moves
     // may be moving still, though nothing undoes it.
     let declared = live.component(step.component()).and_then(|node| node.ty.operations.get(&call.operation.member));
     let leaves_nothing = declared.is_some_and(|operation| operation.effect == Effect::None && !operation.moves);
-    Some(if leaves_nothing { Settled::DidNot } else { Settled::Nobody })
+    Some(if leaves_nothing { SettledAs::DidNot } else { SettledAs::Nobody })
 }
 
-impl Run {
+impl StepsRun {
     /// Settles what can be settled without reading. Answers whether something is left that must be read.
     pub(super) fn settle_blind(&mut self, live: &mut System) -> bool {
         let mut at = 0;
@@ -135,23 +136,23 @@ impl Run {
             let i = *i;
             let settled = match seen {
                 Some(seen) => self.judge(i, seen, live),
-                None => Settled::Nobody,
+                None => SettledAs::Nobody,
             };
             self.settle(self.unread.len() - 1, settled, live);
         }
     }
 
-    fn settle(&mut self, at: usize, settled: Settled, live: &mut System) {
+    fn settle(&mut self, at: usize, settled: SettledAs, live: &mut System) {
         let (i, cause) = self.unread.remove(at);
         match settled {
-            Settled::Happened => self.happened(i, live, false),
-            Settled::DidNot => self.did_not_happen(i, cause, live),
-            Settled::Nobody => self.leave_unsettled(i),
+            SettledAs::Happened => self.happened(i, live, false),
+            SettledAs::DidNot => self.did_not_happen(i, cause, live),
+            SettledAs::Nobody => self.leave_unsettled(i),
         }
     }
 
     /// Whether a step, which the model does not have yet, happened, from what was observed.
-    fn judge(&mut self, i: u32, seen: &Snapshot, live: &mut System) -> Settled {
+    fn judge(&mut self, i: u32, seen: &Snapshot, live: &mut System) -> SettledAs {
         let step = self.list[i as usize].step.clone();
         let component = step.component();
         let one = seen.components.get(&component);
@@ -176,9 +177,9 @@ impl Run {
             Step::Operation(_) => None,
         };
         match is {
-            Some(true) => Settled::Happened,
-            Some(false) => Settled::DidNot,
-            None => Settled::Nobody,
+            Some(true) => SettledAs::Happened,
+            Some(false) => SettledAs::DidNot,
+            None => SettledAs::Nobody,
         }
     }
 }

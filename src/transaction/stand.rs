@@ -1,7 +1,7 @@
 //! Whether what was applied stands: a configuration that says what it stands for counts as applied once that is true.
 
 use super::messages::{Can, Poll, Question};
-use super::{Asked, Phase, Transaction};
+use super::{OpenQuestion, Transaction, TransactionPhase};
 use crate::model::{ComponentName, Step, Transition};
 use crate::system::System;
 
@@ -22,7 +22,7 @@ impl Transaction {
     pub(super) fn stand(&mut self, live: &mut System, can: &Can<'_>) -> Option<Poll> {
         if self.stopped_by.is_some() {
             self.asked.clear();
-            self.phase = Phase::Stopping;
+            self.phase = TransactionPhase::Stopping;
             return None;
         }
         // A best effort of which a step failed is not what was asked for anyway.
@@ -33,8 +33,8 @@ impl Transaction {
         for part in parts {
             match told(part) {
                 None => open = open.or(Some(part)),
-                Some(Asked { told: None, .. }) => waits = true,
-                Some(Asked { told: Some(is), .. }) if *is != Some(true) => {
+                Some(OpenQuestion { told: None, .. }) => waits = true,
+                Some(OpenQuestion { told: Some(is), .. }) if *is != Some(true) => {
                     self.fallen = Some(part);
                     break;
                 }
@@ -42,10 +42,10 @@ impl Transaction {
             }
         }
         match (self.fallen, open) {
-            (Some(_), _) if !self.spec.best_effort => self.phase = Phase::Stopping,
+            (Some(_), _) if !self.spec.best_effort => self.phase = TransactionPhase::Stopping,
             (None, Some(part)) => {
                 let question = Question::Stands { part };
-                self.asked.push(Asked { question, told: None });
+                self.asked.push(OpenQuestion { question, told: None });
                 return Some(Poll::Ask(question));
             }
             (None, None) if waits => return Some(Poll::Wait),

@@ -203,7 +203,7 @@ impl Rig {
         let sink = answers.clone();
         let progress: Arc<Mutex<Vec<Progress>>> = Arc::default();
         let told = progress.clone();
-        let handle = Configurator::start(Setup {
+        let handle = Configurator::start(ConfiguratorSetup {
             operator: configurations.iter().map(|c| c.id).collect(),
             configurations,
             rest: Vec::new(),
@@ -264,7 +264,7 @@ impl Rig {
     }
 
     /// Submits one batch of requests, in words: `on`, `on.undo`, `undo`, `to=2`, `commit`, `commit!` (by force).
-    pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), Full> {
+    pub fn submit_as(&self, words: &str, requester: Requester) -> Result<(), QueueFull> {
         self.handle.submit(words.split_whitespace().map(|word| self.request(word, requester)).collect())
     }
 
@@ -307,7 +307,7 @@ impl Rig {
         self.platform.quarantined()
     }
 
-    pub fn view(&self) -> Arc<View> {
+    pub fn view(&self) -> Arc<ConfiguratorView> {
         self.handle.view(true, self.clock.now() + Duration::from_secs(10)).expect("a view")
     }
 

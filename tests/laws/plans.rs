@@ -4,7 +4,7 @@ use crate::generate::{self, ConfigGene, TypeGene, context, read};
 use crate::plain::Plain;
 use crate::settings;
 use davit::model::{MemberRef, Snapshot};
-use davit::plan::{PlannedStep, plan, plan_on};
+use davit::plan::{PlannedStep, irreversible, plan, plan_on};
 use davit::stack::{Op, Requester, Stack, transaction};
 use davit::system::{Access, Overlay, Reversibility, Slot, View, step};
 use davit::time::Time;
@@ -216,7 +216,7 @@ proptest! {
         // Irreversible steps come last in their wave, except for what depends on them.
         for (i, s) in push.steps.iter().enumerate().filter(|(_, s)| s.reversibility == Reversibility::Irreversible) {
             let mut follows = vec![s.id];
-            for later in push.steps[i + 1..].iter().filter(|l| l.wave == s.wave && l.stage == davit::plan::Stage::Changes) {
+            for later in push.steps[i + 1..].iter().filter(|l| l.wave == s.wave && l.stage == davit::plan::PlanStage::Changes) {
                 if later.after.iter().any(|id| follows.contains(id)) {
                     follows.push(later.id);
                 }
@@ -273,9 +273,9 @@ proptest! {
         let before = system.snapshot();
         let conf = read(&last, &system);
         let Ok(plan) = plan(&system, &conf, &context()) else { return Ok(()) };
-        prop_assert!(plan.irreversible().is_none());
+        prop_assert!(irreversible(&plan.steps).is_none());
         generate::run(&mut system, &plan);
-        for undo in plan.undo_steps() {
+        for undo in plan.steps.iter().rev().flat_map(|step| step.undo.steps()) {
             let allowed = step::apply(undo, &mut system);
             prop_assert!(allowed.is_ok(), "{}: {:?}", undo, allowed);
         }

@@ -5,7 +5,7 @@ use crate::plain::Plain;
 use crate::plans::{every_order, operator, show};
 use crate::settings;
 use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
-use davit::plan::{PlannedStep, Refusal, Stage};
+use davit::plan::{PlanStage, PlannedStep, Refusal};
 use davit::stack::{FrameId, Op, Planned, Scope, Stack, transaction};
 use davit::system::{System, View, step};
 use proptest::prelude::*;
@@ -80,7 +80,7 @@ pub fn record(conf: &Configuration, steps: &[PlannedStep], system: &System) -> V
         _ => None,
     });
     let kept: Vec<Step> = demands.filter(|step| !done(step)).collect();
-    let post = steps.iter().filter(|s| s.stage != Stage::Post).count();
+    let post = steps.iter().filter(|s| s.stage != PlanStage::Post).count();
     let all = steps.iter().map(|s| s.step.clone());
     all.clone().take(post).chain(kept).chain(all.skip(post)).collect()
 }

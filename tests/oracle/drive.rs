@@ -8,7 +8,7 @@ use crate::settings::{Setting, followed};
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
-use davit::session::{Happening, Session, Setup};
+use davit::session::{Happening, Session, SessionSetup};
 use davit::stack::Requester;
 use davit::statechart::{Chart, compile};
 use davit::time::{Clock, Time};
@@ -104,7 +104,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     let options = Options { delays: delays(chance), ..Options::default() };
     let said = format!("{:?}", options.delays);
     let platform = Simulated::new(made.catalogue.clone(), clock.clone(), options);
-    let session = Session::start(Setup {
+    let session = Session::start(SessionSetup {
         deployment: Arc::new(made.deployment.clone()),
         functions: charts.iter().map(|_| None).collect(),
         charts: charts.clone(),

@@ -102,7 +102,6 @@ fn a_queue_that_overflows_says_so_and_keeps_the_oldest() {
     b.wait(MS * 10 + MS / 2);
     let lines: Vec<_> = log::take(&b.clock).into_iter().filter(|l| l.contains("queue")).collect();
     assert_eq!(lines, ["queue [1, 2, 3, 4] lost 6"]);
-    assert_eq!(b.platform.overflows(), [((member("counter.y"), member("probe.queue")), 6)]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use davit::libraries;
 use davit::limits;
 use davit::model::{Ask, ComponentName, EventName};
 use davit::platform::simulated::{Options, Simulated};
-use davit::session::{Happening, NotRaised, Session, Setup};
+use davit::session::{Happening, NotRaised, Session, SessionSetup};
 use davit::statechart::compile;
 use davit::time::Clock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -85,7 +85,7 @@ impl Crowd {
         let clock = Clock::real();
         let platform = Simulated::new(read.catalogue.clone(), clock.clone(), Options::default());
         let charts = read.deployment.charts().map(|written| Arc::new(compile(written).0.expect("a chart"))).collect();
-        let session = Session::start(Setup {
+        let session = Session::start(SessionSetup {
             deployment: Arc::new(read.deployment.clone()),
             charts,
             functions: vec![None],

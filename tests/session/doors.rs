@@ -1,7 +1,7 @@
 //! Who is let in at the control socket when many want to: places, deadlines, subscribers that do not read.
 
 use davit::session::client::{Client, ClientError};
-use davit::session::log::{Entry, Happening};
+use davit::session::log::{Happening, LogEntry};
 use davit::session::owner;
 use davit::session::rpc::{self, RpcError};
 use davit::session::socket::{Bounds, ControlSocket, Service, SocketError};
@@ -202,7 +202,7 @@ fn a_subscriber_that_does_not_read_is_cut_off_and_the_others_hear_all() {
     let text = "x".repeat(1000);
     for number in 0..3_000 {
         let note = format!("{number} {text}");
-        hears.hear(&Arc::new(Entry { at: 0.0, what: Happening::Forced { note } }));
+        hears.hear(&Arc::new(LogEntry { at: 0.0, what: Happening::Forced { note } }));
         hears.keep_pace();
     }
     let missing = rest(&mut deaf);

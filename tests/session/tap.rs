@@ -2,7 +2,7 @@
 
 use davit::limits;
 use davit::model::EventName;
-use davit::session::log::Entry;
+use davit::session::log::LogEntry;
 use davit::session::tap::{Full, News, Tap};
 use davit::session::{Happening, Hub};
 use davit::time::Clock;
@@ -161,10 +161,10 @@ fn an_observer_that_panics_keeps_nobody_waiting() {
 }
 
 /// Takes nothing until it is told to.
-struct Deaf(Arc<Entry>);
+struct Deaf(Arc<LogEntry>);
 
-impl From<Arc<Entry>> for Deaf {
-    fn from(entry: Arc<Entry>) -> Self {
+impl From<Arc<LogEntry>> for Deaf {
+    fn from(entry: Arc<LogEntry>) -> Self {
         Self(entry)
     }
 }
@@ -182,7 +182,7 @@ fn a_deaf_observer_does_not_stop_the_hub_and_its_memory_is_bounded() {
         }
     });
     let tap = tap.unwrap();
-    stands_still(&tap, Deaf(Arc::new(Entry { at: 0.0, what: Happening::Emitted { event: "first".to_owned() } })));
+    stands_still(&tap, Deaf(Arc::new(LogEntry { at: 0.0, what: Happening::Emitted { event: "first".to_owned() } })));
     hub.attach(Arc::new(tap.clone()));
     for _ in 0..200_000 {
         hub.report(Happening::Emitted { event: "e".to_owned() });

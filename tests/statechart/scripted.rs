@@ -4,7 +4,7 @@ use davit::model::finding::Origin;
 use davit::model::names::EventName;
 use davit::model::statechart::{Action, FunctionId, Statechart};
 use davit::statechart::{
-    Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Place, Queue, Raised, Step, View, compile,
+    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Queue, Raised, TurnResult, View, compile,
 };
 use davit::time::Time;
 use std::collections::{BTreeMap, VecDeque};
@@ -22,6 +22,8 @@ pub struct Scripted {
     pub polled: usize,
     pub go_on: usize,
     pub sets: Vec<Vec<String>>,
+    /// The active states, from the root inwards.
+    path: Vec<NodeId>,
 }
 
 /// What a scripted `doo` answers.
@@ -49,10 +51,12 @@ impl Scripted {
 impl Hook for Scripted {
     fn entered(&mut self, chart: &Chart, state: NodeId) {
         self.log.push(format!("{}+", chart.name(state)));
+        self.path.push(state);
     }
 
     fn exited(&mut self, chart: &Chart, state: NodeId) {
         self.log.push(format!("{}-", chart.name(state)));
+        self.path.pop();
     }
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
@@ -82,13 +86,13 @@ impl Hook for Scripted {
         self.call(function, view) != 0
     }
 
-    fn action(&mut self, function: FunctionId, place: Place, view: &mut View<'_>) {
-        let active = view.active.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
+        let active = self.path.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
         let leaf = view.leaf.map_or("none".to_owned(), |n| view.chart.name(n).to_string());
         let place = match place {
-            Place::Entry(_) => "entry",
-            Place::Exit(_) => "exit",
-            Place::Effect(_) => "effect",
+            ActionPlace::Entry(_) => "entry",
+            ActionPlace::Exit(_) => "exit",
+            ActionPlace::Effect(_) => "effect",
         };
         self.log.push(format!("{place}{}[{active},{leaf}]", function.0));
         self.call(function, view);
@@ -161,7 +165,7 @@ impl Run {
         self.machine.run(&self.chart, Time(0), &mut self.hook).idle
     }
 
-    pub fn turn(&mut self) -> Step {
+    pub fn turn(&mut self) -> TurnResult {
         self.machine.turn(&self.chart, Time(0), &mut self.hook)
     }
 

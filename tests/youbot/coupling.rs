@@ -1,6 +1,6 @@
 //! The coupling of two robots, law against law over a delayed link: the figures the design rests on.
 
-use davit::libraries::youbot::hand::{Hand, Script};
+use davit::libraries::youbot::hand::{Hand, HandScript};
 use davit::libraries::youbot::impedance::Reference;
 use davit::libraries::youbot::network::{Network, Quality};
 use davit::libraries::youbot::parameters::WORKING_POSE_DEG;
@@ -80,7 +80,7 @@ impl Scenario {
             p.force_gain = Vector3::repeat(self.force_gain);
             p.recenter_gain = self.recenter;
         }
-        let mut hand = Hand::new(self.script.parse::<Script>().unwrap());
+        let mut hand = Hand::new(self.script.parse::<HandScript>().unwrap());
         let mut out = Figures::default();
         let ticks = (self.seconds / CONTROL_PERIOD) as u64;
         let (mut saturated, mut hand_squares, mut squares) = (0u64, 0.0, 0.0);
@@ -237,7 +237,7 @@ fn damping_by_the_rule_keeps_a_delayed_coupling_stable() {
             }
             let start = pair[1].robot.tool.position;
             pair[1].heard = None;
-            let mut hand = Hand::new("push 0.5 0 3 0; free 60".parse::<Script>().unwrap());
+            let mut hand = Hand::new("push 0.5 0 3 0; free 60".parse::<HandScript>().unwrap());
             let mut late: f64 = 0.0;
             for tick in 0..10_000u32 {
                 let now = f64::from(tick) * CONTROL_PERIOD;

@@ -3,7 +3,7 @@
 use davit::lang::{LoadOptions, load};
 use davit::libraries::{builtin, monitors};
 use davit::model::{Catalogue, ConfigId, Deployment, EventName};
-use davit::plan::{Context, plan};
+use davit::plan::{Context, irreversible, plan};
 use davit::system::System;
 use davit::system::step::apply;
 use std::path::Path;
@@ -61,7 +61,7 @@ fn go(system: &mut System, deployment: &Deployment, ids: &[&str]) {
     for id in ids {
         let configuration = deployment.configuration(ConfigId::new(id).unwrap()).unwrap_or_else(|| panic!("no {id}"));
         let plan = plan(system, configuration, &context).unwrap_or_else(|r| panic!("{id}: {:?}", r.findings));
-        assert!(plan.irreversible().is_none(), "{id}: {:?}", plan.irreversible());
+        assert_eq!(irreversible(&plan.steps), None, "{id}");
         for step in &plan.steps {
             apply(&step.step, system).unwrap_or_else(|v| panic!("{id}: {}: {v:?}", step.step));
         }

@@ -13,14 +13,14 @@ use std::time::Duration;
 
 /// What a script lets go wrong.
 #[derive(Default)]
-pub(super) struct Faults {
+pub(super) struct ScriptFaults {
     /// For the next deployment.
     waiting: Vec<StepFault>,
     /// What is up, with the platform it runs on, if that is the simulated one.
     up: Option<(Checked, Option<Simulated>)>,
 }
 
-impl Faults {
+impl ScriptFaults {
     /// From now on this goes wrong; without a deployment, from the beginning of the next one.
     pub(super) fn add(&mut self, step: &str, how: &str, times: Option<f64>, takes: Option<f64>) -> mlua::Result<()> {
         // One blank between words, as steps are printed.

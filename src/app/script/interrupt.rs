@@ -12,11 +12,11 @@ use std::sync::{Arc, Mutex, Weak};
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<InterruptState>>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct InterruptState {
     force: bool,
     session: Weak<Session>,
 }

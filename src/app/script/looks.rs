@@ -1,22 +1,22 @@
 //! What a script looks at: components, their states, properties and in-ports.
 
-use super::{Shared, error, session, values};
+use super::{SharedHost, error, session, values};
 use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
 use mlua::{Lua, Value as LuaValue};
 
 /// The system, as far as anybody knows it.
-pub(super) fn system(host: &Shared) -> mlua::Result<Snapshot> {
+pub(super) fn system(host: &SharedHost) -> mlua::Result<Snapshot> {
     session(host)?.system().map_err(|unanswered| error(unanswered.to_string()))
 }
 
-pub(super) fn component_state(host: &Shared, name: &str) -> mlua::Result<Option<RunState>> {
+pub(super) fn component_state(host: &SharedHost, name: &str) -> mlua::Result<Option<RunState>> {
     let system = system(host)?;
     let state = ComponentName::new(name).ok().and_then(|n| system.components.get(&n)).map(|c| c.state);
     Ok(state)
 }
 
-pub(super) fn assert_state(host: &Shared, name: &str, wanted: &str) -> mlua::Result<()> {
+pub(super) fn assert_state(host: &SharedHost, name: &str, wanted: &str) -> mlua::Result<()> {
     let known = || did_you_mean(wanted, "run states", RunState::NAMES.iter().copied());
     let wanted =
         RunState::from_name(wanted).ok_or_else(|| error(format!("`{wanted}` is no run state: {}", known())))?;
@@ -41,7 +41,7 @@ fn no_component(name: &str, system: &Snapshot) -> mlua::Error {
     error(format!("there is no component `{name}`: {help}"))
 }
 
-pub(super) fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+pub(super) fn property(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
     let name = member(text)?;
     let system = system(host)?;
     let component = component(&system, name.component)?;
@@ -60,7 +60,7 @@ pub(super) fn property(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<Lua
 }
 
 /// The value written on an in-port by a configuration; nil when never written.
-pub(super) fn port(host: &Shared, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
+pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
     let name = member(text)?;
     let system = system(host)?;
     if let Some(value) = system.ports.get(&name) {

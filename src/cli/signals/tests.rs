@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// What signals ask for that come after so many milliseconds.
 fn asked(signals: &[(u64, i32)]) -> Vec<Asks> {
-    let mut seen = Seen::default();
+    let mut seen = SignalSeen::default();
     let at = |ms: u64| Time(0) + Duration::from_millis(ms);
     signals.iter().map(|(ms, signal)| seen.asks(*signal, at(*ms))).collect()
 }

@@ -24,7 +24,7 @@ impl List {
 const NONE: u32 = u32::MAX;
 
 #[derive(Debug)]
-struct Node {
+struct ListNode {
     incoming: Incoming,
     /// As the how-manieth it came.
     came: u64,
@@ -35,19 +35,19 @@ struct Node {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Ends {
+struct ListEnds {
     first: u32,
     last: u32,
     len: usize,
 }
 
-const EMPTY: Ends = Ends { first: NONE, last: NONE, len: 0 };
+const EMPTY: ListEnds = ListEnds { first: NONE, last: NONE, len: 0 };
 
 #[derive(Debug)]
 pub(super) struct Lists {
-    nodes: Vec<Node>,
+    nodes: Vec<ListNode>,
     free: u32,
-    ends: [Ends; List::ALL.len()],
+    ends: [ListEnds; List::ALL.len()],
     came: u64,
 }
 
@@ -77,7 +77,7 @@ impl Lists {
     /// Puts an event at the end of a list; answers its place, until it is taken out.
     pub fn push(&mut self, list: List, incoming: Incoming) -> u32 {
         let ends = &mut self.ends[list as usize];
-        let node = Node { incoming, came: self.came, list, before: ends.last, after: NONE };
+        let node = ListNode { incoming, came: self.came, list, before: ends.last, after: NONE };
         self.came += 1;
         let at = if self.free == NONE {
             self.nodes.push(node);
@@ -99,7 +99,7 @@ impl Lists {
 
     /// Takes an event out from where it stands.
     pub fn remove(&mut self, at: u32) -> Incoming {
-        let Node { incoming, list, before, after, .. } = self.nodes[at as usize];
+        let ListNode { incoming, list, before, after, .. } = self.nodes[at as usize];
         let ends = &mut self.ends[list as usize];
         match before {
             NONE => ends.first = after,

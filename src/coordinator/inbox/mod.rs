@@ -134,14 +134,14 @@ type Single = (List, EventName, Option<NodeId>);
 
 /// Rooms that were taken and not used yet.
 #[derive(Debug, Default)]
-struct Held {
+struct HeldRoom {
     answers: usize,
     outside: usize,
 }
 
 /// How much of each class may wait, and how long one goes before another; see those of the same names in [`limits`].
 #[derive(Debug, Clone, Copy)]
-struct Bounds {
+struct InboxBounds {
     answers: usize,
     report: usize,
     outside: usize,
@@ -150,7 +150,7 @@ struct Bounds {
     asked: usize,
 }
 
-const BOUNDS: Bounds = Bounds {
+const BOUNDS: InboxBounds = InboxBounds {
     answers: limits::INBOX_ANSWERS,
     report: limits::INBOX_REPORT,
     outside: limits::INBOX_OUTSIDE,
@@ -162,9 +162,9 @@ const BOUNDS: Bounds = Bounds {
 /// All classes.
 #[derive(Debug)]
 pub(super) struct Inbox {
-    bounds: Bounds,
+    bounds: InboxBounds,
     lists: Lists,
-    held: Held,
+    held: HeldRoom,
     /// Answers that wait, which share a list with notices.
     answers: usize,
     /// Urgent events and notices that wait, by what there may be one of.
@@ -187,13 +187,13 @@ impl Inbox {
         Self::within(BOUNDS, declared)
     }
 
-    fn within(bounds: Bounds, declared: impl IntoIterator<Item = EventName>) -> Self {
+    fn within(bounds: InboxBounds, declared: impl IntoIterator<Item = EventName>) -> Self {
         let newest: FxHashMap<EventName, Option<u32>> = declared.into_iter().map(|name| (name, None)).collect();
         let room = bounds.answers + bounds.report + newest.len() + bounds.outside;
         Self {
             bounds,
             lists: Lists::with_room(room + limits::INBOX_SINGLES),
-            held: Held::default(),
+            held: HeldRoom::default(),
             answers: 0,
             singles: FxHashMap::with_capacity_and_hasher(2 * limits::INBOX_SINGLES, rustc_hash::FxBuildHasher),
             newest,

@@ -4,7 +4,7 @@ use super::*;
 use crate::model::precedence::taken_first;
 use proptest::prelude::*;
 
-const SMALL: Bounds = Bounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
+const SMALL: InboxBounds = InboxBounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
 
 /// Names that the chart waits for, and as many that it does not.
 const DECLARED: usize = 3;
@@ -349,7 +349,7 @@ proptest! {
             event if event == name(1) || event == name(2) => Precedence::UrgentAsLast,
             _ => Precedence::InTurn,
         };
-        let patient = Bounds { row: 100, report: 100, outside: 100, ..SMALL };
+        let patient = InboxBounds { row: 100, report: 100, outside: 100, ..SMALL };
         let mut inbox = Inbox::within(patient, (0..DECLARED).map(name));
         let mut came: Vec<(EventName, Precedence)> = Vec::new();
         for arrival in arrivals.into_iter().chain(std::iter::repeat_n(None, 40)) {

@@ -1,8 +1,8 @@
 //! From coordinates relative to each level to those of the picture.
 
 use super::super::picture::{Direction, Shape};
-use super::level::{Levels, Slot, slot_of};
-use super::{Rect, Route, Run};
+use super::level::{LaidBox, Levels, slot_of};
+use super::{LineRun, Rect, Route};
 
 impl Levels<'_> {
     /// Writes the coordinates of a level that begins at `origin` (along, across) and of all levels in it.
@@ -26,9 +26,9 @@ impl Levels<'_> {
         (along, across): (f64, f64),
         nodes: &mut [Rect],
         routes: &mut [Route],
-        parts: &mut [Vec<(i64, Vec<Run>)>],
+        parts: &mut [Vec<(i64, Vec<LineRun>)>],
     ) {
-        let rect = |s: &Slot| match self.picture.direction {
+        let rect = |s: &LaidBox| match self.picture.direction {
             Direction::Right => Rect { x: s.along + along, y: s.across + across, w: s.len, h: s.wide },
             Direction::Down => Rect { x: s.across + across, y: s.along + along, w: s.wide, h: s.len },
         };
@@ -46,7 +46,7 @@ impl Levels<'_> {
             if part.looped.is_some() {
                 routes[part.edge].looped = Some(Rect::default());
             }
-            let moved = part.runs.iter().map(|r| Run {
+            let moved = part.runs.iter().map(|r| LineRun {
                 from: r.from + along,
                 to: r.to + along,
                 across: r.across + across,

@@ -7,7 +7,9 @@
 
 mod absolute;
 mod chains;
+mod laying;
 mod level;
+mod meeting;
 mod order;
 mod place;
 mod rank;
@@ -24,7 +26,7 @@ pub const LINE: f64 = 16.0;
 
 /// A straight run of an edge along the direction of the ranks; curves join one run to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
+pub struct LineRun {
     /// Where it begins, along.
     pub from: f64,
     /// Where it ends, along.
@@ -59,7 +61,7 @@ impl Rect {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Route {
     /// Its runs from its beginning to its end.
-    pub runs: Vec<Run>,
+    pub runs: Vec<LineRun>,
     /// A loop from a node to itself beside it instead of runs: the node's rectangle.
     pub looped: Option<Rect>,
     /// Where its label stands.

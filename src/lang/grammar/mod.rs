@@ -247,6 +247,7 @@ impl Key {
     }
 
     /// Its line in YAML.
+    #[cfg(any(test, feature = "internals"))]
     pub fn yaml(&self) -> String {
         super::spelling::as_yaml(self.example).unwrap_or_else(|| self.example.to_owned())
     }

@@ -1,6 +1,4 @@
-//! The mobile base: four mecanum wheels.
-
-use super::parameters::{WHEEL_LEVER, WHEEL_RADIUS};
+//! The mobile base.
 
 /// A planar velocity in the base's own frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -24,28 +22,6 @@ pub struct Pose2 {
     pub th: f64,
 }
 
-/// Wheel speeds (front left, front right, back left, back right), in rad/s, of a twist; signs as in the youBot's
-/// driver, whose right-hand motors are mounted mirrored.
-pub fn wheel_speeds(t: Twist2) -> [f64; 4] {
-    let turn = WHEEL_LEVER * t.wz;
-    [
-        (-t.vx + t.vy + turn) / WHEEL_RADIUS,
-        (t.vx + t.vy + turn) / WHEEL_RADIUS,
-        (-t.vx - t.vy + turn) / WHEEL_RADIUS,
-        (t.vx - t.vy + turn) / WHEEL_RADIUS,
-    ]
-}
-
-/// The twist of wheel speeds: the least-squares answer when the wheels slip.
-pub fn twist_of_wheels(w: [f64; 4]) -> Twist2 {
-    let q = WHEEL_RADIUS / 4.0;
-    Twist2 {
-        vx: q * (-w[0] + w[1] - w[2] + w[3]),
-        vy: q * (w[0] + w[1] - w[2] - w[3]),
-        wz: q / WHEEL_LEVER * (w[0] + w[1] + w[2] + w[3]),
-    }
-}
-
 impl Pose2 {
     /// Where the base is after moving with `t` for `dt` seconds (turn taken at its middle: exact to second order).
     pub fn moved(self, t: Twist2, dt: f64) -> Self {
@@ -57,21 +33,6 @@ impl Pose2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn wheels_and_back() {
-        for t in [
-            Twist2 { vx: 0.3, vy: 0.0, wz: 0.0 },
-            Twist2 { vx: 0.0, vy: -0.2, wz: 0.0 },
-            Twist2 { vx: 0.1, vy: 0.2, wz: -0.5 },
-        ] {
-            let back = twist_of_wheels(wheel_speeds(t));
-            assert!((back.vx - t.vx).abs() + (back.vy - t.vy).abs() + (back.wz - t.wz).abs() < 1e-12);
-        }
-        // Forward: the left wheels, mounted mirrored, turn the other way than the right ones.
-        let w = wheel_speeds(Twist2 { vx: 0.475, vy: 0.0, wz: 0.0 });
-        assert!((w[0] + 10.0).abs() < 1e-9 && (w[1] - 10.0).abs() < 1e-9);
-    }
 
     #[test]
     fn a_full_circle_comes_home() {

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 /// What the drives do; numbers as in the KU Leuven driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
+pub enum DriveMode {
     /// 0: windings shorted. The arm sinks unless it rests on its stops.
     MotorStop,
     /// 1: hold, or move to, a position.
@@ -19,7 +19,7 @@ pub enum Mode {
     Torque,
 }
 
-impl Mode {
+impl DriveMode {
     /// From the driver's number.
     pub fn from_number(n: u8) -> Option<Self> {
         match n {
@@ -42,7 +42,7 @@ impl Mode {
 
 /// Something the drives report, once each time it begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Happening {
+pub enum DriveHappening {
     /// A joint passed the soft limit.
     SoftLimit,
     /// All joints are inside again.
@@ -108,7 +108,7 @@ const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
 #[derive(Debug, Clone, Copy)]
-enum Task {
+enum DriveTask {
     Idle,
     Moving { from: J5, to: J5, elapsed: f64, duration: f64 },
     Calibrating { elapsed: f64, met: [bool; JOINTS] },
@@ -130,13 +130,13 @@ pub struct Drives {
     last_speed: J5,
     /// Whether outward torque is reduced near the limits.
     pub limit_safety: bool,
-    mode: Mode,
+    mode: DriveMode,
     /// They took torques before they braked.
     resumes: bool,
     /// They were told to brake, and that was not taken back.
     braked: bool,
     calibrated: bool,
-    task: Task,
+    task: DriveTask,
     target: J5,
     target_speed: J5,
     outside: bool,
@@ -155,11 +155,11 @@ impl Drives {
             handover: Handover::default(),
             last_speed: J5::zeros(),
             limit_safety: true,
-            mode: Mode::MotorStop,
+            mode: DriveMode::MotorStop,
             resumes: false,
             braked: false,
             calibrated: false,
-            task: Task::Idle,
+            task: DriveTask::Idle,
             target,
             target_speed: J5::zeros(),
             outside: false,
@@ -168,35 +168,36 @@ impl Drives {
     }
 
     /// What they do.
-    pub fn mode(&self) -> Mode {
+    pub fn mode(&self) -> DriveMode {
         self.mode
     }
 
     /// Whether positions are known.
+    #[cfg(test)]
     pub fn calibrated(&self) -> bool {
         self.calibrated
     }
 
     /// Whether a motion or a calibration is under way.
     pub fn busy(&self) -> bool {
-        !matches!(self.task, Task::Idle)
+        !matches!(self.task, DriveTask::Idle)
     }
 
     /// Changes what they do.
     ///
     /// # Errors
     /// In words: while a motion is under way, or torque control before calibration.
-    pub fn set_mode(&mut self, mode: Mode) -> Result<(), &'static str> {
+    pub fn set_mode(&mut self, mode: DriveMode) -> Result<(), &'static str> {
         if self.busy() {
             return Err("a motion is under way");
         }
-        if mode == Mode::Torque && !self.calibrated {
+        if mode == DriveMode::Torque && !self.calibrated {
             return Err("not calibrated");
         }
         if mode != self.mode {
             match mode {
-                Mode::Positioning => self.hold(),
-                Mode::MotorStop | Mode::Torque => {
+                DriveMode::Positioning => self.hold(),
+                DriveMode::MotorStop | DriveMode::Torque => {
                     self.mode = mode;
                     self.handover.begin();
                 }
@@ -214,25 +215,25 @@ impl Drives {
         if self.braked {
             return Err("the drives were told to brake, and that was not taken back: undo what stopped them");
         }
-        self.set_mode(Mode::Torque)
+        self.set_mode(DriveMode::Torque)
     }
 
     /// Takes back that the drives braked, whoever asked for that: they take torques again if they did before.
     pub fn release(&mut self) {
         self.braked = false;
         if std::mem::take(&mut self.resumes) && !self.busy() {
-            self.mode = Mode::Torque;
+            self.mode = DriveMode::Torque;
             self.handover.begin();
         }
     }
 
     /// Whatever is under way ends: a quick stop, then the drives hold the arm where it came to rest. The base stands.
     pub fn hold(&mut self) {
-        self.task = Task::Idle;
+        self.task = DriveTask::Idle;
         self.target = self.arm.q;
         self.target_speed = self.arm.qd;
-        self.resumes |= self.mode == Mode::Torque;
-        self.mode = Mode::Positioning;
+        self.resumes |= self.mode == DriveMode::Torque;
+        self.mode = DriveMode::Positioning;
         self.handover.begin();
     }
 
@@ -245,7 +246,7 @@ impl Drives {
     /// Whatever is under way ends, as with [`hold`](Self::hold), of what moves or takes torques. Drives that are off stay off: the arm is on its stops, or sinks onto them. Those
     /// that hold already, or come to rest, go on with that: held anew each time, the arm would give way under a load.
     pub fn stop(&mut self) {
-        if self.busy() || self.mode == Mode::Torque {
+        if self.busy() || self.mode == DriveMode::Torque {
             self.hold();
         }
     }
@@ -258,13 +259,13 @@ impl Drives {
         if self.busy() {
             return Err("a motion is under way");
         }
-        if self.mode == Mode::Torque {
+        if self.mode == DriveMode::Torque {
             return Err("the drives take torques: set mode 0 or 1 first");
         }
         self.hold();
         self.resumes = false;
         self.calibrated = false;
-        self.task = Task::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
+        self.task = DriveTask::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
         Ok(())
     }
 
@@ -288,7 +289,7 @@ impl Drives {
         if self.busy() {
             return Err("a motion is under way");
         }
-        if self.mode == Mode::Torque {
+        if self.mode == DriveMode::Torque {
             return Err("the drives take torques: set mode 1 first");
         }
         if !self.calibrated {
@@ -299,7 +300,7 @@ impl Drives {
         let from = self.arm.q;
         // A quintic's peak speed is 15/8 of its mean.
         let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
-        self.task = Task::Moving { from, to, elapsed: 0.0, duration };
+        self.task = DriveTask::Moving { from, to, elapsed: 0.0, duration };
         Ok(())
     }
 
@@ -310,33 +311,33 @@ impl Drives {
         twist: Option<(Twist2, f64)>,
         push: &Vector3<f64>,
         dt: f64,
-        report: &mut impl FnMut(Happening),
+        report: &mut impl FnMut(DriveHappening),
     ) {
         self.advance_task(dt, report);
         let command = match twist {
             // The base is heard while torques are: whoever stops the arm stops the base.
             Some((twist, age)) if age <= self.parameters.base_timeout => {
-                self.base_watched = self.mode == Mode::Torque;
+                self.base_watched = self.mode == DriveMode::Torque;
                 if self.base_watched { twist } else { Twist2::default() }
             }
             _ => {
-                if std::mem::take(&mut self.base_watched) && self.mode == Mode::Torque {
-                    report(Happening::BaseWatchdog);
+                if std::mem::take(&mut self.base_watched) && self.mode == DriveMode::Torque {
+                    report(DriveHappening::BaseWatchdog);
                 }
                 Twist2::default()
             }
         };
-        if self.mode == Mode::Torque && effort.is_none_or(|(_, age)| age > self.parameters.cmd_timeout) {
+        if self.mode == DriveMode::Torque && effort.is_none_or(|(_, age)| age > self.parameters.cmd_timeout) {
             self.hold();
-            report(Happening::CommandWatchdog);
+            report(DriveHappening::CommandWatchdog);
         }
         let mut torque = match (self.mode, effort) {
-            (Mode::Torque, Some((effort, _))) => self.reduced(&effort),
-            (Mode::Positioning, _) => self.position_control(),
-            (Mode::MotorStop | Mode::Torque, _) => J5::zeros(),
+            (DriveMode::Torque, Some((effort, _))) => self.reduced(&effort),
+            (DriveMode::Positioning, _) => self.position_control(),
+            (DriveMode::MotorStop | DriveMode::Torque, _) => J5::zeros(),
         };
         torque = self.handover.over(&torque, &self.torque, dt);
-        if self.mode == Mode::Torque {
+        if self.mode == DriveMode::Torque {
             let gained = (self.arm.qd - self.last_speed) / dt;
             torque = within_speed(&torque, &self.arm.qd, &gained, &self.parameters.tau_max);
         }
@@ -346,18 +347,18 @@ impl Drives {
         self.last_speed = self.arm.qd;
         self.torque = ramped(&self.torque, &torque, dt);
         // Windings are shorted when no torque is left.
-        let braked = self.mode == Mode::MotorStop && self.torque == J5::zeros();
+        let braked = self.mode == DriveMode::MotorStop && self.torque == J5::zeros();
         advance(&mut self.arm, &mut self.base, &self.torque, command, push, braked, dt);
         self.watch_limits(report);
     }
 
-    fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(Happening)) {
+    fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(DriveHappening)) {
         match &mut self.task {
-            Task::Idle => {
+            DriveTask::Idle => {
                 self.target_speed = slowed(&self.target_speed, dt);
                 self.target += self.target_speed * dt;
             }
-            Task::Moving { from, to, elapsed, duration } => {
+            DriveTask::Moving { from, to, elapsed, duration } => {
                 *elapsed += dt;
                 let s = (*elapsed / *duration).min(1.0);
                 let way = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
@@ -369,15 +370,15 @@ impl Drives {
                     self.target_speed = J5::zeros();
                     // The motion has ended when the arm is there, not when it should be.
                     if (self.arm.q - to).amax() < ARRIVAL_ERROR {
-                        self.task = Task::Idle;
-                        report(Happening::Arrived);
+                        self.task = DriveTask::Idle;
+                        report(DriveHappening::Arrived);
                     } else if over > ARRIVAL_TIME {
                         self.hold();
-                        report(Happening::MotionFailed);
+                        report(DriveHappening::MotionFailed);
                     }
                 }
             }
-            Task::Calibrating { elapsed, met } => {
+            DriveTask::Calibrating { elapsed, met } => {
                 *elapsed += dt;
                 for i in 0..JOINTS {
                     if met[i] {
@@ -389,15 +390,15 @@ impl Drives {
                     met[i] = behind > CONTACT_ERROR && self.arm.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
                 }
                 if met.iter().all(|m| *m) {
-                    self.task = Task::Idle;
+                    self.task = DriveTask::Idle;
                     let found = (1..4).all(|i| self.is_at_stop(i));
-                    self.mode = if found { Mode::MotorStop } else { Mode::Positioning };
+                    self.mode = if found { DriveMode::MotorStop } else { DriveMode::Positioning };
                     self.handover.begin();
                     self.calibrated = found;
-                    report(if found { Happening::Calibrated } else { Happening::CalibrationFailed });
+                    report(if found { DriveHappening::Calibrated } else { DriveHappening::CalibrationFailed });
                 } else if *elapsed > CALIBRATION_TIME {
                     self.hold();
-                    report(Happening::CalibrationFailed);
+                    report(DriveHappening::CalibrationFailed);
                 }
             }
         }
@@ -439,22 +440,22 @@ impl Drives {
         out
     }
 
-    fn watch_limits(&mut self, report: &mut impl FnMut(Happening)) {
+    fn watch_limits(&mut self, report: &mut impl FnMut(DriveHappening)) {
         let furthest = (0..JOINTS).map(|i| self.excursion(i).abs()).fold(0.0, f64::max);
         let limit = self.parameters.soft_limit;
         if !self.outside && furthest > limit {
             self.outside = true;
-            report(Happening::SoftLimit);
+            report(DriveHappening::SoftLimit);
         } else if self.outside && furthest < limit - SOFT_LIMIT_HYSTERESIS {
             self.outside = false;
-            report(Happening::SoftLimitExit);
+            report(DriveHappening::SoftLimitExit);
         }
     }
 
     /// Switches the drives off and lets the arm settle for a second; answers how far the tool came down, in m.
     pub fn switch_off(&mut self) -> f64 {
-        self.task = Task::Idle;
-        self.mode = Mode::MotorStop;
+        self.task = DriveTask::Idle;
+        self.mode = DriveMode::MotorStop;
         self.torque = J5::zeros();
         self.handover = Handover::default();
         let before = self.arm.posture().tool.z;

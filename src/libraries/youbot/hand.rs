@@ -4,22 +4,22 @@ use nalgebra::Vector3;
 
 /// What a hand does, one segment after the other: `free 1; align 5; hold 1; sway 20 0.06 0 0 0.15`.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Script {
-    segments: Vec<Segment>,
+pub struct HandScript {
+    segments: Vec<HandSegment>,
 }
 
 /// One segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct HandSegment {
     /// How long, in s.
     pub duration: f64,
     /// What.
-    pub act: Act,
+    pub act: HandAct,
 }
 
 /// What a hand can do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Act {
+pub enum HandAct {
     /// `free T`: not touch the tool.
     Free,
     /// `hold T`: keep it where it was when the segment began.
@@ -51,7 +51,7 @@ const CARRY_SPEED: f64 = 0.1;
 /// A hand that has to pull with all its strength for so long lets go, in s.
 const PATIENCE: f64 = 0.5;
 
-impl std::str::FromStr for Script {
+impl std::str::FromStr for HandScript {
     type Err = ScriptError;
 
     fn from_str(text: &str) -> Result<Self, ScriptError> {
@@ -65,21 +65,21 @@ impl std::str::FromStr for Script {
                 .collect::<Option<_>>()
                 .ok_or_else(error)?;
             let act = match (verb, numbers.as_slice()) {
-                ("free", [_]) => Act::Free,
-                ("hold", [_]) => Act::Hold,
-                ("align", [_]) => Act::Align,
+                ("free", [_]) => HandAct::Free,
+                ("hold", [_]) => HandAct::Hold,
+                ("align", [_]) => HandAct::Align,
                 ("sway", [_, x, y, z, frequency]) => {
-                    Act::Sway { amplitude: Vector3::new(*x, *y, *z), frequency: *frequency }
+                    HandAct::Sway { amplitude: Vector3::new(*x, *y, *z), frequency: *frequency }
                 }
-                ("go", [_, x, y, z]) => Act::Go(Vector3::new(*x, *y, *z)),
-                ("push", [_, x, y, z]) => Act::Push(Vector3::new(*x, *y, *z)),
+                ("go", [_, x, y, z]) => HandAct::Go(Vector3::new(*x, *y, *z)),
+                ("push", [_, x, y, z]) => HandAct::Push(Vector3::new(*x, *y, *z)),
                 _ => return Err(error()),
             };
             let duration = numbers[0];
             if duration < 0.0 || segments.len() >= SEGMENTS_MAX {
                 return Err(error());
             }
-            segments.push(Segment { duration, act });
+            segments.push(HandSegment { duration, act });
         }
         Ok(Self { segments })
     }
@@ -94,7 +94,7 @@ pub struct Hand {
     pub damping: f64,
     /// The strongest it pushes, in N.
     pub f_max: f64,
-    script: Script,
+    script: HandScript,
     segment: usize,
     elapsed: f64,
     target: Vector3<f64>,
@@ -105,7 +105,7 @@ pub struct Hand {
 
 impl Hand {
     /// A hand with the usual stiffness and strength.
-    pub fn new(script: Script) -> Self {
+    pub fn new(script: HandScript) -> Self {
         Self {
             stiffness: 300.0,
             damping: 30.0,
@@ -121,7 +121,7 @@ impl Hand {
     }
 
     /// Begins another script.
-    pub fn follow(&mut self, script: Script) {
+    pub fn follow(&mut self, script: HandScript) {
         self.script = script;
         self.segment = 0;
         self.elapsed = 0.0;
@@ -144,7 +144,7 @@ impl Hand {
             self.segment += 1;
             self.begun = false;
         }
-        let Some(Segment { duration, act }) = self.script.segments.get(self.segment).copied() else {
+        let Some(HandSegment { duration, act }) = self.script.segments.get(self.segment).copied() else {
             return Vector3::zeros();
         };
         if !self.begun {
@@ -159,21 +159,21 @@ impl Hand {
         }
         let before = self.target;
         match act {
-            Act::Free => return Vector3::zeros(),
-            Act::Push(force) => return force,
-            Act::Hold => {}
-            Act::Align => {
+            HandAct::Free => return Vector3::zeros(),
+            HandAct::Push(force) => return force,
+            HandAct::Hold => {}
+            HandAct::Align => {
                 if let Some(other) = other {
                     let way = other - self.target;
                     let most = CARRY_SPEED * dt;
                     self.target += if way.norm() > most { way * (most / way.norm()) } else { way };
                 }
             }
-            Act::Sway { amplitude, frequency } => {
+            HandAct::Sway { amplitude, frequency } => {
                 let phase = std::f64::consts::TAU * frequency * self.elapsed;
                 self.target = self.origin + amplitude * phase.sin();
             }
-            Act::Go(way) => {
+            HandAct::Go(way) => {
                 // Smooth start and end: a hand does not jerk.
                 let s = (self.elapsed / duration.max(dt)).min(1.0);
                 self.target = self.origin + way * (s * s * (3.0 - 2.0 * s));
@@ -197,12 +197,12 @@ mod tests {
 
     #[test]
     fn scripts_are_read_or_refused() {
-        let script: Script = "free 1; sway 2 0.06 0 0 0.15;go 3 0 0.4 0; ".parse().unwrap();
+        let script: HandScript = "free 1; sway 2 0.06 0 0 0.15;go 3 0 0.4 0; ".parse().unwrap();
         assert_eq!(script.segments.len(), 3);
         for bad in ["sway 1", "free", "free -1", "dance 3", "push 1 0 0 NaN", "free 1 2"] {
-            assert!(bad.parse::<Script>().is_err(), "{bad}");
+            assert!(bad.parse::<HandScript>().is_err(), "{bad}");
         }
-        assert!("free 1;".repeat(1000).parse::<Script>().is_err());
+        assert!("free 1;".repeat(1000).parse::<HandScript>().is_err());
     }
 
     #[test]

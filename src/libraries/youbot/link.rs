@@ -59,7 +59,7 @@ const ARRIVALS: usize = 1024;
 
 /// The receiving end: keeps the newest packet and measures.
 #[derive(Debug, Clone)]
-pub struct Receiver {
+pub struct LinkReceiver {
     newest: Option<Packet>,
     arrived: f64,
     transit: f64,
@@ -72,7 +72,7 @@ pub struct Receiver {
     pub max_seq_gap: i64,
 }
 
-impl Default for Receiver {
+impl Default for LinkReceiver {
     fn default() -> Self {
         Self {
             newest: None,
@@ -86,7 +86,7 @@ impl Default for Receiver {
     }
 }
 
-impl Receiver {
+impl LinkReceiver {
     /// Takes a packet in at `now` (s). Late ones count for the loss, and for nothing else.
     #[allow(clippy::cast_precision_loss)]
     pub fn take(&mut self, packet: Packet, now: f64) {
@@ -157,7 +157,7 @@ mod tests {
 
     fn run(quality: Quality) -> LinkStats {
         let mut net = Network::new(quality, 3);
-        let mut receiver = Receiver::default();
+        let mut receiver = LinkReceiver::default();
         let mut stats = None;
         for tick in 0..3000_i64 {
             let now = tick as f64 * 0.001;
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_new_epoch_begins_anew_and_an_old_one_is_not_heard() {
-        let mut receiver = Receiver::default();
+        let mut receiver = LinkReceiver::default();
         receiver.take(Packet { epoch: 1, seq: 900, ..Packet::default() }, 0.0);
         receiver.take(Packet { epoch: 2, seq: 0, ..Packet::default() }, 0.1);
         receiver.take(Packet { epoch: 1, seq: 901, ..Packet::default() }, 0.2);

@@ -37,9 +37,6 @@ pub const RANGE_LOWER_DEG: [f64; JOINTS] = [-169.0, -65.0, -151.0, -102.5, -167.
 /// Upper ends of the joint ranges, in degrees (U, counted from candle).
 pub const RANGE_UPPER_DEG: [f64; JOINTS] = [169.0, 90.0, 146.0, 102.5, 167.5];
 
-/// Driver angle minus candle angle, in rad (R, T): what the driver reads in the candle pose.
-pub const CANDLE_OFFSET: [f64; JOINTS] = [2.9496, 1.1344, -2.5481, 1.7889, 2.9234];
-
 /// From the frame of joint 5 to the gripper's centre of mass, which is the tool point, in m (R: 0.05716 + 0.0289).
 pub const TOOL_OFFSET: [f64; 3] = [0.0, 0.0, 0.05716 + 0.0289];
 
@@ -48,7 +45,7 @@ pub const BASE_MOUNT: [f64; 3] = [0.143, 0.0, 0.13];
 
 /// One rigid link.
 #[derive(Debug, Clone, Copy)]
-pub struct Link {
+pub struct ArmLink {
     /// Mass, in kg.
     pub mass: f64,
     /// Centre of mass in the joint's frame, in m.
@@ -60,16 +57,17 @@ pub struct Link {
 /// Links 1 to 5 (R). The store lists inertia along its own axes; for links 2 and 3, which are long in `z`, the smallest
 /// moment is assigned to `z` (D). The sign of link 5's `z` is doubtful: the URDF has -0.01683, which
 /// would lie behind the joint; taking it instead lowers the gravity torque of joints 2 to 4 by up to 0.22 N m (D).
-pub const LINKS: [Link; JOINTS] = [
-    Link { mass: 2.351, com: [0.01516, 0.00359, -0.03105], inertia: [0.002_952_5, 0.006_009_1, 0.005_882_1] },
-    Link { mass: 1.318, com: [-0.01903, 0.0150, 0.11397], inertia: [0.003_114_5, 0.003_163_1, 0.000_584_3] },
-    Link { mass: 0.821, com: [0.00013, 0.02022, 0.10441], inertia: [0.001_727_67, 0.001_846_8, 0.000_419_67] },
-    Link { mass: 0.769, com: [0.00015, -0.02464, 0.05353], inertia: [0.000_676_4, 0.001_057_3, 0.000_661_0] },
-    Link { mass: 0.687, com: [0.0, 0.0012, 0.01648], inertia: [0.000_193_4, 0.000_160_2, 0.000_068_9] },
+pub const LINKS: [ArmLink; JOINTS] = [
+    ArmLink { mass: 2.351, com: [0.01516, 0.00359, -0.03105], inertia: [0.002_952_5, 0.006_009_1, 0.005_882_1] },
+    ArmLink { mass: 1.318, com: [-0.01903, 0.0150, 0.11397], inertia: [0.003_114_5, 0.003_163_1, 0.000_584_3] },
+    ArmLink { mass: 0.821, com: [0.00013, 0.02022, 0.10441], inertia: [0.001_727_67, 0.001_846_8, 0.000_419_67] },
+    ArmLink { mass: 0.769, com: [0.00015, -0.02464, 0.05353], inertia: [0.000_676_4, 0.001_057_3, 0.000_661_0] },
+    ArmLink { mass: 0.687, com: [0.0, 0.0012, 0.01648], inertia: [0.000_193_4, 0.000_160_2, 0.000_068_9] },
 ];
 
 /// The gripper (R), fixed to link 5 with its centre of mass at [`TOOL_OFFSET`].
-pub const GRIPPER: Link = Link { mass: 0.219, com: TOOL_OFFSET, inertia: [0.000_232_4, 0.000_362_9, 0.000_206_7] };
+pub const GRIPPER: ArmLink =
+    ArmLink { mass: 0.219, com: TOOL_OFFSET, inertia: [0.000_232_4, 0.000_362_9, 0.000_206_7] };
 
 /// Gear ratios (Dv, L).
 pub const GEAR: [f64; JOINTS] = [156.0, 156.0, 100.0, 71.0, 71.0];
@@ -108,12 +106,6 @@ pub const SPEED_LIMIT: f64 = 1.571;
 
 /// Gravity, in m/s².
 pub const GRAVITY: f64 = 9.81;
-
-/// Wheel radius, in m (Dv).
-pub const WHEEL_RADIUS: f64 = 0.0475;
-
-/// Half of wheel base plus half of track, in m (Dv: (0.47 + 0.30) / 2).
-pub const WHEEL_LEVER: f64 = 0.385;
 
 /// Time constant with which the base follows a commanded twist, in s (assumed; not identified in any source).
 pub const BASE_LAG: f64 = 0.1;

@@ -85,6 +85,7 @@ impl ArmPlant {
     }
 
     /// Kinetic plus potential energy (that of the stops included), in J.
+    #[cfg(test)]
     pub fn energy(&self) -> f64 {
         let at = self.model.posture(&self.q);
         let stops: f64 = (0..JOINTS).map(|i| 0.5 * STOP_STIFFNESS * self.beyond(i).powi(2)).sum();

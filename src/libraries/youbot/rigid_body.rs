@@ -6,7 +6,7 @@
 //! Pinocchio to 1e-9 (`tests/golden/`). Nothing here allocates.
 
 use super::parameters::{
-    BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, Link, REFLECTED_INERTIA, TOOL_OFFSET,
+    ArmLink, BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, REFLECTED_INERTIA, TOOL_OFFSET,
 };
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
 
@@ -21,7 +21,7 @@ pub type Jacobian = SMatrix<f64, 3, JOINTS>;
 #[derive(Debug, Clone)]
 pub struct ArmModel {
     /// Links 1 to 5; the last carries what hangs on the tool.
-    links: [Body; JOINTS],
+    links: [RigidBody; JOINTS],
     /// From one joint to the next, in the previous link's frame.
     offsets: [Vector3<f64>; JOINTS],
     axes: [Unit<Vector3<f64>>; JOINTS],
@@ -34,14 +34,14 @@ pub struct ArmModel {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Body {
+struct RigidBody {
     mass: f64,
     com: Vector3<f64>,
     inertia: Matrix3<f64>,
 }
 
-impl Body {
-    fn of(link: &Link) -> Self {
+impl RigidBody {
+    fn of(link: &ArmLink) -> Self {
         Self {
             mass: link.mass,
             com: Vector3::from(link.com),
@@ -96,8 +96,8 @@ impl ArmModel {
     /// The youBot's arm, carrying `payload` kg at the tool (the gripper alone is 0.219 kg), all link masses scaled by
     /// `mass_scale` (1 is nominal; others make a model that does not match).
     pub fn youbot(payload: f64, mass_scale: f64) -> Self {
-        let mut links = LINKS.map(|l| Body::of(&l).scaled(mass_scale));
-        links[JOINTS - 1] = links[JOINTS - 1].join(Body::of(&GRIPPER).scaled(payload / GRIPPER.mass));
+        let mut links = LINKS.map(|l| RigidBody::of(&l).scaled(mass_scale));
+        links[JOINTS - 1] = links[JOINTS - 1].join(RigidBody::of(&GRIPPER).scaled(payload / GRIPPER.mass));
         Self {
             links,
             offsets: JOINT_ORIGIN.map(Vector3::from),
@@ -129,10 +129,10 @@ impl ArmModel {
         out
     }
 
-    fn body(&self, at: &Posture, i: usize) -> Body {
+    fn body(&self, at: &Posture, i: usize) -> RigidBody {
         let r = at.rotations[i].matrix();
         let b = &self.links[i];
-        Body { mass: b.mass, com: at.origins[i] + r * b.com, inertia: r * b.inertia * r.transpose() }
+        RigidBody { mass: b.mass, com: at.origins[i] + r * b.com, inertia: r * b.inertia * r.transpose() }
     }
 
     /// Joint torques that hold the arm still against gravity, in N m.
@@ -150,6 +150,7 @@ impl ArmModel {
     }
 
     /// Potential energy, in J, zero at the arm's base plane.
+    #[cfg(test)]
     pub fn potential(&self, at: &Posture) -> f64 {
         (0..JOINTS)
             .map(|i| self.links[i].mass * GRAVITY * (at.origins[i] + at.rotations[i] * self.links[i].com).z)
@@ -159,7 +160,7 @@ impl ArmModel {
     /// The mass matrix, in kg m², without the drives' inertia.
     pub fn mass_matrix(&self, at: &Posture) -> M5 {
         let mut out = M5::zeros();
-        let mut composite = Body { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
+        let mut composite = RigidBody { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
         for i in (0..JOINTS).rev() {
             composite = self.body(at, i).join(composite);
             // Wrench that accelerates joint i alone at 1 rad/s², about the composite body's centre of mass.

@@ -5,7 +5,6 @@ use super::base::Twist2;
 use super::dynamics::{BaseLimits, Coupled, Dynamics};
 use super::impedance::{Impedance, Reference};
 use super::kinematics::Tool;
-use super::parameters::JOINTS;
 use super::plant::{ArmPlant, BasePlant, base_rotation};
 use super::rigid_body::{ArmModel, J5};
 use nalgebra::Vector3;
@@ -79,9 +78,6 @@ impl Robot {
         self.ticks += 1;
         advance(&mut self.arm, &mut self.base, &law.torque, self.command, push, false, CONTROL_PERIOD);
     }
-
-    /// Bit mask of all joints.
-    pub const ALL_JOINTS: u8 = (1 << JOINTS) - 1;
 }
 
 /// Moves arm and base on by `dt` seconds, in steps of [`PLANT_STEP`]. `push` is a force on the tool in the world.

@@ -36,8 +36,8 @@ mod workers;
 use super::{Ended, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
 use crate::limits;
 use crate::model::{
-    Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, MemberRef, Origin, Snapshot,
-    Step, Transition, TypeName,
+    Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, Origin, Snapshot, Step,
+    Transition, TypeName,
 };
 use crate::monitor::Input;
 use crate::runtime::{Kind, Libraries, Notice, Notices, guard};
@@ -103,16 +103,6 @@ impl EmbeddedPlatform {
             under_way: UnderWay::default(),
         });
         Self { inner }
-    }
-
-    /// The buffered connections with the number of values each has lost because it was full (the newest ones).
-    pub fn overflows(&self) -> Vec<((MemberRef, MemberRef), u64)> {
-        lock(&self.inner.registry).overflows()
-    }
-
-    /// The clock it runs on.
-    pub fn clock(&self) -> &Clock {
-        &self.inner.clock
     }
 }
 

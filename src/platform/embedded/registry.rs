@@ -12,7 +12,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 #[derive(Default)]
 pub(super) struct Registry {
@@ -81,8 +80,6 @@ pub(super) struct PortUse {
 pub(super) struct Connection {
     pub(super) number: u64,
     pub(super) policy: Policy,
-    /// Values lost, of a queue.
-    pub(super) lost: Option<Arc<AtomicU64>>,
 }
 
 pub(super) fn refused<T>(text: String) -> Result<T, Cause> {
@@ -277,16 +274,6 @@ impl Registry {
             written(self.entry(slot), &mut seen.ports);
         }
         seen
-    }
-
-    pub(super) fn overflows(&self) -> Vec<((MemberRef, MemberRef), u64)> {
-        let mut list: Vec<_> = self
-            .connections
-            .iter()
-            .filter_map(|(ends, connection)| Some((ends.0, connection.lost.as_ref()?.load(Ordering::Relaxed))))
-            .collect();
-        list.sort_unstable();
-        list
     }
 }
 

@@ -9,7 +9,7 @@ use crate::platform::Watch;
 use crate::runtime::beat::{Beat, Notices};
 use crate::runtime::builder::PortEnd;
 use crate::runtime::links::Sender;
-use crate::runtime::probe::{Observed, Probe, Probes, ProbesEnd, Tap};
+use crate::runtime::probe::{Observed, Probe, ProbeTap, Probes, ProbesEnd};
 use crate::runtime::sight::Sight;
 use crate::time::{Signal, Time, lock};
 use rustc_hash::FxHashMap;
@@ -177,7 +177,7 @@ impl Registry {
 
     fn tap(&mut self, watcher: usize, place: usize, slot: u32, index: usize, at: MemberRef) {
         let (number, wake) = (self.next_number(), self.watchers[watcher].wake.clone());
-        let tap: Option<Box<dyn Tap>> = match &mut self.entry_mut(slot).ends.ports[index] {
+        let tap: Option<Box<dyn ProbeTap>> = match &mut self.entry_mut(slot).ends.ports[index] {
             Some(PortEnd::Out(end)) => Some(end.tap(number, wake)),
             _ => None,
         };

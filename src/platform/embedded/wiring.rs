@@ -56,7 +56,7 @@ impl Registry {
         let Some(PortEnd::In(end)) = &mut entry.ends.ports[in_port] else {
             return refused(format!("{to} is not there"));
         };
-        let (feed, lost) = end.open(number, carried);
+        let feed = end.open(number, carried);
         entry.ports[in_port].others.push(from);
         entry.ports[in_port].data = carried == Policy::Data;
         entry.connections += 1;
@@ -66,7 +66,7 @@ impl Registry {
         }
         entry.ports[out_port].others.push(to);
         entry.connections += 1;
-        self.connections.insert(ByAddress((from, to)), Connection { number, policy, lost });
+        self.connections.insert(ByAddress((from, to)), Connection { number, policy });
         if !self.watchers.is_empty() && carried == Policy::Data {
             self.show_connection(from, to);
         }

@@ -1,6 +1,21 @@
 //! The latest value between two threads. (Every order of their accesses: `tests/interleavings`.)
 
-use crate::runtime::latest::latest;
+use crate::runtime::latest::{Reader, latest};
+use std::cell::Cell;
+
+/// Several threads may look at a reader at once only where they may look at its value at once: were a reader of a cell to
+/// be shared, it would not be clear which of the two is meant, and this would not compile.
+#[test]
+fn a_reader_is_shared_only_where_its_value_may_be() {
+    trait Either<A> {
+        fn one() {}
+    }
+    struct Shared;
+    impl<T: ?Sized> Either<()> for T {}
+    impl<T: ?Sized + Sync> Either<Shared> for T {}
+    <Reader<Cell<u64>> as Either<_>>::one();
+    <Reader<u64> as Either<Shared>>::one();
+}
 
 #[test]
 fn the_newest_value_is_read_and_told_once() {

@@ -3,9 +3,9 @@
 use super::reading::{AS_IT_IS, a_file};
 use super::rotating::Rotating;
 use super::story::Story;
-use super::{Began, End, boot, file, log_file, prepared};
+use super::{Began, LifeEnd, boot, file, log_file, prepared};
 use crate::limits;
-use crate::session::log::Entry;
+use crate::session::log::LogEntry;
 use crate::session::tap::{Hears, News, Tap};
 use crate::session::{Ended, NotUp};
 use crate::time::{Clock, Wall, lock};
@@ -19,8 +19,8 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 /// Keeps a deployment's log and its life, as long as it is there.
 pub struct Keeper {
     last: Last,
-    tap: Tap<Kept>,
-    beat: Arc<Beat>,
+    tap: Tap<KeptState>,
+    beat: Arc<KeptBeat>,
 }
 
 /// What a life says last: once, whoever says it first.
@@ -31,7 +31,7 @@ struct Last {
 }
 
 impl Last {
-    fn say(&self, end: &End) {
+    fn say(&self, end: &LifeEnd) {
         let mut said = lock(&self.said);
         if !std::mem::replace(&mut said, true) {
             let _ = say(&self.life, &serde_json::to_string(end).expect("plain data"));
@@ -43,21 +43,21 @@ impl Last {
 pub type Leave = Box<dyn FnOnce() + Send>;
 
 /// What is written.
-enum Kept {
-    Entry(Arc<Entry>),
+enum KeptState {
+    Entry(Arc<LogEntry>),
     /// A line of the keeper's own.
     Own(Json),
 }
 
-impl From<Arc<Entry>> for Kept {
-    fn from(entry: Arc<Entry>) -> Self {
+impl From<Arc<LogEntry>> for KeptState {
+    fn from(entry: Arc<LogEntry>) -> Self {
         Self::Entry(entry)
     }
 }
 
 /// What ends the thread that says that the process lives.
 #[derive(Default)]
-struct Beat {
+struct KeptBeat {
     over: Mutex<bool>,
     ended: Condvar,
 }
@@ -92,10 +92,10 @@ impl Keeper {
         life.set_len(0)?;
         say(&life, &serde_json::to_string(&began).expect("plain data"))?;
         let begins = json!({ "at": 0.0, "what": "began", "when": began.began.to_string(), "pid": began.pid });
-        let mut writer = Writer { log, story: Story::default(), missing: 0, begins: Some(begins) };
+        let mut writer = KeptWriter { log, story: Story::default(), missing: 0, begins: Some(begins) };
         writer.begin();
         let tap = Tap::new("davit-keeps", limits::TAP, clock, move |news| writer.keep(news))?;
-        let beat = Arc::new(Beat::default());
+        let beat = Arc::new(KeptBeat::default());
         let lives = (life.clone(), beat.clone());
         std::thread::Builder::new().name("davit-lives".to_owned()).spawn(move || live(&lives.0, &lives.1))?;
         Ok(Self { last: Last { life, said: Arc::default() }, tap, beat })
@@ -108,12 +108,12 @@ impl Keeper {
 
     /// It was stopped, so.
     pub fn ended(&self, ended: &Ended) {
-        self.end(&End { at: Wall::now(), why: None, ended: Some(ended.clone()) });
+        self.end(&LifeEnd { at: Wall::now(), why: None, ended: Some(ended.clone()) });
     }
 
     /// It did not come up.
     pub fn not_up(&self, not_up: &NotUp) {
-        self.end(&End { at: Wall::now(), why: Some(not_up.why.clone()), ended: Some(not_up.ended.clone()) });
+        self.end(&LifeEnd { at: Wall::now(), why: Some(not_up.why.clone()), ended: Some(not_up.ended.clone()) });
     }
 
     /// For a process that ends at once.
@@ -121,15 +121,15 @@ impl Keeper {
         let last = self.last.clone();
         Box::new(move || {
             let why = "it was ended at once, by a third signal: the components were asked nothing more".to_owned();
-            last.say(&End { at: Wall::now(), why: Some(why), ended: None });
+            last.say(&LifeEnd { at: Wall::now(), why: Some(why), ended: None });
         })
     }
 
-    fn end(&self, end: &End) {
+    fn end(&self, end: &LifeEnd) {
         let mut own = serde_json::to_value(end).expect("plain data");
         own["what"] = json!("ended");
         own["when"] = json!(end.at.to_string());
-        self.tap.put_own(Kept::Own(own));
+        self.tap.put_own(KeptState::Own(own));
         self.tap.finish(limits::TAP_END);
         // Last: what says that it ended has all that happened before it.
         self.last.say(end);
@@ -175,7 +175,7 @@ fn say(mut life: &File, line: &str) -> io::Result<()> {
 }
 
 /// Says that the process lives, until it is over.
-fn live(life: &File, beat: &Beat) {
+fn live(life: &File, beat: &KeptBeat) {
     let mut over = lock(&beat.over);
     while !*over {
         let _ = life.set_modified(Wall::now().into());
@@ -183,7 +183,7 @@ fn live(life: &File, beat: &Beat) {
     }
 }
 
-struct Writer {
+struct KeptWriter {
     log: Rotating,
     story: Story,
     /// Entries that could not be written since the last that could.
@@ -192,18 +192,18 @@ struct Writer {
     begins: Option<Json>,
 }
 
-impl Writer {
-    fn keep(&mut self, news: News<Kept>) {
+impl KeptWriter {
+    fn keep(&mut self, news: News<KeptState>) {
         match news {
             News::Missed(entries) => {
                 self.missing += entries;
                 self.story.incomplete = true;
             }
-            News::One(Kept::Own(mut own)) => {
+            News::One(KeptState::Own(mut own)) => {
                 own["at"] = json!(self.story.at);
                 self.write(&own);
             }
-            News::One(Kept::Entry(entry)) => {
+            News::One(KeptState::Entry(entry)) => {
                 self.write(&serde_json::to_value(&*entry).expect("entries are plain data"))
             }
         }
@@ -250,7 +250,7 @@ mod tests {
     fn a_signal_behind_the_end_adds_nothing_to_it() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         let last = Last { life: Arc::new(file.reopen().unwrap()), said: Arc::default() };
-        let end = |why: &str| End { at: Wall::now(), why: Some(why.to_owned()), ended: None };
+        let end = |why: &str| LifeEnd { at: Wall::now(), why: Some(why.to_owned()), ended: None };
         last.say(&end("it did not come up"));
         last.clone().say(&end("a third signal"));
         let mut text = String::new();

@@ -65,7 +65,7 @@ pub struct Began {
 /// How it ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct End {
+pub struct LifeEnd {
     /// When.
     pub at: Wall,
     /// Why it did not come up, or ended at once.
@@ -88,7 +88,7 @@ pub struct Life {
     /// Whether it lives.
     pub alive: bool,
     /// How it ended, if it said so.
-    pub end: Option<End>,
+    pub end: Option<LifeEnd>,
     /// Whether the machine was started anew since.
     pub rebooted: bool,
 }
@@ -125,7 +125,7 @@ pub fn life(name: &str) -> Option<Life> {
 }
 
 /// What a record of that name says; none: not only that of such a process stands there.
-fn record(name: &str, text: &[u8]) -> Option<(Began, Option<End>)> {
+fn record(name: &str, text: &[u8]) -> Option<(Began, Option<LifeEnd>)> {
     let text = std::str::from_utf8(text).ok()?.strip_suffix('\n')?;
     let mut lines = text.split('\n');
     let began: Began = serde_json::from_str(lines.next()?).ok()?;

@@ -1,17 +1,19 @@
 //! The second half of compiling: resolved nodes and transitions are put into tables, in their final order.
 
-use super::{Builder, initial, len};
+use super::{ChartBuilder, initial, len};
 use crate::model::codes;
 use crate::model::finding::{self, Finding, Origin};
 use crate::model::names::EventName;
 use crate::model::statechart::{Action, FunctionId, ROOT, Since, Trigger};
-use crate::statechart::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeRow, Op, RaiseSite, Span, Timer, When};
-use crate::statechart::reactions::Reactions;
+use crate::statechart::chart::{
+    ActionOp, Chart, EdgeRow, EventId, Kind, NONE, NodeRow, RaiseSite, Span, TimerRow, When,
+};
+use crate::statechart::reactions::ReactionTable;
 use crate::statechart::wide::Wide;
 use crate::statechart::{EdgeId, NodeId, order};
 use rustc_hash::FxHashMap;
 
-impl Builder<'_> {
+impl ChartBuilder<'_> {
     pub(super) fn tables(&mut self, pure: bool) -> Chart {
         let mut outgoing: Vec<Vec<usize>> = vec![Vec::new(); self.names.len()];
         for (index, edge) in self.edges.iter().enumerate() {
@@ -39,7 +41,7 @@ impl Builder<'_> {
             unguarded: true,
             pure,
             init: self.event("e_init_fsm").unwrap_or(EventId::INIT),
-            reactions: Reactions::default(),
+            reactions: ReactionTable::default(),
             wide: Wide::default(),
         };
         for (node, out) in outgoing.iter_mut().enumerate() {
@@ -93,8 +95,8 @@ impl Builder<'_> {
 
     /// Gives every event an id, in written order, and finds the time event of each state: the last one written, as rFSM's
     /// plugin checks no more than one a state.
-    fn intern_triggers(&mut self) -> Vec<(u32, Timer)> {
-        let mut timers: Vec<(u32, Timer, Origin)> = Vec::new();
+    fn intern_triggers(&mut self) -> Vec<(u32, TimerRow)> {
+        let mut timers: Vec<(u32, TimerRow, Origin)> = Vec::new();
         let mut timer_of: FxHashMap<u32, usize> = FxHashMap::default();
         for index in 0..self.edges.len() {
             let (transition, src) = (self.edges[index].written, self.edges[index].src);
@@ -118,7 +120,7 @@ impl Builder<'_> {
                 }
                 #[allow(clippy::cast_possible_truncation)] // saturates: 292 years
                 let nanos = (timed.seconds * 1e9).round() as i64;
-                let timer = Timer { relative: timed.since == Since::Entry, nanos, by: timed.by, event };
+                let timer = TimerRow { relative: timed.since == Since::Entry, nanos, by: timed.by, event };
                 match timer_of.get(&src).map(|at| &mut timers[*at]) {
                     None => {
                         timer_of.insert(src, timers.len());
@@ -202,14 +204,14 @@ impl Builder<'_> {
         for (action, origin) in actions {
             match action {
                 Action::Raise(name) => self.raise(*name, when, false, *origin),
-                Action::Function(function) => self.ops.push(Op::Call(*function)),
+                Action::Function(function) => self.ops.push(ActionOp::Call(*function)),
             }
         }
         Span { start, len: len(&self.ops) - start }
     }
 
     fn raise(&mut self, name: EventName, when: When, scoped: bool, origin: Origin) {
-        self.ops.push(if scoped { Op::RaiseScoped(name) } else { Op::Raise(name) });
+        self.ops.push(if scoped { ActionOp::RaiseScoped(name) } else { ActionOp::Raise(name) });
         self.raises.push(RaiseSite { name, when, scoped, origin });
     }
 

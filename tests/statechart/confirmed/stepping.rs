@@ -3,7 +3,7 @@
 use super::doubted;
 use crate::scripted::*;
 use crate::support::*;
-use davit::statechart::{Ended, Machine, Nobody, Sim, Step};
+use davit::statechart::{Machine, Nobody, RunEnd, Sim, TurnResult};
 use davit::time::Time;
 
 fn entered_on_event() -> davit::statechart::Chart {
@@ -15,7 +15,7 @@ fn a_failed_entry_loses_the_events_and_is_not_idle() {
     let chart = entered_on_event();
     let mut machine = Machine::new(&chart);
     let stepped = machine.step(&chart, Time(0), 1, &mut Nobody);
-    assert_eq!((stepped.idle, stepped.ended), (false, Ended::NotEntered));
+    assert_eq!((stepped.idle, stepped.ended), (false, RunEnd::NotEntered));
     assert!(machine.queue().events().is_empty() && machine.active().is_empty());
     let mut sim = Sim::new(&chart);
     let seen = line(&mut sim, "e");
@@ -100,7 +100,7 @@ fn what_waits_outside_is_merged_before_idle_is_told() {
     run.hook.outside = [vec![], vec![e]].into();
     assert!(!run.step(1), "the second look found an event: not idle, and kept for the next step");
     assert_eq!(run.leaf(), "root.a");
-    assert_eq!(run.turn(), Step::Taken);
+    assert_eq!(run.turn(), TurnResult::Taken);
     assert_eq!(run.leaf(), "root.b");
 }
 
@@ -119,7 +119,7 @@ fn an_endless_run_is_ended() {
         || vec![s("a", vec![]), s("b", vec![]), t("initial", "a", ""), t("a", "b", "e_done"), t("b", "a", "e_done")];
     let chart = compiled(parts());
     let mut machine = Machine::new(&chart);
-    assert_eq!(machine.run(&chart, Time(0), &mut Nobody).ended, Ended::Endless);
+    assert_eq!(machine.run(&chart, Time(0), &mut Nobody).ended, RunEnd::Endless);
     doubted(parts(), "chart::endless");
 }
 

@@ -2,7 +2,7 @@
 
 use super::aged;
 use super::samples::{DriverState, JointState, MotorStates, Odometry, Twist, stamp};
-use crate::libraries::youbot::drives::{DriveParameters, Drives, Happening, Mode};
+use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveParameters, Drives};
 use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
 use crate::libraries::youbot::plant::ArmPlant;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
@@ -111,7 +111,7 @@ impl Component for Driver {
         });
         b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
             "setControlMode",
-            |c, _, (mode,): (u8,)| match Mode::from_number(mode) {
+            |c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
                 Some(mode) => c.drives.set_mode(mode).map_or_else(Answer::failed, Answer::Done),
                 None => Answer::failed(format!("no control mode {mode}: 0, 1 or 6")),
             },
@@ -291,23 +291,23 @@ impl Component for Driver {
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
         self.drives.update(effort, twist, &push, cx.dt(), &mut |what| match what {
-            Happening::SoftLimit => events.raise(names.soft_limit),
-            Happening::SoftLimitExit => events.raise(names.soft_limit_exit),
-            Happening::CommandWatchdog => events.raise(names.command_watchdog),
-            Happening::BaseWatchdog => events.raise(names.base_watchdog),
-            Happening::Calibrated | Happening::Arrived => {
-                events.raise(if what == Happening::Arrived { names.arrived } else { names.calibrated });
+            DriveHappening::SoftLimit => events.raise(names.soft_limit),
+            DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
+            DriveHappening::CommandWatchdog => events.raise(names.command_watchdog),
+            DriveHappening::BaseWatchdog => events.raise(names.base_watchdog),
+            DriveHappening::Calibrated | DriveHappening::Arrived => {
+                events.raise(if what == DriveHappening::Arrived { names.arrived } else { names.calibrated });
                 if let Some(ticket) = task.take() {
                     ticket.done(());
                 }
             }
-            Happening::MotionFailed => {
+            DriveHappening::MotionFailed => {
                 events.raise(names.blocked);
                 if let Some(ticket) = task.take() {
                     ticket.failed("the arm did not get there: something is in the way");
                 }
             }
-            Happening::CalibrationFailed => {
+            DriveHappening::CalibrationFailed => {
                 events.raise(names.calibration_failed);
                 if let Some(ticket) = task.take() {
                     ticket.failed("the stops were not found");
@@ -316,7 +316,7 @@ impl Component for Driver {
         });
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
         let told = self.unwatched.map(|since| since + cx.dt()).filter(|since| *since < AGAIN);
-        self.unwatched = (lost && self.drives.mode() == Mode::Torque).then(|| {
+        self.unwatched = (lost && self.drives.mode() == DriveMode::Torque).then(|| {
             told.unwrap_or_else(|| {
                 self.events.raise(self.names.unwatched);
                 0.0

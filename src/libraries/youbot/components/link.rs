@@ -1,7 +1,7 @@
 //! `youbot.Link_Tx` and `youbot.Link_Rx`: the two ends of the link to the other robot.
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::link::{LinkStats, Packet, PeerState, RESTART_SHOWN, Receiver};
+use crate::libraries::youbot::link::{LinkReceiver, LinkStats, Packet, PeerState, RESTART_SHOWN};
 use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
 
 /// Sends where the tool is.
@@ -73,7 +73,7 @@ pub struct LinkRx {
     peer_state: Out<PeerState>,
     max_seq_gap: Prop<i64>,
     window: Prop<f64>,
-    receiver: Receiver,
+    receiver: LinkReceiver,
     epoch: Option<i64>,
     restarted: f64,
 }
@@ -101,7 +101,7 @@ impl Component for LinkRx {
                 .range(1.0..=10_000.0)
                 .property("max_seq_gap", 50_i64),
             window: b.doc("Over how long loss is counted.").unit("s").range(0.1..=1.0).property("window", 1.0),
-            receiver: Receiver::default(),
+            receiver: LinkReceiver::default(),
             epoch: None,
             restarted: f64::NEG_INFINITY,
         }

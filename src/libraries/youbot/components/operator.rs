@@ -1,7 +1,7 @@
 //! `youbot.Operator` and `youbot.Mode_Switch`: the human in the simulation.
 
 use super::samples::{ExtRef, ToolPose, ToolTwist};
-use crate::libraries::youbot::hand::{Hand, Script};
+use crate::libraries::youbot::hand::{Hand, HandScript};
 use crate::model::EventName;
 use crate::runtime::{Answer, Builder, Component, Context, EventOut, Failure, In, Out, Prop};
 use nalgebra::Vector3;
@@ -29,7 +29,7 @@ impl Component for Operator {
         .on_configure(|c, _| c.begin())
         .on_start(|c, _| c.begin());
         b.doc("Begins another script now.").operation("load_script", |c, _, (text,): (String,)| {
-            match text.parse::<Script>() {
+            match text.parse::<HandScript>() {
                 Ok(script) => {
                     c.hand.follow(script);
                     Answer::Done(())
@@ -49,7 +49,7 @@ impl Component for Operator {
             hand_k: b.doc("Stiffness of the hand.").unit("N/m").range(0.0..=2000.0).property("hand_k", 300.0),
             hand_b: b.doc("Damping of the hand.").unit("N s/m").range(0.0..=200.0).property("hand_b", 30.0),
             f_max: b.doc("Strength of the hand.").unit("N").range(0.0..=200.0).property("f_max", 30.0),
-            hand: Hand::new(Script::default()),
+            hand: Hand::new(HandScript::default()),
         }
     }
 
@@ -74,7 +74,7 @@ impl Component for Operator {
 
 impl Operator {
     fn begin(&mut self) -> Result<(), Failure> {
-        let script = self.script.get_ref().parse::<Script>().map_err(|e| Failure::from_error(&e))?;
+        let script = self.script.get_ref().parse::<HandScript>().map_err(|e| Failure::from_error(&e))?;
         self.hand.follow(script);
         Ok(())
     }

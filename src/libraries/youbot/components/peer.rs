@@ -1,7 +1,7 @@
 //! `youbot.Peer`: a stand-in for the other robot and for the network between the two.
 
 use super::samples::{ToolPose, stamp};
-use crate::libraries::youbot::hand::{Hand, Script};
+use crate::libraries::youbot::hand::{Hand, HandScript};
 use crate::libraries::youbot::impedance::Reference;
 use crate::libraries::youbot::link::Packet;
 use crate::libraries::youbot::network::{Network, Quality};
@@ -36,15 +36,15 @@ pub struct Peer {
     cut: Prop<bool>,
     jump: Prop<Vector3<f64>>,
     seed: Prop<i64>,
-    world: Box<World>,
+    world: Box<PeerWorld>,
     epoch: i64,
 }
 
 /// A condition that must hold for a time.
 #[derive(Debug, Clone, Copy, Default)]
-struct Held(f64);
+struct HeldPeer(f64);
 
-impl Held {
+impl HeldPeer {
     /// Whether `condition` has held for `time` seconds, `dt` after the last call.
     fn update(&mut self, condition: bool, time: f64, dt: f64) -> bool {
         self.0 = if condition { self.0 + dt } else { 0.0 };
@@ -52,26 +52,26 @@ impl Held {
     }
 }
 
-struct World {
+struct PeerWorld {
     robot: Robot,
     hand: Hand,
     to_peer: Network<Packet>,
     from_peer: Network<Packet>,
     heard: Option<Packet>,
-    aligned: Held,
+    aligned: HeldPeer,
     since: f64,
     seq: i64,
 }
 
-impl World {
-    fn new(q: J5, script: Script, seed: u64) -> Self {
+impl PeerWorld {
+    fn new(q: J5, script: HandScript, seed: u64) -> Self {
         Self {
             robot: Robot::new(q),
             hand: Hand::new(script),
             to_peer: Network::new(Quality::default(), seed),
             from_peer: Network::new(Quality::default(), seed ^ 0x5555_5555),
             heard: None,
-            aligned: Held::default(),
+            aligned: HeldPeer::default(),
             since: f64::INFINITY,
             seq: 0,
         }
@@ -110,7 +110,7 @@ impl Component for Peer {
         )
         .on_configure(|c, _| {
             let script = c.read_script()?;
-            *c.world = World::new(c.q_start.get(), script, c.seed.get().unsigned_abs());
+            *c.world = PeerWorld::new(c.q_start.get(), script, c.seed.get().unsigned_abs());
             Ok(())
         });
         b.doc("The other robot begins anew: another epoch.").no_effect().operation("restart", |c, _, (): ()| {
@@ -160,7 +160,7 @@ impl Component for Peer {
                 .range(-10.0..=10.0)
                 .property("jump", Vector3::zeros()),
             seed: b.doc("Of the network's luck.").tunable(Tunable::Unconfigured).property("seed", 1_i64),
-            world: Box::new(World::new(radians(START_DEG), Script::default(), 1)),
+            world: Box::new(PeerWorld::new(radians(START_DEG), HandScript::default(), 1)),
             epoch: 1,
         }
     }
@@ -215,7 +215,7 @@ impl Component for Peer {
 }
 
 impl Peer {
-    fn read_script(&mut self) -> Result<Script, Failure> {
-        self.script.get_ref().parse::<Script>().map_err(|e| Failure::from_error(&e))
+    fn read_script(&mut self) -> Result<HandScript, Failure> {
+        self.script.get_ref().parse::<HandScript>().map_err(|e| Failure::from_error(&e))
     }
 }

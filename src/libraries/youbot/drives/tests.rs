@@ -3,7 +3,7 @@
 use super::super::rigid_body::ArmModel;
 use super::*;
 
-fn run(drives: &mut Drives, seconds: f64) -> Vec<Happening> {
+fn run(drives: &mut Drives, seconds: f64) -> Vec<DriveHappening> {
     let mut seen = Vec::new();
     for _ in 0..(seconds * 1000.0) as usize {
         drives.update(None, None, &Vector3::zeros(), 0.001, &mut |h| seen.push(h));
@@ -18,18 +18,18 @@ fn parked() -> Drives {
 #[test]
 fn calibrate_unfold_fold_and_rest() {
     let mut drives = parked();
-    assert!(drives.unfold().is_err() && drives.set_mode(Mode::Torque).is_err());
+    assert!(drives.unfold().is_err() && drives.set_mode(DriveMode::Torque).is_err());
     drives.calibrate().unwrap();
-    assert!(drives.calibrate().is_err() && drives.set_mode(Mode::MotorStop).is_err());
+    assert!(drives.calibrate().is_err() && drives.set_mode(DriveMode::MotorStop).is_err());
     let seen = run(&mut drives, 3.0);
-    assert!(seen.contains(&Happening::Calibrated), "{seen:?} {}", drives.arm.q);
+    assert!(seen.contains(&DriveHappening::Calibrated), "{seen:?} {}", drives.arm.q);
     let rested = drives.arm.posture().tool;
     run(&mut drives, 1.0);
     assert!((drives.arm.posture().tool - rested).norm() < 0.005);
 
     drives.unfold().unwrap();
     let seen = run(&mut drives, 6.0);
-    assert!(seen.contains(&Happening::Arrived) && seen.contains(&Happening::SoftLimitExit), "{seen:?}");
+    assert!(seen.contains(&DriveHappening::Arrived) && seen.contains(&DriveHappening::SoftLimitExit), "{seen:?}");
     assert!((drives.arm.q - radians(WORKING_POSE_DEG)).norm() < 0.01, "{}", drives.arm.q);
     drives.fold().unwrap();
     run(&mut drives, 6.0);
@@ -44,10 +44,10 @@ fn unparked_it_falls_and_without_commands_it_holds() {
     drives.unfold().unwrap();
     run(&mut drives, 6.0);
     let at = drives.arm.q;
-    drives.set_mode(Mode::Torque).unwrap();
+    drives.set_mode(DriveMode::Torque).unwrap();
     let seen = run(&mut drives, 1.0);
-    assert_eq!(seen, [Happening::CommandWatchdog]);
-    assert!((drives.arm.q - at).norm() < 0.01 && drives.mode() == Mode::Positioning);
+    assert_eq!(seen, [DriveHappening::CommandWatchdog]);
+    assert!((drives.arm.q - at).norm() < 0.01 && drives.mode() == DriveMode::Positioning);
     assert!(drives.switch_off() > 0.03);
 }
 
@@ -58,8 +58,8 @@ fn a_motion_that_is_held_up_fails_and_the_arm_stays() {
     run(&mut drives, 3.0);
     drives.arm.friction_scale = 1e6;
     drives.unfold().unwrap();
-    assert!(run(&mut drives, 10.0).contains(&Happening::MotionFailed));
-    assert!(drives.mode() == Mode::Positioning && !drives.busy());
+    assert!(run(&mut drives, 10.0).contains(&DriveHappening::MotionFailed));
+    assert!(drives.mode() == DriveMode::Positioning && !drives.busy());
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn something_in_the_way_is_no_stop() {
     // So heavy a friction that the joints do not move is taken for a stop, and refused as one.
     drives.arm.friction_scale = 1e6;
     drives.calibrate().unwrap();
-    assert_eq!(run(&mut drives, 10.0), [Happening::CalibrationFailed]);
+    assert_eq!(run(&mut drives, 10.0), [DriveHappening::CalibrationFailed]);
     assert!(!drives.calibrated());
 }
 
@@ -98,13 +98,13 @@ fn no_switch_of_modes_is_felt() {
     drives.unfold().unwrap();
     run(&mut drives, 6.0);
     let carried = drives.arm.model.gravity(&drives.arm.posture()) + J5::from([0.9, -0.9, 0.5, 0.2, 0.1]);
-    drives.set_mode(Mode::Torque).unwrap();
+    drives.set_mode(DriveMode::Torque).unwrap();
     assert!(jolt(&mut drives, Some(carried), 0.3) < 0.5);
-    drives.set_mode(Mode::Positioning).unwrap();
+    drives.set_mode(DriveMode::Positioning).unwrap();
     assert!(jolt(&mut drives, None, 0.5) < 0.5);
     drives.fold().unwrap();
     assert!(jolt(&mut drives, None, 6.0) < 0.5);
-    drives.set_mode(Mode::MotorStop).unwrap();
+    drives.set_mode(DriveMode::MotorStop).unwrap();
     assert!(jolt(&mut drives, None, 0.5) < 0.5 && drives.torque == J5::zeros());
 }
 
@@ -115,7 +115,7 @@ fn braking_brings_a_moving_arm_and_its_base_to_rest() {
     run(&mut drives, 3.0);
     drives.unfold().unwrap();
     run(&mut drives, 6.0);
-    drives.set_mode(Mode::Torque).unwrap();
+    drives.set_mode(DriveMode::Torque).unwrap();
     drives.arm.qd = J5::from([1.5, -1.0, 1.2, -1.5, 0.5]);
     drives.base.twist = Twist2 { vx: 0.3, vy: -0.2, wz: 0.3 };
     drives.brake();
@@ -128,18 +128,18 @@ fn braking_brings_a_moving_arm_and_its_base_to_rest() {
     let base = drives.base.twist;
     assert!(drives.arm.qd.amax() < 0.03 && fastest < 1.571, "{} {fastest}", drives.arm.qd);
     assert!(base.vx.abs() < 0.016 && base.vy.abs() < 0.016, "the base goes on: {base:?}");
-    assert!(drives.mode() == Mode::Positioning && !drives.busy());
+    assert!(drives.mode() == DriveMode::Positioning && !drives.busy());
     // Let go of, they take torques again, because they did; after a hold that was asked for they do not.
     drives.release();
-    assert_eq!(drives.mode(), Mode::Torque);
+    assert_eq!(drives.mode(), DriveMode::Torque);
     drives.brake();
-    drives.set_mode(Mode::Positioning).unwrap();
+    drives.set_mode(DriveMode::Positioning).unwrap();
     drives.release();
-    assert_eq!(drives.mode(), Mode::Positioning);
+    assert_eq!(drives.mode(), DriveMode::Positioning);
     // Drives that are off stay off.
-    drives.set_mode(Mode::MotorStop).unwrap();
+    drives.set_mode(DriveMode::MotorStop).unwrap();
     drives.brake();
-    assert_eq!(drives.mode(), Mode::MotorStop);
+    assert_eq!(drives.mode(), DriveMode::MotorStop);
 }
 
 /// Asked to brake again and again, drives that hold an arm under a load do not give way to it.
@@ -205,7 +205,7 @@ fn what_holds_a_pushed_arm_back_comes_by_a_ramp() {
             run(&mut drives, 1.0);
             drives.unfold().unwrap();
             assert!(jolt(&mut drives, None, 6.0) < 0.5 && !drives.busy(), "{joints:?}");
-            drives.set_mode(Mode::Torque).unwrap();
+            drives.set_mode(DriveMode::Torque).unwrap();
             let (mut last, mut most, mut fastest, mut braked) = (drives.torque, 0.0_f64, 0.0_f64, usize::MAX);
             for ms in 0..2000 {
                 let carried = drives.arm.model.gravity(&drives.arm.posture());
