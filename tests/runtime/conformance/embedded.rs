@@ -1,7 +1,7 @@
 //! The embedded platform, to be tested.
 
-use crate::bed::{Bed, Made, Trouble, WORK};
 use davit::model::{EventName, Transition, Tunable};
+use davit::platform::conformance::{self, Bed, Made, Times, Trouble};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::record;
 use davit::runtime::{
@@ -147,7 +147,7 @@ impl Misbehaving {
     /// Takes many updates while it is updated; on a worker it takes its time there.
     fn work(&mut self, cx: &mut Context, (): ()) -> Answer {
         let trouble = trouble_of(cx.clock(), "work");
-        let end = cx.clock().now() + WORK;
+        let end = cx.clock().now() + Times::default().work;
         match trouble {
             Some(Trouble::Long | Trouble::Deaf) => {}
             Some(Trouble::Fail) => return Answer::failed("on purpose"),
@@ -220,7 +220,7 @@ impl Bed for EmbeddedBed {
 #[test]
 fn the_types_are_those_of_the_suite() {
     let here = libraries(&Clock::simulated()).catalogue();
-    for ty in crate::bed::types() {
+    for ty in conformance::types() {
         assert_eq!(**here.get(ty.name).unwrap(), ty);
     }
 }
