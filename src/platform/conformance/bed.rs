@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// What a component of the test type `Misbehaving` does in one of its hooks, or in its operation `work`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
+pub enum BedTrouble {
     /// The hook or operation answers an error.
     Fail,
     /// The hook panics (on a platform elsewhere: whatever makes its component faulted).
@@ -85,16 +85,16 @@ impl Default for Times {
 }
 
 /// Lets the component of that name raise that event.
-pub type Raise = Box<dyn Fn(&str, &str)>;
+pub type BedRaise = Box<dyn Fn(&str, &str)>;
 
 /// A platform to be tried.
-pub struct Made {
+pub struct UnderTest {
     /// The platform, with nothing on it.
     pub platform: Arc<dyn Platform>,
     /// The clock it runs on.
     pub clock: Clock,
     /// Lets the component of that name raise that event.
-    pub raise: Raise,
+    pub raise: BedRaise,
     /// Whatever must live as long, the guard of a simulated clock among it.
     pub keep: Vec<Box<dyn std::any::Any>>,
 }
@@ -107,7 +107,7 @@ pub trait Bed {
     /// In every component of type `Misbehaving` these hooks (`configure`, `start`, `stop`, `cleanup`), its making and its end
     /// (`create`, `destroy`: they only hang), or its operation `work` (`Fail`, `Long`, `Deaf`) are in trouble; it is always
     /// called `bad`. Its operation `brake` needs nothing of its activity.
-    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made;
+    fn make(&self, trouble: &[(&'static str, BedTrouble)]) -> UnderTest;
 
     /// What it cannot make happen: rules that need it are skipped.
     fn cannot(&self) -> &[Ability] {

@@ -1,13 +1,13 @@
 //! Rules of calls that are given up while they are under way.
 
-use super::bed::{Bed, Trouble};
-use super::trial::{Ends, Trial, ends, has_heard, holds, is, is_not_done, is_unknown, same_system};
+use super::bed::{Bed, BedTrouble};
+use super::trial::{RuleEnds, Trial, ends, has_heard, holds, is, is_not_done, is_unknown, same_system};
 use super::words::*;
 use crate::model::{Step, Transition, Value};
 use crate::platform::{Cause, Outcome, PlatformEvent};
 
 /// A component `bad` whose operation `work` is in trouble, not running and running.
-fn each_way(bed: &dyn Bed, trouble: Trouble, f: impl Fn(Trial) -> Ends) -> Ends {
+fn each_way(bed: &dyn Bed, trouble: BedTrouble, f: impl Fn(Trial) -> RuleEnds) -> RuleEnds {
     [false, true].into_iter().try_for_each(|running| {
         let t = Trial::of(bed, &[("work", trouble)]);
         t.does(create_misbehaving())?;
@@ -30,8 +30,8 @@ fn brake() -> Step {
     call("bad.brake", vec![])
 }
 
-pub fn a_call_that_is_given_up_comes_to_rest_and_counts_as_done(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Long, |t| {
+pub fn a_call_that_is_given_up_comes_to_rest_and_counts_as_done(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Long, |t| {
         let long = t.times.work * 6;
         let working = t.begin(&work(), long);
         t.wait(t.times.limit);
@@ -51,8 +51,8 @@ pub fn a_call_that_is_given_up_comes_to_rest_and_counts_as_done(bed: &dyn Bed) -
     })
 }
 
-pub fn giving_up_what_is_not_under_way_does_nothing(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Long, |t| {
+pub fn giving_up_what_is_not_under_way_does_nothing(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Long, |t| {
         let before = t.see()?;
         for step in [work(), call("nobody.work", vec![]), state("bad", Transition::Stop)] {
             t.cancel(&step)?;
@@ -76,8 +76,8 @@ pub fn giving_up_what_is_not_under_way_does_nothing(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn a_failure_before_being_told_stays_one(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Fail, |t| {
+pub fn a_failure_before_being_told_stays_one(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Fail, |t| {
         let working = t.begin(&work(), t.times.work * 6);
         t.wait(t.times.limit);
         t.cancel(&work())?;
@@ -87,8 +87,8 @@ pub fn a_failure_before_being_told_stays_one(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn what_has_no_ear_goes_on_when_it_is_given_up(bed: &dyn Bed) -> Ends {
-    let t = Trial::of(bed, &[("configure", Trouble::Hang(None))]);
+pub fn what_has_no_ear_goes_on_when_it_is_given_up(bed: &dyn Bed) -> RuleEnds {
+    let t = Trial::of(bed, &[("configure", BedTrouble::Hang(None))]);
     t.does(create_misbehaving())?;
     let configure = state("bad", Transition::Configure);
     let (began, limit) = (t.now(), t.times.limit);
@@ -102,8 +102,8 @@ pub fn what_has_no_ear_goes_on_when_it_is_given_up(bed: &dyn Bed) -> Ends {
     holds(at >= deadline, with, format_args!("no answer before {deadline}"), format_args!("one at {at}"))
 }
 
-pub fn until_it_rests_a_component_begins_no_other_operation(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Deaf, |t| {
+pub fn until_it_rests_a_component_begins_no_other_operation(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Deaf, |t| {
         let (began, long, rest) = (t.now(), t.times.work * 6, t.times.rest);
         let working = t.begin(&work(), long);
         t.wait(t.times.limit);
@@ -132,8 +132,8 @@ pub fn until_it_rests_a_component_begins_no_other_operation(bed: &dyn Bed) -> En
     })
 }
 
-pub fn what_is_safe_runs_beside_a_call_that_does_not_rest(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Deaf, |t| {
+pub fn what_is_safe_runs_beside_a_call_that_does_not_rest(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Deaf, |t| {
         let began = t.now();
         let working = t.begin(&work(), t.times.limit * 4);
         t.wait(t.times.limit);
@@ -151,8 +151,8 @@ pub fn what_is_safe_runs_beside_a_call_that_does_not_rest(bed: &dyn Bed) -> Ends
     })
 }
 
-pub fn a_component_that_does_not_rest_is_quarantined_until_it_does(bed: &dyn Bed) -> Ends {
-    each_way(bed, Trouble::Deaf, |t| {
+pub fn a_component_that_does_not_rest_is_quarantined_until_it_does(bed: &dyn Bed) -> RuleEnds {
+    each_way(bed, BedTrouble::Deaf, |t| {
         let heard = t.listen()?;
         let (began, limit, late) = (t.now(), t.times.limit, t.times.late);
         let working = t.begin(&work(), limit * 4);

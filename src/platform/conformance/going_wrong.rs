@@ -1,7 +1,7 @@
 //! Rules of steps that fail, panic, hang, or come too late.
 
-use super::bed::{Bed, Trouble};
-use super::trial::{Ends, Trial, ends, has_heard, holds, is, is_not_done, is_unknown, same_system};
+use super::bed::{Bed, BedTrouble};
+use super::trial::{RuleEnds, Trial, ends, has_heard, holds, is, is_not_done, is_unknown, same_system};
 use super::words::*;
 use crate::model::{Policy, RunState, Step, Transition, Value};
 use crate::platform::{Cause, Outcome, PlatformEvent};
@@ -34,9 +34,9 @@ const HOOKS: [&str; 4] = ["configure", "start", "stop", "cleanup"];
 /// Where else a component's own code runs, beside its operations.
 const MAKING: [&str; 2] = ["create", "destroy"];
 
-pub fn a_failed_step_leaves_the_component_as_it_was(bed: &dyn Bed) -> Ends {
+pub fn a_failed_step_leaves_the_component_as_it_was(bed: &dyn Bed) -> RuleEnds {
     HOOKS[..2].iter().try_for_each(|hook| {
-        let t = Trial::of(bed, &[(hook, Trouble::Fail)]);
+        let t = Trial::of(bed, &[(hook, BedTrouble::Fail)]);
         t.all(up_to(hook).1)?;
         let before = t.see()?;
         let with = format!("`{}`, which fails", step_of(hook));
@@ -46,9 +46,9 @@ pub fn a_failed_step_leaves_the_component_as_it_was(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn a_panic_faults_the_component_and_nothing_else(bed: &dyn Bed) -> Ends {
+pub fn a_panic_faults_the_component_and_nothing_else(bed: &dyn Bed) -> RuleEnds {
     HOOKS.iter().try_for_each(|hook| {
-        let t = Trial::of(bed, &[(hook, Trouble::Panic)]);
+        let t = Trial::of(bed, &[(hook, BedTrouble::Panic)]);
         let heard = t.listen()?;
         t.all(up_to(hook).1)?;
         t.all([create("other"), state("other", Configure), state("other", Start)])?;
@@ -62,9 +62,9 @@ pub fn a_panic_faults_the_component_and_nothing_else(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn faulted_components_can_be_cleaned_up_and_destroyed(bed: &dyn Bed) -> Ends {
+pub fn faulted_components_can_be_cleaned_up_and_destroyed(bed: &dyn Bed) -> RuleEnds {
     ["cleanup", "destroy"].iter().try_for_each(|last| {
-        let t = Trial::of(bed, &[("start", Trouble::Panic)]);
+        let t = Trial::of(bed, &[("start", BedTrouble::Panic)]);
         t.all(up_to("start").1)?;
         t.run(&step_of("start"))?;
         t.refuses(state("bad", Start))?;
@@ -76,9 +76,9 @@ pub fn faulted_components_can_be_cleaned_up_and_destroyed(bed: &dyn Bed) -> Ends
     })
 }
 
-fn hung(bed: &dyn Bed, hooks: &[&'static str]) -> Ends {
+fn hung(bed: &dyn Bed, hooks: &[&'static str]) -> RuleEnds {
     hooks.iter().try_for_each(|hook| {
-        let t = Trial::of(bed, &[(hook, Trouble::Hang(None))]);
+        let t = Trial::of(bed, &[(hook, BedTrouble::Hang(None))]);
         t.all(up_to(hook).1)?;
         t.does(create("other"))?;
         let with = format!("`{}`, which hangs", step_of(hook));
@@ -95,16 +95,16 @@ fn hung(bed: &dyn Bed, hooks: &[&'static str]) -> Ends {
     })
 }
 
-pub fn a_hung_call_is_unknown_at_its_deadline_and_quarantined(bed: &dyn Bed) -> Ends {
+pub fn a_hung_call_is_unknown_at_its_deadline_and_quarantined(bed: &dyn Bed) -> RuleEnds {
     hung(bed, &HOOKS)
 }
 
-pub fn a_hung_making_or_end_is_unknown_at_its_deadline_and_quarantined(bed: &dyn Bed) -> Ends {
+pub fn a_hung_making_or_end_is_unknown_at_its_deadline_and_quarantined(bed: &dyn Bed) -> RuleEnds {
     hung(bed, &MAKING)
 }
 
-pub fn a_quarantined_component_holds_up_no_other(bed: &dyn Bed) -> Ends {
-    let t = Trial::of(bed, &[("start", Trouble::Hang(None))]);
+pub fn a_quarantined_component_holds_up_no_other(bed: &dyn Bed) -> RuleEnds {
+    let t = Trial::of(bed, &[("start", BedTrouble::Hang(None))]);
     t.all(up_to("start").1)?;
     t.all([create("a"), create("b"), connect("a.y", "b.u", Policy::Data)])?;
     t.run(&step_of("start"))?;
@@ -113,10 +113,10 @@ pub fn a_quarantined_component_holds_up_no_other(bed: &dyn Bed) -> Ends {
     holds(seen == ["bad"], "others beside one in quarantine", "`bad` alone is left", seen.join(", "))
 }
 
-fn returns_late(bed: &dyn Bed, hooks: &[&'static str]) -> Ends {
+fn returns_late(bed: &dyn Bed, hooks: &[&'static str]) -> RuleEnds {
     let times = bed.times();
     hooks.iter().try_for_each(|hook| {
-        let t = Trial::of(bed, &[(hook, Trouble::Hang(Some(times.limit * 3)))]);
+        let t = Trial::of(bed, &[(hook, BedTrouble::Hang(Some(times.limit * 3)))]);
         let heard = t.listen()?;
         let (before, steps) = up_to(hook);
         t.all(steps)?;
@@ -135,15 +135,15 @@ fn returns_late(bed: &dyn Bed, hooks: &[&'static str]) -> Ends {
     })
 }
 
-pub fn a_call_that_returns_late_is_cleaned_up(bed: &dyn Bed) -> Ends {
+pub fn a_call_that_returns_late_is_cleaned_up(bed: &dyn Bed) -> RuleEnds {
     returns_late(bed, &HOOKS)
 }
 
-pub fn a_making_or_end_that_returns_late_is_cleaned_up(bed: &dyn Bed) -> Ends {
+pub fn a_making_or_end_that_returns_late_is_cleaned_up(bed: &dyn Bed) -> RuleEnds {
     returns_late(bed, &MAKING)
 }
 
-pub fn what_is_not_done_by_its_deadline_does_not_happen_later(bed: &dyn Bed) -> Ends {
+pub fn what_is_not_done_by_its_deadline_does_not_happen_later(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.does(create("a"))?;
     for (step, done) in [(destroy("a"), None), (create("b"), Some(RunState::Unconfigured))] {
@@ -163,8 +163,8 @@ pub fn what_is_not_done_by_its_deadline_does_not_happen_later(bed: &dyn Bed) -> 
     Ok(())
 }
 
-pub fn unknown_is_settled_by_reading_back(bed: &dyn Bed) -> Ends {
-    let t = Trial::of(bed, &[("configure", Trouble::Hang(None))]);
+pub fn unknown_is_settled_by_reading_back(bed: &dyn Bed) -> RuleEnds {
+    let t = Trial::of(bed, &[("configure", BedTrouble::Hang(None))]);
     t.all(up_to("configure").1)?;
     is_unknown("`configure bad`, which hangs", &t.run(&step_of("configure"))?)?;
     let seen = t.see_one("bad")?.map(|it| it.state);
@@ -173,7 +173,7 @@ pub fn unknown_is_settled_by_reading_back(bed: &dyn Bed) -> Ends {
     holds(seen == expected, "reading `bad` back, which hangs in `configure`", words(expected), words(seen))
 }
 
-pub fn safe_steps_do_what_others_do(bed: &dyn Bed) -> Ends {
+pub fn safe_steps_do_what_others_do(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.does(create("a"))?;
     for step in

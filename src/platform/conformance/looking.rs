@@ -1,14 +1,14 @@
 //! Rules of what a platform tells, and of lists of steps that it prepares.
 
 use super::bed::Bed;
-use super::trial::{Ends, Stop, Trial, broken, has_heard, holds, is_not_done, same, same_system, told};
+use super::trial::{RuleEnds, RuleStop, Trial, broken, has_heard, holds, is_not_done, same, same_system, told};
 use super::words::*;
 use crate::model::{ComponentName, Policy, RunState, Step, Transition, Value};
 use crate::platform::{Outcome, PlatformEvent, Prepared};
 use crate::time::lock;
 use {Policy::Buffer, Policy::Data, Transition::Configure, Transition::Start, Transition::Stop as Halt};
 
-pub fn one_component_observed_is_the_one_of_the_whole(bed: &dyn Bed) -> Ends {
+pub fn one_component_observed_is_the_one_of_the_whole(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), create("b"), state("a", Configure), set("a.gain", 2.5)])?;
     let whole = t.see()?;
@@ -18,7 +18,7 @@ pub fn one_component_observed_is_the_one_of_the_whole(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn some_components_observed_are_those_of_the_whole(bed: &dyn Bed) -> Ends {
+pub fn some_components_observed_are_those_of_the_whole(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), create("b"), create("c"), create("d"), state("a", Configure), set("a.gain", 2.5)])?;
     t.all([connect("a.y", "b.u", Data), connect("a.y2", "b.q", Buffer(3)), connect("c.y", "b.q", Buffer(2))])?;
@@ -48,7 +48,7 @@ pub fn some_components_observed_are_those_of_the_whole(bed: &dyn Bed) -> Ends {
     check()
 }
 
-pub fn events_of_components_reach_the_sink(bed: &dyn Bed) -> Ends {
+pub fn events_of_components_reach_the_sink(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), state("a", Configure), state("a", Start)])?;
     let heard = t.listen()?;
@@ -63,16 +63,16 @@ pub fn events_of_components_reach_the_sink(bed: &dyn Bed) -> Ends {
 }
 
 /// A prepared list, whose steps are carried out as those of a platform.
-struct List<'t> {
+struct StepList<'t> {
     t: &'t Trial,
     steps: Vec<Step>,
     prepared: Option<Box<dyn Prepared>>,
 }
 
-impl List<'_> {
-    fn run(&mut self, index: usize, value: Option<Value>) -> Ends<Outcome> {
+impl StepList<'_> {
+    fn run(&mut self, index: usize, value: Option<Value>) -> RuleEnds<Outcome> {
         let (now, deadline) = (self.t.now(), self.t.deadline());
-        let mut prepared = self.prepared.take().ok_or_else(|| Stop::Skipped("it is gone".to_owned()))?;
+        let mut prepared = self.prepared.take().ok_or_else(|| RuleStop::Skipped("it is gone".to_owned()))?;
         let with = self.with(index);
         let (outcome, prepared) = self.t.call(with, deadline, move |_| {
             let outcome = prepared.execute(index, value.as_ref(), now, deadline);
@@ -86,13 +86,13 @@ impl List<'_> {
         format!("`{}`, prepared", self.steps[index])
     }
 
-    fn does(&mut self, index: usize, value: Option<Value>) -> Ends {
+    fn does(&mut self, index: usize, value: Option<Value>) -> RuleEnds {
         let outcome = self.run(index, value)?;
         holds(matches!(outcome, Outcome::Done(_)), self.with(index), "done", told(&outcome))
     }
 }
 
-pub fn prepared_steps_do_what_executed_ones_do(bed: &dyn Bed) -> Ends {
+pub fn prepared_steps_do_what_executed_ones_do(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), state("a", Configure), state("a", Start)])?;
     let steps = vec![
@@ -105,9 +105,9 @@ pub fn prepared_steps_do_what_executed_ones_do(bed: &dyn Bed) -> Ends {
     let asked = steps.clone();
     let prepared = t.at_once("preparing", move |platform| platform.prepare(&asked))?;
     if prepared.is_none() {
-        return Err(Stop::Skipped("the platform prepares nothing".to_owned()));
+        return Err(RuleStop::Skipped("the platform prepares nothing".to_owned()));
     }
-    let mut list = List { t: &t, steps, prepared };
+    let mut list = StepList { t: &t, steps, prepared };
     let gains = |expected: &Value| {
         let seen = t.see()?.components.remove(&name("a")).and_then(|mut a| a.properties.remove(&ident("gains")));
         same("`a.gains`, which was set", &seen.as_ref(), &Some(expected))

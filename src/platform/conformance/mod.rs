@@ -26,8 +26,8 @@ mod steps;
 mod trial;
 mod words;
 
-pub use bed::{Ability, Bed, Made, Raise, Times, Trouble};
-pub use report::{Broken, Report, Verdict};
+pub use bed::{Ability, Bed, BedRaise, BedTrouble, Times, UnderTest};
+pub use report::{BrokenRule, RuleReport, RuleVerdict};
 pub use stand_in::StandIn;
 pub use words::types;
 
@@ -35,7 +35,7 @@ pub use words::types;
 use super::Platform;
 use crate::time::clock::panic_text;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use trial::{Ends, Stop};
+use trial::{RuleEnds, RuleStop};
 
 /// One rule of the trait.
 pub struct Rule {
@@ -45,21 +45,21 @@ pub struct Rule {
     pub demands: &'static str,
     /// What it needs to be tried at all.
     pub needs: &'static [Ability],
-    check: fn(&dyn Bed) -> Ends,
+    check: fn(&dyn Bed) -> RuleEnds,
 }
 
 impl Rule {
     /// Tries it on a platform that `bed` makes, in the calling thread.
-    pub fn test(&self, bed: &dyn Bed) -> Verdict {
+    pub fn test(&self, bed: &dyn Bed) -> RuleVerdict {
         let cannot = bed.cannot();
         if let Some(missing) = self.needs.iter().find(|need| cannot.contains(need)) {
-            return Verdict::Skipped(format!("the bed cannot make that {missing}"));
+            return RuleVerdict::Skipped(format!("the bed cannot make that {missing}"));
         }
         match catch_unwind(AssertUnwindSafe(|| (self.check)(bed))) {
-            Ok(Ok(())) => Verdict::Kept,
-            Ok(Err(Stop::Broken(broken))) => Verdict::Broken(broken),
-            Ok(Err(Stop::Skipped(why))) => Verdict::Skipped(why),
-            Err(payload) => Verdict::Broken(Broken {
+            Ok(Ok(())) => RuleVerdict::Kept,
+            Ok(Err(RuleStop::Broken(broken))) => RuleVerdict::Broken(broken),
+            Ok(Err(RuleStop::Skipped(why))) => RuleVerdict::Skipped(why),
+            Err(payload) => RuleVerdict::Broken(BrokenRule {
                 with: "the bed".to_owned(),
                 expected: "a platform".to_owned(),
                 seen: format!("a panic: {}", panic_text(&*payload)),
@@ -74,8 +74,8 @@ pub fn rules() -> &'static [Rule] {
 }
 
 /// Tries every rule.
-pub fn run(bed: &dyn Bed) -> Report {
-    Report::new(rules().iter().map(|rule| (rule, rule.test(bed))).collect())
+pub fn run(bed: &dyn Bed) -> RuleReport {
+    RuleReport::new(rules().iter().map(|rule| (rule, rule.test(bed))).collect())
 }
 
 macro_rules! rules {

@@ -5,7 +5,7 @@ use std::fmt;
 
 /// What a platform did otherwise than a rule demands.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Broken {
+pub struct BrokenRule {
     /// With what it was tried.
     pub with: String,
     /// What was expected.
@@ -16,34 +16,34 @@ pub struct Broken {
 
 /// What came of trying one rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
+pub enum RuleVerdict {
     /// The platform keeps it.
     Kept,
     /// It does not.
-    Broken(Broken),
+    Broken(BrokenRule),
     /// It was not tried, and why.
     Skipped(String),
 }
 
 /// What came of trying all rules.
-pub struct Report {
-    verdicts: Vec<(&'static Rule, Verdict)>,
+pub struct RuleReport {
+    verdicts: Vec<(&'static Rule, RuleVerdict)>,
 }
 
-impl Report {
-    pub(super) fn new(verdicts: Vec<(&'static Rule, Verdict)>) -> Self {
+impl RuleReport {
+    pub(super) fn new(verdicts: Vec<(&'static Rule, RuleVerdict)>) -> Self {
         Self { verdicts }
     }
 
     /// Every rule with its verdict.
-    pub fn verdicts(&self) -> &[(&'static Rule, Verdict)] {
+    pub fn verdicts(&self) -> &[(&'static Rule, RuleVerdict)] {
         &self.verdicts
     }
 
     /// Those that are not kept, with what was seen.
-    pub fn broken(&self) -> impl Iterator<Item = (&'static Rule, &Broken)> {
+    pub fn broken(&self) -> impl Iterator<Item = (&'static Rule, &BrokenRule)> {
         self.verdicts.iter().filter_map(|(rule, verdict)| match verdict {
-            Verdict::Broken(broken) => Some((*rule, broken)),
+            RuleVerdict::Broken(broken) => Some((*rule, broken)),
             _ => None,
         })
     }
@@ -51,7 +51,7 @@ impl Report {
     /// Those that were not tried, and why.
     pub fn skipped(&self) -> impl Iterator<Item = (&'static Rule, &str)> {
         self.verdicts.iter().filter_map(|(rule, verdict)| match verdict {
-            Verdict::Skipped(why) => Some((*rule, why.as_str())),
+            RuleVerdict::Skipped(why) => Some((*rule, why.as_str())),
             _ => None,
         })
     }
@@ -62,12 +62,12 @@ impl Report {
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for RuleReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (broken, skipped) = (self.broken().count(), self.skipped().count());
         let kept = self.verdicts.len() - broken - skipped;
         writeln!(f, "{} rules: {kept} kept, {broken} broken, {skipped} not tried", self.verdicts.len())?;
-        for (rule, Broken { with, expected, seen }) in self.broken() {
+        for (rule, BrokenRule { with, expected, seen }) in self.broken() {
             writeln!(f, "\nbroken: {}", rule.name)?;
             writeln!(f, "  demands   {}", rule.demands)?;
             writeln!(f, "  with      {with}")?;

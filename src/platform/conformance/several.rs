@@ -1,7 +1,7 @@
 //! Rules of several brief steps in one call.
 
-use super::bed::{Bed, Trouble};
-use super::trial::{Ends, Trial, ends, holds, is, is_unknown};
+use super::bed::{Bed, BedTrouble};
+use super::trial::{RuleEnds, Trial, ends, holds, is, is_unknown};
 use super::words::*;
 use crate::model::Step;
 use crate::platform::{Cause, Ended, Outcome};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Hands the platform these steps, which have so long together, and answers what came of those that it began.
-fn hand(t: &Trial, steps: &[Step], until: Time, stop: bool) -> Ends<Vec<Ended>> {
+fn hand(t: &Trial, steps: &[Step], until: Time, stop: bool) -> RuleEnds<Vec<Ended>> {
     let with = in_words(steps);
     let (own, each, stop) = (steps.to_vec(), t.times.limit, Arc::new(AtomicBool::new(stop)));
     let ended = t.call(&with, until, move |platform| platform.execute_brief(own, each, until, &stop))?;
@@ -31,7 +31,7 @@ fn is_done(ended: &Ended) -> bool {
 }
 
 /// Has it carry out all of them, in as many calls as it likes. All are done.
-fn hand_all(t: &Trial, mut steps: Vec<Step>) -> Ends {
+fn hand_all(t: &Trial, mut steps: Vec<Step>) -> RuleEnds {
     while !steps.is_empty() {
         let ended = hand(t, &steps, t.now() + t.times.work, false)?;
         for (step, ended) in steps.iter().zip(&ended) {
@@ -43,12 +43,12 @@ fn hand_all(t: &Trial, mut steps: Vec<Step>) -> Ends {
 }
 
 /// Exactly these components are there.
-fn there_are(t: &Trial, with: &str, expected: &[&str]) -> Ends {
+fn there_are(t: &Trial, with: &str, expected: &[&str]) -> RuleEnds {
     let seen: Vec<String> = t.see()?.components.keys().map(ToString::to_string).collect();
     holds(seen == expected, with, expected.join(", "), seen.join(", "))
 }
 
-pub fn several_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) -> Ends {
+pub fn several_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     let names = ["a", "b", "c"];
     hand_all(&t, names.iter().map(|n| create(n)).collect())?;
@@ -60,7 +60,7 @@ pub fn several_steps_are_carried_out_as_far_as_they_are_done(bed: &dyn Bed) -> E
     there_are(&t, "one that is refused, and one behind it", &names)
 }
 
-pub fn several_steps_stop_where_they_are_told_to(bed: &dyn Bed) -> Ends {
+pub fn several_steps_stop_where_they_are_told_to(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     hand_all(&t, ["a", "b"].iter().map(|n| create(n)).collect())?;
     let steps = [destroy("a"), destroy("b")];
@@ -70,9 +70,9 @@ pub fn several_steps_stop_where_they_are_told_to(bed: &dyn Bed) -> Ends {
     there_are(&t, &with, &["b"])
 }
 
-pub fn several_steps_end_with_one_that_hangs(bed: &dyn Bed) -> Ends {
+pub fn several_steps_end_with_one_that_hangs(bed: &dyn Bed) -> RuleEnds {
     let times = bed.times();
-    let t = Trial::of(bed, &[("create", Trouble::Hang(Some(times.limit * 3)))]);
+    let t = Trial::of(bed, &[("create", BedTrouble::Hang(Some(times.limit * 3)))]);
     t.all(["a", "b", "c"].iter().map(|n| create(n)))?;
     let mut steps = vec![destroy("a"), create_misbehaving(), create("d"), destroy("b")];
     // A platform may carry out as many in one call as it likes.

@@ -1,22 +1,22 @@
 //! Rules of single steps: what each needs, and what it does.
 
 use super::bed::Bed;
-use super::trial::{Ends, Trial, broken, holds, same};
+use super::trial::{RuleEnds, Trial, broken, holds, same};
 use super::words::*;
 use crate::model::{ComponentSnapshot, Policy, RunState, Transition, Value, ValueType};
 use {Policy::Buffer, Policy::Data, Transition::Cleanup, Transition::Configure, Transition::Start, Transition::Stop};
 
 /// The component, which must be there.
-fn seen(t: &Trial, component: &str) -> Ends<ComponentSnapshot> {
+fn seen(t: &Trial, component: &str) -> RuleEnds<ComponentSnapshot> {
     let found = t.see()?.components.remove(&name(component));
     found.ok_or_else(|| broken("observing", format_args!("`{component}`"), "it is not there"))
 }
 
-fn ports_are(t: &Trial, with: &str, expected: &[(&str, Value)]) -> Ends {
+fn ports_are(t: &Trial, with: &str, expected: &[(&str, Value)]) -> RuleEnds {
     same(with, &t.see()?.ports, &written(expected))
 }
 
-pub fn create_needs_a_known_type_and_a_free_name(bed: &dyn Bed) -> Ends {
+pub fn create_needs_a_known_type_and_a_free_name(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.is_empty("a platform that was just made")?;
     t.refuses(create_of("Nothing", "a", Vec::new()))?;
@@ -32,7 +32,7 @@ pub fn create_needs_a_known_type_and_a_free_name(bed: &dyn Bed) -> Ends {
     holds(system.connections.is_empty(), "`create a`", "no connection", format_args!("{:?}", system.connections))
 }
 
-pub fn create_needs_every_value_of_its_type_and_within_its_limits(bed: &dyn Bed) -> Ends {
+pub fn create_needs_every_value_of_its_type_and_within_its_limits(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     let with = |at: usize, value: Value| {
         let mut properties = plant_values();
@@ -49,7 +49,7 @@ pub fn create_needs_every_value_of_its_type_and_within_its_limits(bed: &dyn Bed)
     t.does(with(1, Value::Float(10.0))).map(drop)
 }
 
-pub fn run_states_move_along_the_legal_path_only(bed: &dyn Bed) -> Ends {
+pub fn run_states_move_along_the_legal_path_only(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(state("a", Configure))?;
     t.does(create("a"))?;
@@ -68,7 +68,7 @@ pub fn run_states_move_along_the_legal_path_only(bed: &dyn Bed) -> Ends {
     Ok(())
 }
 
-pub fn destroy_needs_unconfigured_and_no_connections(bed: &dyn Bed) -> Ends {
+pub fn destroy_needs_unconfigured_and_no_connections(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(destroy("a"))?;
     t.all([create("a"), create("b"), state("a", Configure)])?;
@@ -82,7 +82,7 @@ pub fn destroy_needs_unconfigured_and_no_connections(bed: &dyn Bed) -> Ends {
     t.is_empty("everything was destroyed")
 }
 
-pub fn a_property_takes_its_type_within_its_limits(bed: &dyn Bed) -> Ends {
+pub fn a_property_takes_its_type_within_its_limits(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(set("a.gain", 1.0))?;
     t.does(create("a"))?;
@@ -102,7 +102,7 @@ pub fn a_property_takes_its_type_within_its_limits(bed: &dyn Bed) -> Ends {
     })
 }
 
-pub fn a_property_is_set_only_where_it_is_tunable(bed: &dyn Bed) -> Ends {
+pub fn a_property_is_set_only_where_it_is_tunable(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.does(create("a"))?;
     t.all([set("a.device", "x"), set("a.mode", 1), set("a.gain", 2.0)])?;
@@ -121,7 +121,7 @@ pub fn a_property_is_set_only_where_it_is_tunable(bed: &dyn Bed) -> Ends {
     t.does(set("a.device", "z")).map(drop)
 }
 
-pub fn a_data_connection_is_the_only_one_of_its_port(bed: &dyn Bed) -> Ends {
+pub fn a_data_connection_is_the_only_one_of_its_port(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), create("b"), create("c")])?;
     t.does(connect("a.y", "b.u", Data))?;
@@ -148,7 +148,7 @@ pub fn a_data_connection_is_the_only_one_of_its_port(bed: &dyn Bed) -> Ends {
     same("what was connected", &t.see()?.connections, &expected)
 }
 
-pub fn types_units_and_directions_of_connected_ports_agree(bed: &dyn Bed) -> Ends {
+pub fn types_units_and_directions_of_connected_ports_agree(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(connect("a.y", "b.u", Data))?;
     t.all([create("a"), create("b")])?;
@@ -168,7 +168,7 @@ pub fn types_units_and_directions_of_connected_ports_agree(bed: &dyn Bed) -> End
     t.all([connect("a.y", "b.u_plain", Data), connect("a.w", "b.v", Data)])
 }
 
-pub fn event_ports_take_many_connections(bed: &dyn Bed) -> Ends {
+pub fn event_ports_take_many_connections(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), create("b"), create("c")])?;
     t.all([connect("a.said", "c.heard", Data), connect("b.said", "c.heard", Data)])?;
@@ -177,7 +177,7 @@ pub fn event_ports_take_many_connections(bed: &dyn Bed) -> Ends {
     same("how many are connected", &t.see()?.connections.len(), &3)
 }
 
-pub fn port_write_needs_a_port_that_nothing_drives(bed: &dyn Bed) -> Ends {
+pub fn port_write_needs_a_port_that_nothing_drives(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(write("b.u", Some(Value::Float(1.0))))?;
     t.all([create("a"), create("b")])?;
@@ -195,7 +195,7 @@ pub fn port_write_needs_a_port_that_nothing_drives(bed: &dyn Bed) -> Ends {
     ports_are(&t, "what was written", &[("b.v", Value::floats(&[1.0, 2.0, 3.0])), ("b.n", Value::Int(3))])
 }
 
-pub fn a_written_value_survives_a_connection_and_never_written_comes_back(bed: &dyn Bed) -> Ends {
+pub fn a_written_value_survives_a_connection_and_never_written_comes_back(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), create("b")])?;
     let there = [("b.u", Value::Float(2.0))];
@@ -209,7 +209,7 @@ pub fn a_written_value_survives_a_connection_and_never_written_comes_back(bed: &
     ports_are(&t, "what was written, taken back", &[])
 }
 
-pub fn a_component_may_be_connected_to_itself(bed: &dyn Bed) -> Ends {
+pub fn a_component_may_be_connected_to_itself(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.all([create("a"), connect("a.y", "a.u", Data)])?;
     t.refuses(destroy("a"))?;
@@ -217,7 +217,7 @@ pub fn a_component_may_be_connected_to_itself(bed: &dyn Bed) -> Ends {
     t.is_empty("`destroy a`")
 }
 
-pub fn operations_need_their_arguments_and_answer_their_type(bed: &dyn Bed) -> Ends {
+pub fn operations_need_their_arguments_and_answer_their_type(bed: &dyn Bed) -> RuleEnds {
     let t = Trial::of(bed, &[]);
     t.refuses(call("a.nothing", vec![]))?;
     t.all([create("a"), state("a", Configure)])?;

@@ -1,7 +1,7 @@
 //! Platforms that are wrong on purpose: the rule that they break is named, with what was expected and what was seen.
 
 use davit::model::{Catalogue, ComponentName, ComponentSnapshot, Snapshot, Step};
-use davit::platform::conformance::{Ability, Bed, Made, Report, StandIn, Trouble, Verdict, rules, run};
+use davit::platform::conformance::{Ability, Bed, BedTrouble, RuleReport, RuleVerdict, StandIn, UnderTest, rules, run};
 use davit::platform::simulated::Simulated;
 use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform};
 use davit::time::{Clock, Time};
@@ -31,7 +31,7 @@ enum Wrong {
 
 struct WrongBed(Wrong);
 
-struct Broken {
+struct BrokenRule {
     inner: Simulated,
     wrong: Wrong,
 }
@@ -46,14 +46,14 @@ impl Drop for Release {
 }
 
 impl Bed for WrongBed {
-    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
+    fn make(&self, trouble: &[(&'static str, BedTrouble)]) -> UnderTest {
         let (inner, mut made) = StandIn::with(trouble);
         made.keep.insert(0, Box::new(Release(made.clock.clone())));
-        Made { platform: Arc::new(Broken { inner, wrong: self.0 }), ..made }
+        UnderTest { platform: Arc::new(BrokenRule { inner, wrong: self.0 }), ..made }
     }
 }
 
-impl Platform for Broken {
+impl Platform for BrokenRule {
     fn catalogue(&self) -> &Catalogue {
         self.inner.catalogue()
     }
@@ -122,7 +122,7 @@ impl Platform for Broken {
     }
 }
 
-fn named(report: &Report) -> Vec<&'static str> {
+fn named(report: &RuleReport) -> Vec<&'static str> {
     report.broken().map(|(rule, _)| rule.name).collect()
 }
 
@@ -164,7 +164,7 @@ fn what_is_wrong_is_told() {
     let tell = |wrong: Wrong, rule: &str| {
         let rule = rules().iter().find(|known| known.name == rule).expect("a rule");
         match rule.test(&WrongBed(wrong)) {
-            Verdict::Broken(told) => [told.with, told.expected, told.seen],
+            RuleVerdict::Broken(told) => [told.with, told.expected, told.seen],
             other => panic!("{wrong:?}: {other:?}"),
         }
     };
@@ -190,7 +190,7 @@ fn what_is_wrong_is_told() {
 struct PlainBed;
 
 impl Bed for PlainBed {
-    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
+    fn make(&self, trouble: &[(&'static str, BedTrouble)]) -> UnderTest {
         assert!(trouble.is_empty(), "it was not to be asked");
         StandIn.make(trouble)
     }

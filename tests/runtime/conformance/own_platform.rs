@@ -4,17 +4,17 @@
 mod bus;
 
 use bus::Bus;
-use davit::platforms::conformance::{Bed, Made, StandIn, Trouble, run};
+use davit::platforms::conformance::{Bed, BedTrouble, StandIn, UnderTest, run};
 use std::sync::Arc;
 
 struct BusBed;
 
 impl Bed for BusBed {
-    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
+    fn make(&self, trouble: &[(&'static str, BedTrouble)]) -> UnderTest {
         // What is at the other end: it fails, panics and hangs as it is told to.
         let (books, made) = StandIn::with(trouble);
         let bus = Bus::new(Box::new(std::io::sink()), String::new(), books);
-        Made { platform: Arc::new(bus), ..made }
+        UnderTest { platform: Arc::new(bus), ..made }
     }
 }
 
