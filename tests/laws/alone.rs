@@ -170,6 +170,11 @@ fn is_single(deployment: &Deployment) -> bool {
     })
 }
 
+/// Whether a configuration replaces a component by one whose ports have other names.
+fn renames(conf: &Configuration) -> bool {
+    conf.changes.iter().any(|change| matches!(&change.kind, ChangeKind::Replace { map, .. } if !map.is_empty()))
+}
+
 /// Compares the two for every configuration; counts what `check` refused, by code.
 fn compare(world: &World, seed: &[u8], counts: &mut BTreeMap<Code, usize>) -> Result<(), TestCaseError> {
     let single = is_single(&world.deployment);
@@ -185,7 +190,9 @@ fn compare(world: &World, seed: &[u8], counts: &mut BTreeMap<Code, usize>) -> Re
             prop_assert!(told.is_empty() || planned.is_err(), "planned all the same: {:?}\n{:?}", told, conf);
             if let (true, Err(refusal)) = (single, planned) {
                 let said: BTreeSet<(Code, &str)> = told.iter().map(|f| (f.code, f.message.as_str())).collect();
-                for finding in refusal.findings.iter().filter(|f| OF_TYPES.contains(&f.code)) {
+                // What a renamed port is connected with is known in a system only: one without a unit takes any.
+                let met = |f: &Finding| f.code == PORT_UNITS && renames(conf);
+                for finding in refusal.findings.iter().filter(|f| OF_TYPES.contains(&f.code) && !met(f)) {
                     let key = (finding.code, finding.message.as_str());
                     prop_assert!(said.contains(&key), "only the planner says {:?}: {:?}\n{:?}", finding, told, conf);
                 }
