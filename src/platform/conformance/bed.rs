@@ -24,19 +24,19 @@ pub enum BedTrouble {
 /// What a bed can make happen, beside steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ability {
-    /// [`Trouble::Fail`] in hooks and in `work`.
+    /// [`BedTrouble::Fail`] in hooks and in `work`.
     Fails,
-    /// [`Trouble::Panic`] in hooks.
+    /// [`BedTrouble::Panic`] in hooks.
     Panics,
-    /// [`Trouble::Hang`] in hooks, for ever.
+    /// [`BedTrouble::Hang`] in hooks, for ever.
     Hangs,
-    /// [`Trouble::Hang`] in `create` and `destroy`.
+    /// [`BedTrouble::Hang`] in `create` and `destroy`.
     MakingHangs,
-    /// [`Trouble::Hang`] with a time after which the call returns.
+    /// [`BedTrouble::Hang`] with a time after which the call returns.
     HangsReturn,
-    /// [`Trouble::Long`] in `work`.
+    /// [`BedTrouble::Long`] in `work`.
     Works,
-    /// [`Trouble::Deaf`] in `work`.
+    /// [`BedTrouble::Deaf`] in `work`.
     Deaf,
     /// The operation `brake` runs beside its component's activity.
     Beside,
