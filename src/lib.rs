@@ -143,12 +143,14 @@ pub mod component {
 /// What platforms of one's own are written with.
 ///
 /// `examples/own_platform.rs` is a whole program with one, `examples/embed.rs` one that gives its platform to a
-/// [`Configurator`]. A [`Platform`](platforms::Platform) is asked in blocking calls with deadlines.
+/// [`Configurator`]. A [`Platform`](platforms::Platform) is asked in blocking calls with deadlines, and whether it keeps the
+/// rules that a configurator relies on is tried by a test of a few lines ([`conformance`](platforms::conformance)).
 pub mod platforms {
     pub use crate::app::{Making, PlatformMaker};
     pub use crate::model::{
         Catalogue, Cause, ComponentSnapshot, ComponentType, Execution, Outcome, PlatformKind, PropertyType, Tunable,
     };
+    pub use crate::platform::conformance;
     pub use crate::platform::simulated::{Options as SimulatedOptions, Simulated};
     pub use crate::platform::{EventSink, ObserveError, Platform, PlatformEvent, Prepared};
 }

@@ -88,7 +88,11 @@ impl Worlds<'_> {
     /// Whose frames are there since their undo has failed: they no longer belong to the state that brought them.
     fn left_over(&self, id: WorldId, aside: &Aside) -> SmallVec<[Whose; 4]> {
         let frames = self.get(id).map(|world| world.stack.frames()).unwrap_or_default();
-        let left = frames.iter().filter(|frame| frame.scope.is_none() && aside.may(frame.configuration));
+        // What an operator has applied belongs to no state, and is not left over.
+        let asked = |by: Requester| matches!(by, Requester::Coordinator(_));
+        let left = frames
+            .iter()
+            .filter(|frame| frame.scope.is_none() && asked(frame.requester) && aside.may(frame.configuration));
         let mut left: SmallVec<[Whose; 4]> = left.map(|frame| (frame.configuration, frame.requester)).collect();
         left.sort_unstable();
         left.dedup();

@@ -3,6 +3,7 @@
 //! One trait, of blocking calls with deadlines, made from worker threads. Nothing assumes that a call is local, quick or
 //! answered: the same trait must fit components on other hosts and ROS 2 lifecycle nodes.
 
+pub mod conformance;
 pub mod embedded;
 pub mod simulated;
 

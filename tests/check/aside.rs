@@ -140,6 +140,34 @@ fn what_is_set_aside_changes_no_verdict() {
     assert!(compared > 60 && apart > 15, "{compared} compared, of which {apart} had something set aside");
 }
 
+/// What an undo leaves is known also where it is come to only behind another one that failed, and that was set aside.
+#[test]
+fn what_is_left_behind_another_one_is_known() {
+    let configurations = "base = Configuration { create('a', 'Drive'), create('b', 'Drive'),
+           post_conf_state = { 'a:running', 'b:running' } },
+         s0 = Configuration { property_set('a.gain', 2.5) }, s1 = Configuration { property_set('b.gain', 2.5) },";
+    let coordinator = "idle = state {}, starting = state { entry = 'base' },
+         up = state { first = state { config = 's0' }, between = state {}, second = state { config = 's1' }, last = state {},
+           trans { src = 'initial', tgt = 'first' },
+           trans { src = 'first', tgt = 'between', events = { 'e_next', 's0.failed', 's0.broken' } },
+           trans { src = 'between', tgt = 'second', events = { 's0.undo.failed' } },
+           trans { src = 'second', tgt = 'last', events = { 'e_next', 's1.failed', 's1.broken' } } },
+         leaving = state { entry = 'base.undo' },
+         trans { src = 'initial', tgt = 'idle' },
+         trans { src = 'idle', tgt = 'starting', events = { 'e_start' } },
+         trans { src = 'starting', tgt = 'up', events = { 'base.ok' } },
+         trans { src = 'starting', tgt = 'idle', events = { 'base.failed' } },
+         trans { src = 'starting', tgt = 'leaving', events = { 'e_shutdown', 'base.broken' } },
+         trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+         trans { src = 'leaving', tgt = 'idle', events = { 'base.undone', 'base.undo.failed', 'base.undo.broken' } },";
+    let read = Small::new(configurations, coordinator, "").read();
+    let report = run_with(read.deployment, &read.catalogue, Effort { aside_from: 0, ..Effort::default() });
+    for left in ["s0", "s1"] {
+        let refused = format!("`base` cannot be undone before `{left}`");
+        assert!(told(&report).iter().any(|told| told.contains(&refused)), "{refused}: {:#?}", told(&report));
+    }
+}
+
 /// A hub and `n` modes, each of which sets a property of a component of its own; `number` tells several coordinators apart.
 fn hub(number: usize, n: usize) -> (String, String) {
     let creates: Vec<String> = (0..n).map(|i| format!("create('c{number}_{i}', 'Drive')")).collect();

@@ -1,6 +1,7 @@
 //! What force does, in which order, and what is told of it; and what a look at the platform finds and forgets.
 
-use crate::demo::{Demo, Ran};
+use crate::demo::Ran;
+use crate::small;
 
 const DEPLOYMENT: &str = "davit: 1
 name: small
@@ -31,27 +32,9 @@ const CONFIGURATIONS: &str = r#"ConfiguratorConf {
 }
 "#;
 
-const COORDINATOR: &str = r#"return state {
-  idle = state {}, building = state { entry = "base" }, up = state {}, removing = state { entry = "base.undo" }, stuck = state {},
-  trans { src = "initial", tgt = "idle" },
-  trans { src = "idle", tgt = "building", events = { "e_start" } },
-  trans { src = "building", tgt = "up", events = { "base.ok" } },
-  trans { src = "building", tgt = "removing", events = { "base.failed", "base.broken", "e_stop" } },
-  trans { src = "up", tgt = "removing", events = { "e_stop" } },
-  trans { src = "removing", tgt = "idle", events = { "base.undone" } },
-  trans { src = "removing", tgt = "stuck", events = { "base.undo.failed", "base.undo.broken" } },
-  trans { src = "stuck", tgt = "removing", events = { "e_stop" } },
-}
-"#;
-
 fn run(script: &str) -> Ran {
-    let demo = Demo::new();
-    demo.write("deployment.yaml", DEPLOYMENT);
-    demo.write("conf.lua", CONFIGURATIONS);
-    demo.write("coordinator.lua", COORDINATOR);
     let told = "local function drifts(what) for _, d in ipairs(drift()) do if d.text:find(what, 1, true) then return true end end end\n";
-    demo.write("story.lua", &format!("{told}deploy('deployment.yaml')\n{script}"));
-    demo.run(&["run", "story.lua", "--clock", "simulated"])
+    small::run(DEPLOYMENT, CONFIGURATIONS, &format!("{told}deploy('deployment.yaml')\n{script}"))
 }
 
 fn whole(script: &str) -> String {

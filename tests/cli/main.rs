@@ -30,6 +30,7 @@ mod resting;
 mod setting;
 mod several;
 mod simulated;
+mod small;
 mod stalled;
 mod stopping;
 mod together;

@@ -5,6 +5,8 @@ mod batches;
 mod brief;
 mod claims;
 mod kept_calls;
+#[path = "../support/names.rs"]
+mod names;
 mod observing;
 mod prepared;
 mod repair;

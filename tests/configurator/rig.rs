@@ -1,5 +1,6 @@
 //! A configurator on a simulated platform, with plain types and short words for configurations.
 
+pub use crate::names::{event, id, ident, member, name};
 use davit::configurator::*;
 use davit::model::*;
 use davit::platform::Platform;
@@ -9,26 +10,6 @@ use davit::time::{Clock, Guard};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-
-pub fn ident(text: &str) -> Ident {
-    Ident::new(text).unwrap()
-}
-
-pub fn name(text: &str) -> ComponentName {
-    ComponentName::new(text).unwrap()
-}
-
-pub fn id(text: &str) -> ConfigId {
-    ConfigId::new(text).unwrap()
-}
-
-pub fn event(text: &str) -> EventName {
-    EventName::new(text).unwrap()
-}
-
-pub fn member(text: &str) -> MemberRef {
-    MemberRef::new(text).unwrap()
-}
 
 /// `Node`: a float in and out, an always tunable gain, one that needs `stopped`, operations of every effect.
 pub fn catalogue() -> Catalogue {

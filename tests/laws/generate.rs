@@ -3,6 +3,7 @@
 //! Everything is made of small numbers, so that proptest shrinks well, and read against the system it is applied to, so
 //! that most configurations are meaningful and a good share of them is accepted.
 
+pub use crate::names::ident;
 use davit::model::*;
 use davit::plan::{Context, Plan, plan};
 use davit::system::{System, View, step};
@@ -43,10 +44,6 @@ pub fn config() -> impl Strategy<Value = ConfigGene> {
 
 pub fn configs(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<ConfigGene>> {
     vec(config(), n)
-}
-
-pub fn ident(text: &str) -> Ident {
-    Ident::new(text).unwrap()
 }
 
 const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "s/f", "s/g", "t/h"];

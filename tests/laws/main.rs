@@ -11,6 +11,8 @@ mod endings;
 mod generate;
 mod machine;
 mod motion;
+#[path = "../support/names.rs"]
+mod names;
 mod plain;
 mod plans;
 mod prepared;

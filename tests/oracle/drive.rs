@@ -2,8 +2,9 @@
 //! rest it is compared with where `check` follows it to.
 
 use crate::classes::Classes;
-use crate::generate::{CONFIRMS, Chance, EVENTS, Made, event};
+use crate::generate::{CONFIRMS, Chance, EVENTS, Made};
 use crate::laws::Laws;
+use crate::names::event;
 use crate::settings::{Setting, followed};
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};

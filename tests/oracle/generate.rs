@@ -3,6 +3,7 @@
 //! They need not be sound. What a coordinator asks for may be refused, fail or be left behind: the oracle is about what
 //! happens then, not about whether it should.
 
+use crate::names::{event, ident};
 use davit::model::finding::Origin;
 use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
 use davit::model::*;
@@ -71,14 +72,6 @@ pub struct Made {
     pub text: String,
     /// `c3` creates a component that is kept.
     pub kept: bool,
-}
-
-fn ident(text: &str) -> Ident {
-    Ident::new(text).expect("a plain name")
-}
-
-pub fn event(text: &str) -> EventName {
-    EventName::new(text).expect("a plain name")
 }
 
 fn raise(text: &str) -> (Action, Origin) {

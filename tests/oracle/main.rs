@@ -14,6 +14,8 @@ mod drive;
 mod generate;
 mod laws;
 mod mutations;
+#[path = "../support/names.rs"]
+mod names;
 mod settings;
 
 use classes::{CLASSES, Classes};

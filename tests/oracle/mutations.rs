@@ -120,6 +120,14 @@ fn copy(to: &Path) {
         "configs",
     ];
     kept.map(|name| root().join(name)).iter().filter(|path| path.exists()).for_each(|path| files(path, &mut all));
+    // What is there no more is not in the copy either.
+    let mut before = Vec::new();
+    kept.map(|name| to.join(name)).iter().filter(|path| path.exists()).for_each(|path| files(path, &mut before));
+    for path in before {
+        if !root().join(path.strip_prefix(to).expect("below the copy")).exists() {
+            std::fs::remove_file(&path).expect("the copy's own");
+        }
+    }
     for path in all {
         let name = path.strip_prefix(root()).expect("below the root").to_owned();
         let mut text = std::fs::read(&path).expect("a file");

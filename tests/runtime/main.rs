@@ -4,7 +4,10 @@
 mod activities;
 mod calls;
 mod cancelling;
+mod conformance;
 mod flow;
 mod monitors;
+#[path = "../support/names.rs"]
+mod names;
 mod standard;
 mod support;

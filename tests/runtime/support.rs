@@ -1,5 +1,6 @@
 //! A platform on a simulated clock, and short words for the tests.
 
+pub use crate::names::{ident, member, name};
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Outcome, Platform, PlatformEvent};
@@ -44,18 +45,6 @@ pub fn bench_with(clock: Clock, libraries: impl IntoIterator<Item = Library>) ->
     let sink = events.clone();
     platform.subscribe(Arc::new(move |event| sink.lock().unwrap().push(event)));
     Bench { platform, clock, events, _guard: guard }
-}
-
-pub fn ident(text: &str) -> Ident {
-    Ident::new(text).unwrap()
-}
-
-pub fn name(text: &str) -> ComponentName {
-    ComponentName::new(text).unwrap()
-}
-
-pub fn member(text: &str) -> MemberRef {
-    MemberRef::new(text).unwrap()
 }
 
 pub fn call(operation: &str, args: Vec<Value>) -> Step {

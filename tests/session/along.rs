@@ -1,6 +1,7 @@
 //! What an operator has put in the way of what a coordinator undoes while it leads down.
 
-use crate::stopping::{Small, event, force};
+use crate::names::event;
+use crate::stopping::{Small, force};
 use davit::model::{Ask, ConfigId};
 use davit::platform::simulated::{Fault, FaultRule, Faults};
 use davit::session::{NotRaised, Stage};

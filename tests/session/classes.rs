@@ -1,12 +1,13 @@
 //! What waits for a coordinator waits in classes (semantics: *Coordinators*): each of them flooded, on a running deployment. How long
 //! something waits is counted in turns of the coordinator, never in seconds.
 
+use crate::names::event;
 use davit::app;
 use davit::coordinator::Refused;
 use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::limits;
-use davit::model::{Ask, ComponentName, EventName};
+use davit::model::{Ask, ComponentName};
 use davit::platform::simulated::{Options, Simulated};
 use davit::session::{Happening, NotRaised, Session, SessionSetup};
 use davit::statechart::compile;
@@ -58,10 +59,6 @@ const CONFIGURATIONS: &str = "ConfiguratorConf {
   ask = Configuration { group = \"asked\" },
 }
 ";
-
-fn event(name: &str) -> EventName {
-    EventName::new(name).unwrap()
-}
 
 /// A deployment that is up, on a platform whose components say what the test lets them say.
 struct Crowd {

@@ -1,6 +1,7 @@
 //! What panics: whoever drives a session, a coordinator's thread, whoever only hears of what happens. The robot is not left up.
 
-use crate::stopping::{Small, event};
+use crate::names::event;
+use crate::stopping::Small;
 use davit::session::{Command, Happening, Phase, Stage};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

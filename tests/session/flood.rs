@@ -3,6 +3,7 @@
 //! It is bounded, counted and told; it neither delays nor displaces what an operator and the configurator say, nor the
 //! session's memory of it.
 
+use crate::names::event;
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::limits;
@@ -98,10 +99,6 @@ const MONITORS: &str = "Monitors {
   high = monitor { when = above(\"Source.y\", 0.0), event = \"e_high\", cleared = \"e_low\" },
 }
 ";
-
-fn event(name: &str) -> EventName {
-    EventName::new(name).unwrap()
-}
 
 struct Flooded {
     session: Arc<Session>,

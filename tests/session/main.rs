@@ -9,6 +9,8 @@ mod doors;
 mod flood;
 mod hangs;
 mod life;
+#[path = "../support/names.rs"]
+mod names;
 mod platforms;
 mod replaced;
 mod settled;

@@ -1,10 +1,11 @@
 //! What configurations stand for (`holds`): true before they count as applied, watched while they are in force.
 
+use crate::names::id;
 use davit::app;
 use davit::configurator::Recovery;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{Ask, ComponentName, ConfigId, RequestId, Step, Value, codes};
+use davit::model::{Ask, ComponentName, RequestId, Step, Value, codes};
 use davit::platform::Platform as _;
 use davit::platform::simulated::{Options, Simulated};
 use davit::runtime::{Answer, Builder, Component, Context, Kind, Libraries, Library, Out, Prop};
@@ -176,10 +177,6 @@ fn record(session: &Session) -> Arc<Mutex<Vec<(Time, String)>>> {
         log.lock().unwrap().push((at, line));
     }));
     heard
-}
-
-fn id(name: &str) -> ConfigId {
-    ConfigId::new(name).unwrap()
 }
 
 fn apply(name: &str) -> Ask {

@@ -1,9 +1,10 @@
 //! The three stages of stopping, on a deployment of two components: what each does, and what it leaves to the next.
 
+use crate::names::event;
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{Ask, ConfigId, EventName, RunState};
+use davit::model::{Ask, ConfigId, RunState};
 use davit::platform::Platform;
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
 use davit::session::service::SessionService;
@@ -195,10 +196,6 @@ impl Small {
             .map(|frame| format!("{}{}", frame.configuration, ["", " partial"][usize::from(frame.partial)]))
             .collect()
     }
-}
-
-pub fn event(name: &str) -> EventName {
-    EventName::new(name).unwrap()
 }
 
 pub fn force(session: &Session) {

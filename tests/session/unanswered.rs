@@ -1,6 +1,7 @@
 //! A configurator or a platform that does not answer: what nobody knows is not nothing.
 
-use crate::stopping::{Small, event, force};
+use crate::names::event;
+use crate::stopping::{Small, force};
 use davit::model::{
     Ask, Catalogue, ComponentName, ComponentSnapshot, ConfigId, Execution, MemberRef, Outcome, Snapshot, Step, Value,
 };

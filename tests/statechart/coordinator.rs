@@ -1,5 +1,6 @@
 //! The coordinator on its own thread, in simulated time: what it hears, raises, forgets, and when it falls silent.
 
+use crate::names::event;
 use crate::support::*;
 use davit::coordinator::{ChartTrouble, Class, Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag};
 use davit::limits;
@@ -8,10 +9,6 @@ use davit::statechart::{Chart, Hook, NodeId, Raised};
 use davit::time::{Clock, Time};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
-
-fn event(text: &str) -> EventName {
-    EventName::new(text).unwrap()
-}
 
 /// Notes everything, in words.
 #[derive(Clone, Default)]

@@ -3,6 +3,8 @@
 mod confirmed;
 mod coordinator;
 mod naive;
+#[path = "../support/names.rs"]
+mod names;
 mod random;
 mod rfsm;
 mod rich;

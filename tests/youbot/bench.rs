@@ -13,7 +13,6 @@ use davit::system::System;
 use davit::system::step::apply;
 use davit::time::{Clock, Guard, Receiver, Time};
 use nalgebra::Vector3;
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -38,27 +37,6 @@ pub struct Row {
 }
 
 static ROWS: Mutex<BTreeMap<i64, Vec<Row>>> = Mutex::new(BTreeMap::new());
-
-thread_local! {
-    static REQUESTS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts what a thread asks of the allocator.
-pub struct Counting;
-
-// SAFETY: every call is passed on to the system's allocator unchanged; the counter is a plain thread-local without a
-// destructor, so that counting neither allocates nor touches a dead thread's memory.
-unsafe impl std::alloc::GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: std::alloc::Layout) -> *mut u8 {
-        REQUESTS.with(|n| n.set(n.get() + 1));
-        // SAFETY: as the caller promises.
-        unsafe { std::alloc::System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, p: *mut u8, layout: std::alloc::Layout) {
-        // SAFETY: as the caller promises.
-        unsafe { std::alloc::System.dealloc(p, layout) }
-    }
-}
 
 /// Records the control loop.
 struct Probe {
@@ -110,7 +88,7 @@ impl Component for Probe {
             mode: self.mode.get().unwrap_or(0),
             joints: self.joints.get().unwrap_or_default(),
             base: self.base.get().unwrap_or_default(),
-            requests: REQUESTS.with(Cell::get),
+            requests: crate::counting::made(),
         });
     }
 }

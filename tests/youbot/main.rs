@@ -2,6 +2,9 @@
 
 mod bench;
 mod chatter;
+#[path = "../support/counting.rs"]
+#[allow(dead_code)] // only what one thread asks for
+mod counting;
 mod coupling;
 mod faults;
 mod files;
@@ -14,4 +17,4 @@ mod stops;
 mod two;
 
 #[global_allocator]
-static ALLOCATOR: bench::Counting = bench::Counting;
+static ALLOCATOR: counting::Counting = counting::Counting;

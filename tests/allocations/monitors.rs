@@ -1,34 +1,12 @@
 //! Evaluating monitors allocates nothing, whatever they hold: counted by the allocator.
 
+use crate::counting::Together;
 use davit::lang::{LoadOptions, Sources, load_monitors};
 use davit::monitor::{Bank, Sample};
 use davit::time::Time;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: everything is the system allocator's; the counter is beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.dealloc(at, layout) }
-    }
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
+static COUNT: Together = Together::new();
 
 const MONITORS: &str = r#"
 local high = above("A.x", 0.5, { hysteresis = 0.1 })
@@ -43,7 +21,6 @@ Monitors {
 }
 "#;
 
-// One test: the counter is the whole program's.
 #[test]
 fn evaluating_allocates_nothing() {
     let loaded = load_monitors(&Sources::memory([("m.lua", MONITORS)]), Path::new("m.lua"), &LoadOptions::default());
@@ -53,7 +30,8 @@ fn evaluating_allocates_nothing() {
     let mut samples = vec![Sample::default(); bank.inputs().len()];
     let mut raised = 0_u64;
     let mut seed = 7_u64;
-    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    COUNT.add_thread();
+    let before = COUNT.touched();
     for i in 0..30_000_u64 {
         let now = Time(i * 1_000_000);
         for (n, sample) in samples.iter_mut().enumerate() {
@@ -71,7 +49,7 @@ fn evaluating_allocates_nothing() {
         bank.step(now, &mut |n| samples[n], &mut |_, _| raised += 1);
         let _ = (bank.next_wake(), bank.is_true(0), bank.robustness(1));
     }
-    let allocations = ALLOCATIONS.load(Ordering::SeqCst) - before;
+    let allocations = COUNT.touched() - before;
     assert!(raised > 100, "{raised} events");
     assert!(bank.troubles().merged > 0, "the memory of no operator was used up");
     assert_eq!(allocations, 0);

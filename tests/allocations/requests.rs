@@ -1,37 +1,19 @@
 //! What a request for a prepared switch allocates on its whole way: queue, configurator, embedded platform, progress,
-//! answer. Counted over all threads of the process.
+//! answer. Counted in the threads that have to do with it.
 
+use crate::counting::Together;
 use davit::configurator::{Answer, Batch, Configurator, ConfiguratorSetup, Request, Requester};
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::runtime::{Builder, Component, In, Libraries, Library, Prop};
 use davit::time::Clock;
-use std::alloc::{GlobalAlloc, Layout};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-struct Counting;
-
-static COUNT: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.fetch_add(1, Ordering::SeqCst);
-        // SAFETY: the caller's obligations are the system allocator's.
-        unsafe { std::alloc::System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { std::alloc::System.dealloc(at, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+/// Who asks, and who answers and tells: the configurator.
+static COUNT: Together = Together::new();
 
 /// A controller with a gain of three and a reference.
 #[allow(dead_code)]
@@ -90,10 +72,14 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         clock: clock.clone(),
         limits: DeploymentLimits::default(),
         workers: 2,
-        answers: Arc::new(move |answer| drop(sink.try_send(answer))),
+        answers: Arc::new(move |answer| {
+            COUNT.add_thread();
+            drop(sink.try_send(answer));
+        }),
         progress: Some(Arc::new(move |_| _ = told.fetch_add(1, Ordering::Relaxed))),
         conditions: None,
     });
+    COUNT.add_thread();
     let mut next = 0;
     let mut ask = |ask: Ask| {
         next += 1;
@@ -113,12 +99,12 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
     // is made once ends; what a request makes shows in every round, and what grows by doubling in five of the twenty.
     let told = steps.load(Ordering::Relaxed);
     let rounds: Vec<u64> = std::iter::repeat_with(|| {
-        let before = COUNT.load(Ordering::SeqCst);
+        let before = COUNT.touched();
         for _ in 0..1_000 {
             ask(Ask::Apply(switch));
             ask(Ask::UndoOf(switch));
         }
-        COUNT.load(Ordering::SeqCst) - before
+        COUNT.touched() - before
     })
     .take(20)
     .collect();

@@ -1,51 +1,14 @@
 //! What a prepared switch costs in allocations: nothing, from its second application on (the first one is planned, and
 //! makes the frame that is used again afterwards).
 
+use crate::counting::made_by;
 use davit::model::*;
 use davit::plan::footprint::Saved;
 use davit::plan::{Context, plan};
 use davit::stack::{Op, Requester, Resolved, Scope, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
-use std::alloc::{GlobalAlloc, Layout};
-use std::cell::Cell;
 use std::sync::Arc;
-
-struct Counting;
-
-thread_local! {
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system's allocator unchanged; counting touches a thread-local without a
-// destructor, which allocates nothing.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|c| c.set(c.get() + 1));
-        // SAFETY: the caller's obligations are the system allocator's.
-        unsafe { std::alloc::System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { std::alloc::System.dealloc(at, layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        COUNT.with(|c| c.set(c.get() + 1));
-        // SAFETY: as above.
-        unsafe { std::alloc::System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn count(f: impl FnOnce()) -> u64 {
-    let before = COUNT.with(Cell::get);
-    f();
-    COUNT.with(Cell::get) - before
-}
 
 fn arm() -> System {
     let mut ty = ComponentType::new("T.arm", "an arm's controller");
@@ -135,7 +98,7 @@ fn a_prepared_switch_allocates_nothing() {
     };
     let before = system.snapshot();
     let mut first = None;
-    assert!(count(|| first = Some(plan(&mut system, &mut stack))) > 0, "the counter counts");
+    assert!(made_by(|| first = Some(plan(&mut system, &mut stack))) > 0, "the counter counts");
     let mut switch = first.unwrap();
     let undo = transaction(&system, &stack, &[Op::UndoTop], &Context::default()).unwrap();
     for planned in undo.steps.iter() {
@@ -152,7 +115,7 @@ fn a_prepared_switch_allocates_nothing() {
         assert_eq!(perform(switch, true, system), 4);
         stack.pop_switch();
     };
-    assert_eq!(count(|| (0..100).for_each(|_| cycle(&mut switch, &mut system, &mut stack))), 0);
+    assert_eq!(made_by(|| (0..100).for_each(|_| cycle(&mut switch, &mut system, &mut stack))), 0);
     assert_eq!(system.snapshot(), before);
     // In force twice, it has two frames.
     let gain = |value: f64, system: &mut System| {

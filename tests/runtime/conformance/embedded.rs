@@ -1,7 +1,7 @@
 //! The embedded platform, to be tested.
 
-use crate::bed::{Bed, Made, Trouble, WORK};
 use davit::model::{EventName, Transition, Tunable};
+use davit::platform::conformance::{self, Bed, BedTrouble, Times, UnderTest};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::record;
 use davit::runtime::{
@@ -17,7 +17,7 @@ pub struct EmbeddedBed;
 /// What tests ask of components that they cannot reach: by the clock, of which every test has its own.
 struct Wish {
     clock: Clock,
-    trouble: Vec<(&'static str, Trouble)>,
+    trouble: Vec<(&'static str, BedTrouble)>,
     raise: Vec<(String, String)>,
 }
 
@@ -94,17 +94,17 @@ struct Misbehaving {
     task: Option<(Time, Ticket)>,
 }
 
-fn trouble_of(clock: &Clock, what: &str) -> Option<Trouble> {
+fn trouble_of(clock: &Clock, what: &str) -> Option<BedTrouble> {
     with_wish(clock, |w| w.trouble.iter().find(|(h, _)| *h == what).map(|(_, t)| *t)).flatten()
 }
 
 fn misbehave(clock: &Clock, hook: &str) -> HookResult {
     match trouble_of(clock, hook) {
-        None | Some(Trouble::Long | Trouble::Deaf) => Ok(()),
-        Some(Trouble::Fail) => Err(Failure::from("on purpose")),
-        Some(Trouble::Panic) => panic!("on purpose"),
-        Some(Trouble::Hang(None)) => clock.hang(),
-        Some(Trouble::Hang(Some(time))) => {
+        None | Some(BedTrouble::Long | BedTrouble::Deaf) => Ok(()),
+        Some(BedTrouble::Fail) => Err(Failure::from("on purpose")),
+        Some(BedTrouble::Panic) => panic!("on purpose"),
+        Some(BedTrouble::Hang(None)) => clock.hang(),
+        Some(BedTrouble::Hang(Some(time))) => {
             clock.sleep(time);
             Ok(())
         }
@@ -135,7 +135,7 @@ impl Component for Misbehaving {
         let Some((end, ticket)) = self.task.take() else { return };
         if cx.now() >= end {
             ticket.done(());
-        } else if ticket.is_cancelled() && trouble_of(cx.clock(), "work") == Some(Trouble::Long) {
+        } else if ticket.is_cancelled() && trouble_of(cx.clock(), "work") == Some(BedTrouble::Long) {
             ticket.failed("it was given up");
         } else {
             self.task = Some((end, ticket));
@@ -147,10 +147,10 @@ impl Misbehaving {
     /// Takes many updates while it is updated; on a worker it takes its time there.
     fn work(&mut self, cx: &mut Context, (): ()) -> Answer {
         let trouble = trouble_of(cx.clock(), "work");
-        let end = cx.clock().now() + WORK;
+        let end = cx.clock().now() + Times::default().work;
         match trouble {
-            Some(Trouble::Long | Trouble::Deaf) => {}
-            Some(Trouble::Fail) => return Answer::failed("on purpose"),
+            Some(BedTrouble::Long | BedTrouble::Deaf) => {}
+            Some(BedTrouble::Fail) => return Answer::failed("on purpose"),
             _ => return Answer::Done(()),
         }
         if self.runs {
@@ -158,7 +158,7 @@ impl Misbehaving {
             return Answer::Pending;
         }
         while cx.clock().now() < end {
-            if trouble == Some(Trouble::Long) && cx.is_cancelled() {
+            if trouble == Some(BedTrouble::Long) && cx.is_cancelled() {
                 return Answer::failed("it was given up");
             }
             cx.clock().sleep(Duration::from_millis(1));
@@ -197,7 +197,7 @@ impl Drop for Release {
 }
 
 impl Bed for EmbeddedBed {
-    fn make(&self, trouble: &[(&'static str, Trouble)]) -> Made {
+    fn make(&self, trouble: &[(&'static str, BedTrouble)]) -> UnderTest {
         let clock = Clock::simulated();
         let guard = clock.enter();
         // A type is made once to be described, before anything is asked of it.
@@ -205,7 +205,7 @@ impl Bed for EmbeddedBed {
         WISHES.lock().unwrap().push(Wish { clock: clock.clone(), trouble: trouble.to_vec(), raise: Vec::new() });
         let platform = EmbeddedPlatform::new(&clock, &libraries, &BTreeMap::new());
         let asked = clock.clone();
-        Made {
+        UnderTest {
             platform: Arc::new(platform),
             clock: clock.clone(),
             raise: Box::new(move |component, event| {
@@ -220,7 +220,7 @@ impl Bed for EmbeddedBed {
 #[test]
 fn the_types_are_those_of_the_suite() {
     let here = libraries(&Clock::simulated()).catalogue();
-    for ty in crate::bed::types() {
+    for ty in conformance::types() {
         assert_eq!(**here.get(ty.name).unwrap(), ty);
     }
 }

@@ -1,37 +1,16 @@
 //! What runs in control activities, and what a prepared switch does, allocates nothing: counted by the allocator.
 
+use crate::counting::Together;
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Outcome, Platform};
 use davit::runtime::*;
 use davit::time::Clock;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: everything is the system allocator's; the counter is beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.dealloc(at, layout) }
-    }
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
+/// The thread that switches, and that of the activity.
+static COUNT: Together = Together::new();
 
 /// Reads and writes a vector and a float.
 struct Worker {
@@ -47,6 +26,7 @@ impl Component for Worker {
     }
 
     fn update(&mut self, _: &mut Context) {
+        COUNT.add_thread();
         let gains = self.gains.get();
         let _ = (self.mode.get(), self.u.age());
         let u = self.u.get().unwrap_or_default();
@@ -54,7 +34,6 @@ impl Component for Worker {
     }
 }
 
-// One test: the counter is the whole program's.
 #[test]
 fn updates_and_prepared_switches_allocate_nothing() {
     let clock = Clock::simulated();
@@ -102,11 +81,13 @@ fn updates_and_prepared_switches_allocate_nothing() {
             clock.sleep(Duration::from_millis(5));
         }
     };
+    COUNT.add_thread();
     // The first rounds take what is kept (the list of timers, the memory of slots).
     round(50);
-    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    let before = COUNT.touched();
+    assert!(before > 0, "the counter counts");
     round(200);
-    assert_eq!(ALLOCATIONS.load(Ordering::SeqCst) - before, 0);
+    assert_eq!(COUNT.touched() - before, 0);
     let cycles = platform.activities()[0].cycles;
     assert!(cycles >= 1000, "{cycles} rounds of four components were among them");
 }

@@ -1,47 +1,16 @@
 //! What a step of a pure chart costs: no allocation, and work that does not grow with the size of the chart. Counted, not
-//! timed; in a binary of its own, because it counts the allocations of its threads.
+//! timed.
 
+use crate::counting::{made, made_by};
 use davit::coordinator::{Class, Coordinator, Core, Incoming, Listener};
 use davit::model::finding::Origin;
 use davit::model::names::{ConfigId, EventName, Ident};
 use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
 use davit::statechart::{Chart, EventId, Machine, Nobody, Raised, compile};
 use davit::time::{Clock, Time};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
-
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is handed on to the system's allocator as it came; the counter is a plain thread-local number that
-// needs neither allocation nor destruction.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `alloc` above, that is from the system's allocator, with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(work: impl FnOnce()) -> u64 {
-    let before = ALLOCATIONS.with(Cell::get);
-    work();
-    ALLOCATIONS.with(Cell::get) - before
-}
 
 fn state(name: &str) -> State {
     State::new(Ident::new(name).unwrap())
@@ -90,7 +59,7 @@ fn a_step_of_a_pure_chart_allocates_nothing() {
     let mut now = Time(0);
     core.start(now, &mut listener);
     let mut reacted = 0;
-    let count = allocations(|| {
+    let count = made_by(|| {
         for i in 0..10_000_usize {
             now = Time(now.as_nanos() + 400_000_000);
             core.tick(now, &mut listener);
@@ -101,7 +70,7 @@ fn a_step_of_a_pure_chart_allocates_nothing() {
     });
     assert_eq!(count, 0);
     assert!(reacted > 5_000 && listener.0 > 10_000, "it did something: {reacted} transitions, {} names", listener.0);
-    assert!(allocations(|| drop(std::hint::black_box(vec![1]))) == 1, "the counter counts");
+    assert!(made_by(|| drop(std::hint::black_box(vec![1]))) == 1, "the counter counts");
 }
 
 /// What its thread has allocated so far, after each step.
@@ -112,7 +81,7 @@ struct Seen {
 
 impl Listener for Seen {
     fn raised(&mut self, _: &Chart, _: &[Raised]) {
-        self.allocated.store(ALLOCATIONS.with(Cell::get), Ordering::SeqCst);
+        self.allocated.store(made(), Ordering::SeqCst);
         self.steps.fetch_add(1, Ordering::SeqCst);
     }
 }
@@ -139,7 +108,7 @@ fn a_coordinator_takes_events_of_every_class_without_allocating() {
     };
     let mut mine = 0;
     for round in 0..1_000 {
-        let own = allocations(|| all.into_iter().for_each(sending));
+        let own = made_by(|| all.into_iter().for_each(sending));
         sent += all.len() as u64;
         let deadline = clock.now() + Duration::from_secs(60);
         while steps.load(Ordering::SeqCst) < sent {
