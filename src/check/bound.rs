@@ -26,6 +26,8 @@ pub enum Bound {
     Squashed,
     /// Which frames are squashed, where those that share nothing were pushed in one order and in another.
     Orders,
+    /// What several undos that failed leave together, where that of one is known at a time.
+    Aside,
     /// [`limits::CHECK_INBOX`].
     Inbox,
     /// [`limits::CHECK_HANDED`], [`limits::CHECK_FORKS`].
@@ -89,6 +91,7 @@ impl Bound {
             Self::Orders => "which frames are squashed was followed for one order of frames that share nothing and were pushed in \
                              several"
                 .to_owned(),
+            Self::Aside => "what only several undos that failed bring about together was not followed".to_owned(),
             Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
             Self::Forks => format!(
                 "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \

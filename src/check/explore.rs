@@ -292,6 +292,9 @@ impl Graph<'_, '_> {
             let by = next.by;
             let (mut next, class) = self.abstracted(next, so_far);
             next.aside &= self.product.worlds.top(next.world).is_none();
+            if next.aside {
+                self.cut(Bound::Aside, so_far.max(class));
+            }
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);

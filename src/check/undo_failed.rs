@@ -8,10 +8,10 @@
 //! frame may be one that was set aside.
 //!
 //! What that keeps: every way that coordinators can go (events, answers, states) is gone with each of what was left known
-//! exactly, so whatever is wrong on it because of what *one* failed undo left is found. What it leaves out is what only two of
-//! them bring about together: nothing of which one could be refused is, since a refusal names one frame that is in its way, and
-//! nothing in a plan depends on another one's frame, for only what changes values and connections of its own is set aside
-//! ([`Aside::of`](super::aside::Aside::of)).
+//! exactly, so whatever is wrong on it because of what *one* failed undo left is found: a refusal names one frame that is in its
+//! way, and nothing in a plan depends on another one's, for only what changes values and connections of its own is set aside
+//! ([`Aside::of`](super::aside::Aside::of)). What only several of them bring about together is left out, and said to be
+//! ([`Bound::Aside`](super::bound::Bound::Aside)).
 
 use super::aside::Aside;
 use super::outcome::{Went, WorldId};
